@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -28,6 +29,9 @@ class RewardWeights:
         time: reward per second [1/s].
         talk: reward for each utterance span of the role itself (participant and Co-Wizard).
         refusal: reward for each refused action of the role.
+
+    Raises:
+        ValueError: a weight is not finite; names the field.
     """
 
     subgoal: float = 1.0
@@ -36,6 +40,11 @@ class RewardWeights:
     time: float = -0.005
     talk: float = -0.01
     refusal: float = -0.02
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not math.isfinite(value):
+                raise ValueError(f"RewardWeights.{name} is {value}; it must be a finite number")
 
     def terms(
         self,

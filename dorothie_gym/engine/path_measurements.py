@@ -98,9 +98,9 @@ def write_waypoints(s: Array, points: Array, heading: float, start: float, spaci
     Args:
         s: see above.
         points: see above.
-        heading: of the path at its start, before which it goes on straight [rad].
+        heading: heading of the path at its start; before it, the path is extended straight [rad].
         start: distance along the path [m].
-        spacing: from one to the next, and from the start to the first [m].
+        spacing: distance between successive points, and from the start to the first [m].
         table: table that is written: positions (m, 2) [m].
     """
     end = len(s) - 1

@@ -39,8 +39,8 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
     """Dialogue of three agents while a car drives through a town.
 
     ## Description
-    The participant has errands to run (a storyboard) and knows the whole map, but cannot drive. The Co-Wizard drives
-    by discrete actions and talks, but knows neither the errands nor the places of hidden landmarks. The Ad-Wizard
+    The participant has a list of tasks (a storyboard) and knows the whole map, but cannot drive. The Co-Wizard drives
+    by discrete actions and talks, but knows neither the tasks nor the places of hidden landmarks. The Ad-Wizard
     creates unexpected situations: weather, roadblocks, sensor faults, changes of the task. `engine` is the
     `SessionEngine` that runs the session.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -23,17 +24,20 @@ class NavigationWeights:
     """Weights of the reward terms; a term of weight 0 is reported as 0.
 
     Attributes:
-        progress: for each metre by which the cost to go decreases. The cost to go is that of the route to the present
-            goal in metres at 40 km/h; as a difference of potentials it leaves the optimal policy unchanged (Ng, Harada
-            and Russell 1999).
-        subgoal: for each subgoal reached.
-        success: at the end, if every live subgoal was reached and nothing was hit.
-        collision: for each collision of the car's own making.
-        infraction: for each red light, stop sign, stretch off the road or on the wrong side.
-        gave_up: at the end, if the participant has given up or the car has left the road.
-        time: for each second.
-        action: for each action that is carried out; discourages needless actions.
-        refusal: for each action that is refused.
+        progress: reward for each metre by which the cost to go decreases. The cost to go is that of the route to the
+            present goal in metres at 40 km/h; as a difference of potentials it leaves the optimal policy unchanged (Ng,
+            Harada and Russell 1999).
+        subgoal: reward for each subgoal reached.
+        success: reward at the end, if every live subgoal was reached without a collision caused by the ego.
+        collision: reward for each collision caused by the ego.
+        infraction: reward for each red light, stop sign, stretch off the road or on the wrong side.
+        gave_up: reward at the end, if the participant has given up or the ego has left the road.
+        time: reward per second [1/s].
+        action: reward for each action that is carried out; discourages needless actions.
+        refusal: reward for each action that is refused.
+
+    Raises:
+        ValueError: a weight is not finite; names the field.
     """
 
     progress: float = 0.02
@@ -45,6 +49,11 @@ class NavigationWeights:
     time: float = -0.02
     action: float = -0.005
     refusal: float = -0.01
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not math.isfinite(value):
+                raise ValueError(f"NavigationWeights.{name} is {value}; it must be a finite number")
 
 
 REWARDS: Mapping[str, NavigationWeights] = MappingProxyType(
@@ -68,6 +77,9 @@ class NavigationConfig:
         patience: time without progress after which the participant gives up and the episode terminates [s].
         decision_frequency: decisions per second [Hz]; it divides the 30 Hz of the physics.
         weights: weights of the reward terms.
+
+    Raises:
+        ValueError: a setting is out of its range; names the field.
     """
 
     guidance: Guidance | str = Guidance.TURNS
@@ -80,14 +92,18 @@ class NavigationConfig:
 
     def __post_init__(self) -> None:
         if self.guidance not in tuple(Guidance):
-            raise ValueError(f"guidance is {str(self.guidance)!r}; it must be one of {', '.join(Guidance)}")
+            raise ValueError(
+                f"NavigationConfig.guidance is {str(self.guidance)!r}; it must be one of {', '.join(Guidance)}"
+            )
         object.__setattr__(self, "guidance", Guidance(self.guidance))
         if self.traffic not in TRAFFIC:
-            raise ValueError(f"traffic is {self.traffic!r}; it must be one of {', '.join(TRAFFIC)}")
+            raise ValueError(f"NavigationConfig.traffic is {self.traffic!r}; it must be one of {', '.join(TRAFFIC)}")
         if not 0.0 <= self.exceptions <= MOST_TRICKS:
-            raise ValueError(f"exceptions is {self.exceptions}; it must be in 0..{MOST_TRICKS:g} a session")
+            raise ValueError(
+                f"NavigationConfig.exceptions is {self.exceptions}; it must be in 0..{MOST_TRICKS:g} a session"
+            )
         if not 10.0 <= self.patience <= 86400.0:
-            raise ValueError(f"patience is {self.patience}; it must be in 10..86400 s")
+            raise ValueError(f"NavigationConfig.patience is {self.patience}; it must be in 10..86400 s")
         EnvConfig(decision_frequency=self.decision_frequency, max_seconds=self.max_seconds)  # validates both
 
     @property

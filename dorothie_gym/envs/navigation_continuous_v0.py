@@ -141,10 +141,10 @@ def _obstacle(world: World) -> list[float]:
 
 
 def _stop(heard: HeardInstruction) -> list[float]:
-    told = heard.instruction
-    if told is None or told.action is not ActionValue.STOP:
+    given = heard.instruction
+    if given is None or given.action is not ActionValue.STOP:
         return [0.0] * 3
-    left = told.distance - heard.driven
+    left = given.distance - heard.driven
     return [1.0, left / DISTANCE_UNIT, left / CLOSE_UNIT]
 
 
@@ -264,30 +264,30 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
 
     def _prepare(self, drive: DrivingSession) -> Physical | None:
         """Returns the manoeuvre of the last instruction, if it is not part of the path yet."""
-        told, planner = drive.heard.instruction, drive.session.world.planner
-        if told is None or told.action not in _MANOEUVRES or planner.in_manoeuvre:
+        given, planner = drive.heard.instruction, drive.session.world.planner
+        if given is None or given.action not in _MANOEUVRES or planner.in_manoeuvre:
             return None
-        action = _MANOEUVRES[told.action]
-        left = told.distance - drive.heard.driven
+        action = _MANOEUVRES[given.action]
+        left = given.distance - drive.heard.driven
         if left < -PREPARED_UNTIL or planner.manoeuvre[0] is action is not PhysicalAction.J_TURN:
             return None
         if action is PhysicalAction.U_TURN:
             may = planner.may_turn_round(float(drive.session.world.car.speed))
             return Physical(action=action) if may else None
-        angle = self._angle(told)
+        angle = self._angle(given)
         if angle is None or (action is PhysicalAction.J_TURN and planner.turn_ahead == angle):
             return None
         return Physical(action=action, angle=angle)
 
-    def _angle(self, told: NavigationInstruction) -> int | None:
+    def _angle(self, given: NavigationInstruction) -> int | None:
         """Returns the angle of the instructed turn or lane switch [degrees, positive left], or None."""
         assert self._controls is not None
-        if told.sector is None:
+        if given.sector is None:
             return None
-        if told.action is ActionValue.LANE_SWITCH:
-            return LEFT if SECTORS[told.sector] > 0 else RIGHT
+        if given.action is ActionValue.LANE_SWITCH:
+            return LEFT if SECTORS[given.sector] > 0 else RIGHT
         choice = self._controls.choice
-        way = self._controls.exits.by_sector(choice[0])[told.sector] if choice is not None else None
+        way = self._controls.exits.by_sector(choice[0])[given.sector] if choice is not None else None
         return None if way is None else way.angle
 
     def _keep_path(self, drive: DrivingSession) -> None:

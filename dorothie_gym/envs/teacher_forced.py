@@ -1,4 +1,4 @@
-"""The three tasks as Gymnasium environments over a corpus: history in, prediction out, the record goes on."""
+"""Base class of the three task environments on recorded sessions (teacher forcing)."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ from dorothie_gym.recording.towns import find_town
 from dorothie_gym.spaces import ActionMapping, SpaceLimits, StepInfo
 
 DEFAULT: Final = "default"
-"""The corpus that is played once and kept in the user's cache folder."""
+"""Name of the corpus that is generated once and kept in the user's cache folder."""
 
 ALL: Final = "all"
 
 SPLITS: Final[Mapping[str, str]] = {fold.value.replace("/", "_"): fold.value for fold in Fold}
-"""Names of splits, and the folds that they are: `val` and `test` are those of seen and unseen towns together."""
+"""Fold of each split; `val` and `test` contain both seen and unseen towns."""
 
 CACHED_SESSIONS: Final = 16
-"""Sessions that an environment keeps in memory, those used last."""
+"""Number of sessions that an environment keeps in memory; the least recently used one is dropped."""
 
 
 class TeacherForcedEnv(PointEnv):
@@ -144,13 +144,13 @@ class TeacherForcedEnv(PointEnv):
 
 
 class _Library:
-    """The sessions of a split, read when they are asked for.
+    """Sessions of a split, read on demand.
 
     Args:
         corpus: as of `TeacherForcedEnv`; `split` likewise.
         split: see there.
-        task: whose points are wanted.
-        limits: sizes that sessions must keep within.
+        task: task of the points.
+        limits: largest numbers of landmarks and streets.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class _Library:
         return len(self.names)
 
     def maps(self, number: int) -> Path | None:
-        """Returns the folder with maps that a session was given with."""
+        """Returns the folder of the maps that belong to a session, or None."""
         found = self._found[number]
         return None if isinstance(found, Session) else found.maps
 
@@ -180,7 +180,7 @@ class _Library:
 
 
 def _sessions(corpus: Corpus | Path | str | Sequence[Session], split: str) -> Sequence[CorpusEntry | Session]:
-    """Sessions, or entries that load them."""
+    """Returns the sessions of a split, or entries that load them."""
     if isinstance(corpus, str) and corpus == DEFAULT:
         # Imported here: the simulation is slow to import, and only the default corpus needs it.
         from dorothie_gym.rollout.corpus_cache import default_corpus

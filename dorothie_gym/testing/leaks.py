@@ -30,9 +30,9 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
     """Checks that the Co-Wizard observes neither hidden landmarks nor the participant's tasks.
 
     A session is played with random and with scripted actions. The same actions are then played in two altered
-    scenarios: hidden landmarks stand at other sites; the story and the order of the errands are others. Observation,
-    action mask and refusals of the Co-Wizard must be equal to the bit at every decision (with other errands: up to the
-    first arrival, which everybody may notice, and with an idle Ad-Wizard, whose refusals depend on the task). The
+    scenarios: hidden landmarks stand at other sites; the story and the order of the tasks differ. Observation,
+    action mask and refusals of the Co-Wizard must be equal to the bit at every decision (with other tasks: up to the
+    first arrival, which all roles may notice, and with an idle Ad-Wizard, because its refusals depend on the task). The
     participant's observation must differ, or the check would prove nothing.
 
     Args:
@@ -69,14 +69,14 @@ def _check_errands(env: ParallelSession, play: Play, seed: int, decisions: int) 
     actions = [{**decision.actions, AD_WIZARD: idle} for decision in played if decision.actions]
     scenario = env.unwrapped.scenario
     runs = []
-    for variant in (scenario, with_other_errands(scenario)):
+    for variant in (scenario, with_other_tasks(scenario)):
         run = []
         for observations, infos in play_again(env, variant, actions):
             run.append((observations, infos))
             if any(event.type == "Subgoal" for event in env.unwrapped.last_events):
                 break
         runs.append(run)
-    where = f"other errands, seed {seed}"
+    where = f"other tasks, seed {seed}"
     for k, (one, other) in enumerate(zip(*runs, strict=False)):
         _check_equal(where, k, one, other)
         same = one[0][PARTICIPANT]["story"] == other[0][PARTICIPANT]["story"]
@@ -119,12 +119,12 @@ def with_hidden_landmarks_moved(scenario: Scenario, town: Town, rng: np.random.G
     return dataclasses.replace(scenario, storyboard=dataclasses.replace(board, landmarks=tuple(landmarks)))
 
 
-def with_other_errands(scenario: Scenario) -> Scenario:
-    """Returns the scenario with another story, and with every errand at the place of the next one."""
+def with_other_tasks(scenario: Scenario) -> Scenario:
+    """Returns the scenario with another story, and with every task at the place of the next one."""
     board = scenario.storyboard
     places = [subgoal.landmark for subgoal in board.subgoals]
     subgoals = tuple(
-        dataclasses.replace(subgoal, landmark=place, description=f"errand {k}")
+        dataclasses.replace(subgoal, landmark=place, description=f"task {k}")
         for k, (subgoal, place) in enumerate(zip(board.subgoals, places[1:] + places[:1], strict=True))
     )
     return dataclasses.replace(scenario, storyboard=dataclasses.replace(board, story="A story.", subgoals=subgoals))

@@ -80,7 +80,7 @@ def spread(held: BeliefTracker) -> float:
     return float(np.trace(np.array(held.places[HIDDEN.name].covariance)))
 
 
-def test_a_street_that_is_named_tells_where_the_place_is() -> None:
+def test_named_street_locates_landmark() -> None:
     held = beliefs()
     told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
     place = held.places[HIDDEN.name]
@@ -88,7 +88,7 @@ def test_a_street_that_is_named_tells_where_the_place_is() -> None:
     assert not held.guesses
 
 
-def test_an_answer_without_a_name_is_about_what_was_last_spoken_of() -> None:
+def test_answer_without_name_refers_to_last_topic() -> None:
     held = beliefs()
     told(held, DialogueMove.QUERY_W, HIDDEN.name, by=Role.CO_WIZARD)
     told(held, DialogueMove.REPLY_W, STREET)
@@ -97,7 +97,7 @@ def test_an_answer_without_a_name_is_about_what_was_last_spoken_of() -> None:
     assert held.places == named.places
 
 
-def test_a_landmark_beside_it_tells_more() -> None:
+def test_named_neighbour_narrows_estimate() -> None:
     held = beliefs()
     told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
     before = spread(held)
@@ -105,7 +105,7 @@ def test_a_landmark_beside_it_tells_more() -> None:
     assert spread(held) < before
 
 
-def test_the_same_said_again_tells_nothing_new() -> None:
+def test_repeated_statement_adds_no_information() -> None:
     held = beliefs()
     told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
     told(held, DialogueMove.EXPLAIN, HIDDEN.name, KNOWN.name)
@@ -125,7 +125,7 @@ def test_the_same_said_again_tells_nothing_new() -> None:
         (DialogueMove.EXPLAIN, (KNOWN.name, STREET), Role.PARTICIPANT),
     ],
 )
-def test_what_says_nothing_of_a_hidden_place_is_left_alone(
+def test_other_utterances_leave_estimates_unchanged(
     move: DialogueMove, values: tuple[SlotValue, ...], speaker: Role
 ) -> None:
     held = beliefs()
@@ -133,7 +133,7 @@ def test_what_says_nothing_of_a_hidden_place_is_left_alone(
     assert not held.places
 
 
-def test_a_new_task_with_a_known_place_changes_the_subject() -> None:
+def test_instruction_about_known_place_changes_topic() -> None:
     held = beliefs()
     told(held, DialogueMove.QUERY_W, HIDDEN.name, by=Role.CO_WIZARD)
     told(held, DialogueMove.INSTRUCT, KNOWN.name)
@@ -141,7 +141,7 @@ def test_a_new_task_with_a_known_place_changes_the_subject() -> None:
     assert HIDDEN.name not in held.places
 
 
-def test_a_mark_of_what_is_in_sight_is_surer_than_one_from_afar() -> None:
+def test_mark_in_sight_has_smaller_covariance() -> None:
     x, y = TOWN.lanes[HIDDEN.lane].position(HIDDEN.station)
     afar, near = beliefs(), beliefs()
     mark(afar, HIDDEN.lane, HIDDEN.station)
@@ -151,7 +151,7 @@ def test_a_mark_of_what_is_in_sight_is_surer_than_one_from_afar() -> None:
     assert spread(near) < spread(fog) == spread(afar)
 
 
-def test_marks_and_words_add_up() -> None:
+def test_marks_and_statements_are_combined() -> None:
     held = beliefs()
     mark(held, HIDDEN.lane, HIDDEN.station)
     alone = spread(held)
@@ -162,7 +162,7 @@ def test_marks_and_words_add_up() -> None:
     assert held.places == again
 
 
-def test_hidden_places_do_not_show_in_what_is_believed() -> None:
+def test_beliefs_do_not_depend_on_hidden_places() -> None:
     moved = tuple(replace(m, position=(m.position[0] + 50.0, m.position[1])) if m.hidden else m for m in LANDMARKS)
     other = replace(SCENARIO, storyboard=replace(SCENARIO.storyboard, landmarks=moved))
     found = []
@@ -174,7 +174,7 @@ def test_hidden_places_do_not_show_in_what_is_believed() -> None:
 
 
 @pytest.mark.parametrize("observe_acts", [True, False])
-def test_the_co_wizard_observes_mean_and_covariance(observe_acts: bool) -> None:
+def test_co_wizard_observes_mean_and_covariance(observe_acts: bool) -> None:
     env = DuoWizardEnv(
         "brookside", config=EnvConfig(observe_acts=observe_acts, world=WorldConfig(vehicles=0, pedestrians=0))
     )

@@ -125,7 +125,7 @@ def search_sites(town: Town, start: tuple[int, float], blocks: dict[int, list[fl
 
 
 @pytest.mark.parametrize("name", ["brookside", "Town02"])
-def test_no_place_is_ever_cut_off(name: str) -> None:
+def test_prop_that_cuts_off_a_site_is_refused(name: str) -> None:
     world, adversary = adversary_in(name)
     town, rng = world.town, np.random.default_rng(0)
     start = (world.planner.lane, world.planner.station)
@@ -143,7 +143,7 @@ def test_no_place_is_ever_cut_off(name: str) -> None:
         assert search_sites(town, (prop.lane_id, prop.station - 17.0), blocks) == before
 
 
-def test_weather_changes_once() -> None:
+def test_unchanged_weather_is_refused() -> None:
     world, adversary = adversary_in()
     action = AdWizardAction(exception=ExceptionKind.WEATHER, weather=WeatherParameter.FOG_DENSITY, share=0.5)
     assert adversary.execute(action) == {"parameter": str(WeatherParameter.FOG_DENSITY), "value": 50.0}
@@ -151,7 +151,7 @@ def test_weather_changes_once() -> None:
     assert world.weather.values[WeatherParameter.FOG_DENSITY] == 50.0
 
 
-def test_fault_ends_by_itself_after_half_a_minute() -> None:
+def test_sensor_fault_ends_after_thirty_seconds() -> None:
     world, adversary = adversary_in()
     action = AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=Sensor.GPS, on=True)
     assert adversary.execute(action) == {"sensor": str(Sensor.GPS), "on": True}
@@ -163,7 +163,7 @@ def test_fault_ends_by_itself_after_half_a_minute() -> None:
 
 
 @pytest.mark.parametrize("kind", [ExceptionKind.SPAWN_VEHICLES, ExceptionKind.SPAWN_PEDESTRIANS])
-def test_spawning_tells_how_many_came_and_keeps_away_from_the_car(kind: ExceptionKind) -> None:
+def test_spawn_reports_count_and_keeps_distance_from_ego(kind: ExceptionKind) -> None:
     world, adversary = adversary_in()
     lane = max((lane for lane in world.town.lanes if not lane.in_junction), key=lambda lane: lane.length)
     assert adversary.execute(place(lane.id, 20, kind)) == "nobody was to come: count is 0"
@@ -181,7 +181,7 @@ def test_spawning_tells_how_many_came_and_keeps_away_from_the_car(kind: Exceptio
 
 @pytest.mark.parametrize("extent", [5, 15, 40])
 @pytest.mark.parametrize("kind", [ExceptionKind.SPAWN_VEHICLES, ExceptionKind.SPAWN_PEDESTRIANS])
-def test_as_many_are_spawned_as_fit_and_then_nobody(kind: ExceptionKind, extent: int) -> None:
+def test_spawn_is_limited_by_room(kind: ExceptionKind, extent: int) -> None:
     world, adversary = adversary_in("midtown")
     far = [lane for lane in world.town.lanes if np.hypot(*(lane.position(40.0) - world.car.position)) > 120.0]
     lane = max((lane for lane in far if not lane.in_junction), key=lambda lane: lane.length)
@@ -207,7 +207,7 @@ def test_no_vehicle_is_spawned_on_a_waypoint() -> None:
             assert vehicle.lane_id != site.lane or np.hypot(*(vehicle.position - np.array(site.waypoint))) >= 7.5
 
 
-def test_vehicles_are_spawned_farther_off_the_faster_the_car_is_and_the_wetter_the_road() -> None:
+def test_spawn_distance_grows_with_speed_and_wetness() -> None:
     world, adversary = adversary_in()
     least = []
     for speed, wet in ((0.0, 0.0), (15.0, 0.0), (15.0, 1.0)):
@@ -219,7 +219,7 @@ def test_vehicles_are_spawned_farther_off_the_faster_the_car_is_and_the_wetter_t
     assert least[2] > least[1]
 
 
-def test_two_props_block_all_lanes_of_a_direction_where_there_is_room_to_turn_round_before_each() -> None:
+def test_props_may_block_a_direction_only_with_room_to_turn_round() -> None:
     world, adversary = adversary_in("northgate")
     town, put = world.town, 0
     for lane in town.lanes:
@@ -236,7 +236,7 @@ def test_two_props_block_all_lanes_of_a_direction_where_there_is_room_to_turn_ro
     assert put >= 1
 
 
-def test_prop_kinds_stand_as_they_are() -> None:
+def test_placed_prop_keeps_kind_and_pose() -> None:
     world, adversary = adversary_in()
     for kind in PropKind:
         action = free_place(world, adversary)

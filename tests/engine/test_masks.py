@@ -69,7 +69,7 @@ def test_masks_fit_the_spaces(role: Role) -> None:
         assert sample["lane"] < len(world.town.lanes)
 
 
-def test_masks_that_were_given_out_may_be_changed() -> None:
+def test_returned_masks_may_be_changed() -> None:
     _, masks, _ = in_town("brookside")
     for value in masks.mask(Role.AD_WIZARD).values():
         if isinstance(value, np.ndarray):
@@ -77,7 +77,7 @@ def test_masks_that_were_given_out_may_be_changed() -> None:
     assert masks.mask(Role.AD_WIZARD)["lane"].any()
 
 
-def test_exceptions_are_masked_by_what_there_is() -> None:
+def test_exception_mask_follows_props_and_task() -> None:
     world, masks, limits = in_town("brookside")
     mask = masks.mask(Role.AD_WIZARD)["exception"]
     assert not mask[ExceptionKind.MOVE_PROP]

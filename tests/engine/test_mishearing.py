@@ -39,7 +39,7 @@ def heard() -> list[tuple[Any, list[dict[str, Any]]]]:
     return talk(noisy(0.2), seed=3, decisions=300)
 
 
-def test_listeners_observe_the_transcript_and_the_ad_wizard_what_was_said(heard: Any) -> None:
+def test_listeners_observe_transcript_and_ad_wizard_spoken_words(heard: Any) -> None:
     other = {Role.PARTICIPANT: "co_wizard", Role.CO_WIZARD: "participant"}
     misheard = 0
     for observations, spoken in heard:
@@ -51,7 +51,7 @@ def test_listeners_observe_the_transcript_and_the_ad_wizard_what_was_said(heard:
     assert misheard > 5
 
 
-def test_acts_that_were_meant_do_not_come_with_words_that_were_misheard(heard: Any) -> None:
+def test_intended_act_is_not_observed_with_misheard_words(heard: Any) -> None:
     other = {Role.PARTICIPANT: "co_wizard", Role.CO_WIZARD: "participant"}
     differing = 0
     for observations, spoken in heard:
@@ -66,7 +66,7 @@ def test_acts_that_were_meant_do_not_come_with_words_that_were_misheard(heard: A
     assert differing
 
 
-def test_an_act_says_nothing_that_was_not_heard() -> None:
+def test_observed_act_follows_from_transcript() -> None:
     """An Instruct to go to the KFC by words that name no place arrives as these words alone would."""
     env = noisy(0.9)
     to_kfc = DialogueAct.of(DialogueMove.INSTRUCT, LandmarkName.KFC)
@@ -86,7 +86,7 @@ def test_an_act_says_nothing_that_was_not_heard() -> None:
     assert observations["ad_wizard"]["participant_moves"][0] == DialogueMove.INSTRUCT
 
 
-def test_without_word_errors_sessions_have_no_transcripts_and_hear_everything() -> None:
+def test_sessions_without_word_errors_have_no_transcripts() -> None:
     for observations, spoken in talk(noisy(0.0), seed=3):
         for act in spoken:
             assert "recognised" not in act
@@ -94,7 +94,7 @@ def test_without_word_errors_sessions_have_no_transcripts_and_hear_everything() 
             assert observations[listener][f"{act['by']}_text"] == act["text"]
 
 
-def test_word_errors_are_drawn_apart_from_everything_else() -> None:
+def test_word_errors_use_their_own_random_stream() -> None:
     """Actions given, only what is heard differs: the words found for acts and the traffic are the same."""
     clear, unclear = (DuoWizardEnv(config=EnvConfig(word_error_rate=rate)) for rate in (0.0, 0.5))
     for env in (clear, unclear):
@@ -123,13 +123,13 @@ def measured_rate(sessions: list[Session]) -> float:
     )
 
 
-def test_a_session_has_about_the_word_errors_that_were_asked_for(tmp_path: Path) -> None:
+def test_word_error_rate_of_session_equals_setting(tmp_path: Path) -> None:
     assert measured_rate([played(noisy(0.3, max_seconds=200.0), 2, tmp_path / "one")]) == pytest.approx(0.3, abs=0.1)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.05, 0.15, 0.3])
-def test_a_corpus_has_the_word_errors_that_were_asked_for(tmp_path: Path, rate: float) -> None:
+def test_word_error_rate_of_corpus_equals_setting(tmp_path: Path, rate: float) -> None:
     env = noisy(rate)
     assert measured_rate([played(env, seed, tmp_path / str(seed)) for seed in range(16)]) == pytest.approx(
         rate, rel=0.1
@@ -137,6 +137,6 @@ def test_a_corpus_has_the_word_errors_that_were_asked_for(tmp_path: Path, rate: 
 
 
 @pytest.mark.parametrize("rate", [-0.1, 1.0, float("nan")])
-def test_rates_out_of_range_are_named(rate: float) -> None:
+def test_error_names_rate_out_of_range(rate: float) -> None:
     with pytest.raises(ValueError, match=r"EnvConfig.word_error_rate is .*; it must be at least 0 and below 1"):
         EnvConfig(word_error_rate=rate)

@@ -17,7 +17,7 @@ def env() -> DuoWizardEnv:
     return env
 
 
-def test_objects_are_told_nearest_first_and_within_sight(env: DuoWizardEnv) -> None:
+def test_objects_are_sorted_by_distance_and_within_sight(env: DuoWizardEnv) -> None:
     seen = 0
     for _ in range(40):
         observations, *_ = env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
@@ -32,7 +32,7 @@ def test_objects_are_told_nearest_first_and_within_sight(env: DuoWizardEnv) -> N
     assert seen > 0
 
 
-def test_car_waits_before_its_first_turn_and_shows_the_exits() -> None:
+def test_exits_are_observed_before_first_turn() -> None:
     env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
     observations, _ = env.reset(seed=8)
     for _ in range(80):

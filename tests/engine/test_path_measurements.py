@@ -37,7 +37,7 @@ def seen(env: DuoWizardEnv) -> dict[str, Any]:
     return env.session.observations((Role.CO_WIZARD,))[Role.CO_WIZARD]
 
 
-def test_with_an_exact_estimate_everything_is_where_it_is() -> None:
+def test_exact_estimate_gives_true_places() -> None:
     env = drifted_env()
     view, truth = seen(env), env.session.observations((Role.AD_WIZARD,))[Role.AD_WIZARD]
     # the planner's own place is that of a frame ago
@@ -49,7 +49,7 @@ def test_with_an_exact_estimate_everything_is_where_it_is() -> None:
 
 
 @pytest.mark.parametrize("ahead", [-4.0, 5.0])
-def test_waypoints_and_exits_follow_the_estimate_along_the_road(ahead: float) -> None:
+def test_waypoints_and_exits_follow_the_estimated_place(ahead: float) -> None:
     straight, drifted = seen(drifted_env()), seen(drifted_env((ahead, 0.0, 0.0)))
     assert drifted["exits"][0, ExitColumn.DISTANCE] == pytest.approx(
         straight["exits"][0, ExitColumn.DISTANCE] - ahead, abs=0.1
@@ -78,7 +78,7 @@ def test_objects_are_seen_around_the_estimated_pose() -> None:
 
 
 @pytest.mark.parametrize("shift", [(6.0, 0.0, 0.0), (-6.0, 0.0, 0.0), (4.0, 3.0, 0.2)])
-def test_nothing_in_the_observation_is_at_its_true_place(shift: tuple[float, float, float]) -> None:
+def test_observation_contains_no_true_place(shift: tuple[float, float, float]) -> None:
     """No point shown lies where the true pose would put it."""
     env = drifted_env(shift)
     view, truth = seen(env), env.session.observations((Role.AD_WIZARD,))[Role.AD_WIZARD]
@@ -87,7 +87,7 @@ def test_nothing_in_the_observation_is_at_its_true_place(shift: tuple[float, flo
     assert abs(view["station"][0] - truth["station"][0]) > 1.0
 
 
-def test_waypoints_go_on_straight_before_the_start_of_the_path() -> None:
+def test_waypoints_are_extended_straight_before_path_start() -> None:
     env = drifted_env()
     world = env.session.world
     start = world.planner.path.position_at(0.0)
@@ -101,7 +101,7 @@ def test_waypoints_go_on_straight_before_the_start_of_the_path() -> None:
     assert math.hypot(first[0] - start[0], first[1] - start[1]) == pytest.approx(15.0, abs=0.2)
 
 
-def test_half_a_minute_without_gps_drifts_and_gps_brings_it_back() -> None:
+def test_pose_drifts_without_gps_and_recovers() -> None:
     env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
     env.reset(seed=8)
     world = env.session.world
@@ -117,7 +117,7 @@ def test_half_a_minute_without_gps_drifts_and_gps_brings_it_back() -> None:
 
 
 @pytest.mark.parametrize("frames", [1, 7, 15, 100])
-def test_a_fault_ends_within_half_a_minute_however_long_decisions_are(frames: int) -> None:
+def test_fault_ends_within_thirty_seconds_at_any_decision_frequency(frames: int) -> None:
     env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
     env.reset(seed=8)
     world = env.session.world

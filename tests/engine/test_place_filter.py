@@ -16,26 +16,26 @@ def deviations(place: PlaceEstimate) -> tuple[float, float]:
     return math.sqrt(xx), math.sqrt(yy)
 
 
-def test_a_street_is_long_and_narrow() -> None:
+def test_street_gives_elongated_estimate() -> None:
     place = about(None, STREET, 15.0)
     assert place.mean == pytest.approx((0.0, 0.0))
     assert deviations(place) == pytest.approx((math.hypot(118.3, 15.0), 15.0), rel=0.01)
 
 
-def test_two_streets_cross_at_a_corner() -> None:
+def test_two_streets_give_estimate_at_their_corner() -> None:
     crossing = STREET[:, ::-1] + [60.0, 0.0]
     place = about(about(None, STREET, 15.0), crossing, 15.0)
     assert place.mean == pytest.approx((60.0, 0.0), abs=3.0)
     assert max(deviations(place)) < 16.0
 
 
-def test_a_slanting_street_correlates_the_axes() -> None:
+def test_slanting_street_correlates_axes() -> None:
     slanting = np.column_stack((STREET[:, 0], STREET[:, 0]))
     (xx, xy), (_, yy) = about(None, slanting, 15.0).covariance
     assert xy > 0.9 * math.sqrt(xx * yy)
 
 
-def test_a_statement_about_a_street_narrows_a_place_across_it_only() -> None:
+def test_statement_about_street_narrows_estimate_across_it_only() -> None:
     before = near(30.0, 20.0, 25.0)
     after = about(before, STREET, 15.0)
     assert abs(after.mean[1]) < 10.0
@@ -44,7 +44,7 @@ def test_a_statement_about_a_street_narrows_a_place_across_it_only() -> None:
     assert deviations(after)[0] == pytest.approx(25.0, abs=1.0)
 
 
-def test_two_landmarks_of_a_name_leave_both_possible() -> None:
+def test_two_landmarks_of_a_name_stay_possible() -> None:
     both = about(None, np.array([[-100.0, 0.0], [100.0, 0.0]]), 20.0)
     assert deviations(both)[0] > 100.0
     told = about(near(80.0, 0.0, 30.0), np.array([[-100.0, 0.0], [100.0, 0.0]]), 20.0)
@@ -59,24 +59,24 @@ def test_marks_refine_each_other() -> None:
     assert deviations(place) == pytest.approx((10.0, 10.0))
 
 
-def test_a_mark_that_is_moved_counts_more_than_the_old_one() -> None:
+def test_moved_mark_outweighs_earlier_mark() -> None:
     place = refined(near(0.0, 0.0, 20.0), near(30.0, 0.0, 20.0), drift=20.0)
     assert 15.0 < place.mean[0] < 30.0
 
 
 @pytest.mark.parametrize("statement", ["mark", "street"])
-def test_what_excludes_all_that_was_known_begins_anew(statement: str) -> None:
+def test_contradicting_statement_replaces_estimate(statement: str) -> None:
     before = near(0.0, 500.0, 20.0)
     after = refined(before, near(0.0, 0.0, 20.0)) if statement == "mark" else about(before, STREET, 15.0)
     assert after == (near(0.0, 0.0, 20.0) if statement == "mark" else about(None, STREET, 15.0))
 
 
-def test_a_place_about_nothing_is_an_error() -> None:
+def test_estimate_without_points_raises_error() -> None:
     with pytest.raises(ValueError, match="at least one point"):
         about(None, np.zeros((0, 2)), 10.0)
 
 
-def test_places_are_within_the_ellipse_as_often_as_it_says() -> None:
+def test_coverage_of_ellipse_equals_its_probability() -> None:
     """A place beside a landmark on a street, told of in either order, and marked."""
     rng = np.random.default_rng(0)
     inside = []

@@ -11,7 +11,7 @@ from dorothie_gym.recording import ActorKind, Decision
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_actions_are_put_together_again_as_they_were(seed: int) -> None:
+def test_compact_actions_expand_to_the_originals(seed: int) -> None:
     env = DuoWizardEnv("brookside")
     for agent in env.possible_agents:
         env.action_space(agent).seed(seed)
@@ -23,14 +23,14 @@ def test_actions_are_put_together_again_as_they_were(seed: int) -> None:
             assert all(np.array_equal(again[agent][name], value) for name, value in action.items())
 
 
-def test_idle_actions_leave_nothing_to_write() -> None:
+def test_idle_actions_are_omitted() -> None:
     limits = DuoWizardEnv("brookside").limits
     assert compact(idle_actions(limits), limits) == {}
     said = {**idle_actions(limits), "participant": {**idle_actions(limits)["participant"], "move": 3}}
     assert compact(said, limits) == {Role.PARTICIPANT: {"move": 3}}
 
 
-def test_everybody_around_the_car_is_recorded_once() -> None:
+def test_every_actor_is_recorded_once() -> None:
     env = DuoWizardEnv("brookside")
     env.reset(seed=3)
     actors = env.session.world.actors
@@ -47,7 +47,7 @@ def test_everybody_around_the_car_is_recorded_once() -> None:
     assert (rows["kind"] == ActorKind.PROP).sum() == 1
 
 
-def test_lights_are_those_of_the_town_at_every_moment() -> None:
+def test_recorded_lights_equal_programme_at_any_time() -> None:
     town = load_town("midtown")
     lights = LightStates(town)
     signals = {signal for programme in town.programmes for signal in programme.signals}

@@ -13,7 +13,7 @@ DRAWS = 1000
 
 
 @pytest.mark.parametrize("name", town_names())
-def test_every_seed_binds_a_storyboard_whose_places_can_be_reached(name: str) -> None:
+def test_every_seed_binds_storyboard_with_reachable_places(name: str) -> None:
     town = load_town(name)
     search = router(town)
     unreachable = []
@@ -27,7 +27,7 @@ def test_every_seed_binds_a_storyboard_whose_places_can_be_reached(name: str) ->
 
 
 @pytest.mark.parametrize("name", town_names())
-def test_seeds_shuffle_street_names_sites_and_departures(name: str) -> None:
+def test_seeds_vary_street_names_sites_and_departures(name: str) -> None:
     town = load_town(name)
     drawn = [draw_scenario(town, None, seed) for seed in range(DRAWS)]
     given = [(scenario.street_names[k], k) for scenario in drawn for k in range(len(town.streets))]
@@ -41,5 +41,5 @@ def test_seeds_shuffle_street_names_sites_and_departures(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", town_names())
-def test_towns_have_as_many_streets_as_a_session_gives_names_to(name: str) -> None:
+def test_every_street_of_shipped_towns_gets_a_name(name: str) -> None:
     assert 8 <= len(load_town(name).streets) <= 15

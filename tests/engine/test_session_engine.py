@@ -39,7 +39,7 @@ def step(env: DuoWizardEnv, action: Any = None) -> tuple[Any, ...]:
     return env.step(actions)
 
 
-def test_dialogue_is_heard_after_its_last_word(env: DuoWizardEnv) -> None:
+def test_utterance_is_delivered_after_its_last_word(env: DuoWizardEnv) -> None:
     words = "please turn left at the next junction now"  # eight words: 3.2 s
     speech = Speech(act=DialogueAct(move=DialogueMove.INSTRUCT), text=words)
     observations, *_ = step(env, ParticipantAction(speech=speech))
@@ -108,7 +108,7 @@ def test_participant_does_not_see_subgoals_before_they_are_triggered() -> None:
     assert waiting > 0
 
 
-def test_observations_fit_their_spaces_throughout(env: DuoWizardEnv) -> None:
+def test_observations_are_in_their_spaces(env: DuoWizardEnv) -> None:
     infos: Any = None
     observations, infos = env.reset(seed=6)
     for agent in env.possible_agents:
@@ -120,7 +120,7 @@ def test_observations_fit_their_spaces_throughout(env: DuoWizardEnv) -> None:
         observations, *_, infos = env.step(actions)
 
 
-def test_infractions_are_events_and_counted_in_info_and_summary(env: DuoWizardEnv) -> None:
+def test_infractions_are_logged_and_counted(env: DuoWizardEnv) -> None:
     *_, infos = step(env)
     assert set(infos["participant"]["infractions"].values()) == {0}
     world = env.session.world

@@ -143,7 +143,7 @@ def play_session_at_random(seed: int, seconds: float) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("seed", [0, 2, 3, 4, 8, 20])
-def test_session_in_which_everybody_acts_at_random_stays_solvable(seed: int) -> None:
+def test_session_with_random_actions_stays_solvable(seed: int) -> None:
     exceptions, blocked = play_session_at_random(seed, 10.0)
     assert exceptions >= 2
     assert blocked > 0
@@ -151,17 +151,17 @@ def test_session_in_which_everybody_acts_at_random_stays_solvable(seed: int) -> 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_a_hundred_sessions_in_which_everybody_acts_at_random_stay_solvable() -> None:
+def test_hundred_sessions_with_random_actions_stay_solvable() -> None:
     played = [play_session_at_random(seed, 30.0) for seed in range(1000, 1100)]
     assert sum(blocked > 0 for _, blocked in played) >= 60
 
 
 @pytest.mark.parametrize("name", ["brookside", "midtown"])
-def test_car_that_stands_can_drive_to_every_place_whatever_is_put(name: str) -> None:
+def test_standing_car_can_reach_every_site_despite_props(name: str) -> None:
     assert sum(play_standing(name, seed, 40) for seed in range(2)) >= 4
 
 
-def test_car_that_drives_can_go_on_to_every_place_whatever_is_put() -> None:
+def test_driving_car_can_reach_every_site_despite_props() -> None:
     assert play_driving("brookside", 0, 10.0)[1] >= 3
 
 

@@ -10,7 +10,7 @@ from tests.sim.driving import network, world_at
 
 
 @pytest.mark.parametrize("name", ["brookside", "northgate", "Town05"])
-def test_options_and_lanes_ahead_are_those_of_the_planner(name: str) -> None:
+def test_options_and_lanes_ahead_equal_those_of_planner(name: str) -> None:
     town = network(name).town
     start = next(
         lane for lane in town.lanes if not lane.in_junction and lane.length > 60.0 and len(town.exits(lane.id)) > 1

@@ -35,7 +35,7 @@ def play_in_a_process(folder: Path, hash_seed: str) -> list[str]:
     return done.stdout.split()
 
 
-def test_two_processes_see_and_record_the_same(tmp_path: Path) -> None:
+def test_two_processes_observe_and_record_the_same(tmp_path: Path) -> None:
     one = play_in_a_process(tmp_path / "one", "1")
     other = play_in_a_process(tmp_path / "other", "2")
     assert len(one) == 2 * 41
@@ -47,21 +47,21 @@ def test_two_processes_see_and_record_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("play", [play_at_random, play_by_script])
-def test_an_environment_that_was_used_before_plays_the_same(play: Any) -> None:
+def test_used_environment_plays_equal_session(play: Any) -> None:
     used = DuoWizardEnv()
     list(play(used, seed=5, decisions=12))
     fresh = [digest(moment) for moment in play(DuoWizardEnv(), seed=6, decisions=12)]
     assert [digest(moment) for moment in play(used, seed=6, decisions=12)] == fresh
 
 
-def test_what_was_returned_is_left_alone() -> None:
+def test_returned_objects_are_not_changed() -> None:
     env = DuoWizardEnv()
     kept = list(play_at_random(env, seed=3, decisions=8))
     seen = [digest(moment) for moment in play_at_random(DuoWizardEnv(), seed=3, decisions=8)]
     assert [digest(moment) for moment in kept] == seen
 
 
-def test_resets_without_a_seed_go_on_from_the_last_seed() -> None:
+def test_resets_without_seed_continue_the_series() -> None:
     env, other = DuoWizardEnv(), DuoWizardEnv()
     for each in (env, other):
         each.reset(seed=8)
@@ -70,6 +70,6 @@ def test_resets_without_a_seed_go_on_from_the_last_seed() -> None:
     assert [digest(other.reset()) for _ in range(2)] == [first, second]
 
 
-def test_seeds_matter() -> None:
+def test_different_seeds_give_different_sessions() -> None:
     env = DuoWizardEnv()
     assert not np.array_equal(env.reset(seed=1)[0]["ad_wizard"]["pose"], env.reset(seed=2)[0]["ad_wizard"]["pose"])

@@ -37,7 +37,7 @@ def test_stable_baselines_accepts_it_when_flat(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", IDS)
-def test_passive_checks_find_nothing_in_an_episode(name: str) -> None:
+def test_passive_checker_accepts_episode(name: str) -> None:
     env = make(name)
     _, info = env.reset(seed=4)
     env.action_space.seed(4)

@@ -37,7 +37,7 @@ def test_observations_and_infos_do_not_change_after_further_steps() -> None:
         assert len(set(then)) == len(then)
 
 
-def test_what_is_done_to_observations_and_infos_has_no_effect() -> None:
+def test_changes_of_returned_objects_have_no_effect() -> None:
     clean = [
         digest((observations, infos))
         for observations, infos, _ in play_at_random(DuoWizardEnv(config=CONFIG), seed=6, decisions=20)

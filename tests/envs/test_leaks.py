@@ -13,7 +13,7 @@ from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import Role
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import SubgoalColumn, noop
-from dorothie_gym.testing.leaks import with_hidden_landmarks_moved, with_other_errands
+from dorothie_gym.testing.leaks import with_hidden_landmarks_moved, with_other_tasks
 from dorothie_gym.testing.playing import play_again
 from tests.envs.sessions_played import play_at_random, play_by_script
 
@@ -23,7 +23,7 @@ def env() -> DuoWizardEnv:
     return DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2)))
 
 
-def check_that_hidden_places_do_not_show(env: DuoWizardEnv, play: Any, seed: int, decisions: int) -> None:
+def check_hidden_places_are_not_visible(env: DuoWizardEnv, play: Any, seed: int, decisions: int) -> None:
     """Plays a session, and plays its actions again where hidden landmarks stand elsewhere."""
     while not any(landmark.hidden for landmark in draw_scenario(env.town, None, seed).storyboard.landmarks):
         seed += 1000
@@ -43,25 +43,25 @@ def check_that_hidden_places_do_not_show(env: DuoWizardEnv, play: Any, seed: int
 
 @pytest.mark.parametrize("seed", [0, 2, 5])
 @pytest.mark.parametrize(("play", "decisions"), [(play_at_random, 40), (play_by_script, 120)])
-def test_places_of_hidden_landmarks_do_not_show(env: DuoWizardEnv, play: Any, decisions: int, seed: int) -> None:
-    check_that_hidden_places_do_not_show(env, play, seed, decisions)
+def test_hidden_places_are_not_visible(env: DuoWizardEnv, play: Any, decisions: int, seed: int) -> None:
+    check_hidden_places_are_not_visible(env, play, seed, decisions)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 125))
 @pytest.mark.parametrize(("play", "decisions"), [(play_at_random, 120), (play_by_script, 600)])
-def test_places_of_hidden_landmarks_never_show(env: DuoWizardEnv, play: Any, decisions: int, seed: int) -> None:
-    check_that_hidden_places_do_not_show(env, play, seed, decisions)
+def test_hidden_places_are_never_visible(env: DuoWizardEnv, play: Any, decisions: int, seed: int) -> None:
+    check_hidden_places_are_not_visible(env, play, seed, decisions)
 
 
 @pytest.mark.parametrize("config", [{"word_error_rate": 0.25}, {"word_error_rate": 0.25, "observe_acts": False}])
-def test_places_of_hidden_landmarks_do_not_show_in_what_is_misheard(config: dict[str, Any]) -> None:
+def test_hidden_places_are_not_visible_with_word_errors(config: dict[str, Any]) -> None:
     noisy = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), **config))
-    check_that_hidden_places_do_not_show(noisy, play_by_script, seed=2, decisions=120)
+    check_hidden_places_are_not_visible(noisy, play_by_script, seed=2, decisions=120)
 
 
-def check_that_errands_do_not_show(env: DuoWizardEnv, play: Any, seed: int, decisions: int) -> None:
-    """Plays a session, and plays its actions again with other errands and another story, up to the first arrival.
+def check_tasks_are_not_visible(env: DuoWizardEnv, play: Any, seed: int, decisions: int) -> None:
+    """Plays a session, and plays its actions again with other tasks and another story, up to the first arrival.
 
     Actions of the Ad-Wizard on the task are left out: whether one is refused tells of the task, and is told to it.
     """
@@ -69,7 +69,7 @@ def check_that_errands_do_not_show(env: DuoWizardEnv, play: Any, seed: int, deci
     idle = noop(Role.AD_WIZARD, env.limits)
     actions = [{**actions, "ad_wizard": idle} for _, _, actions in played if actions]
     runs = []
-    for scenario in (env.scenario, with_other_errands(env.scenario)):
+    for scenario in (env.scenario, with_other_tasks(env.scenario)):
         run = []
         for observations, infos in play_again(env, scenario, actions):
             run.append((observations, infos))
@@ -88,18 +88,18 @@ def check_that_errands_do_not_show(env: DuoWizardEnv, play: Any, seed: int, deci
 
 @pytest.mark.parametrize("rate", [0.0, 0.25])
 @pytest.mark.parametrize("play", [play_at_random, play_by_script])
-def test_errands_do_not_show_to_the_co_wizard(play: Any, rate: float) -> None:
+def test_tasks_are_not_visible_to_the_co_wizard(play: Any, rate: float) -> None:
     env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), word_error_rate=rate))
-    check_that_errands_do_not_show(env, play, seed=3, decisions=60)
+    check_tasks_are_not_visible(env, play, seed=3, decisions=60)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(200, 215))
 @pytest.mark.parametrize("rate", [0.0, 0.2])
 @pytest.mark.parametrize("play", [play_at_random, play_by_script])
-def test_errands_never_show_to_the_co_wizard(play: Any, rate: float, seed: int) -> None:
+def test_tasks_are_never_visible_to_the_co_wizard(play: Any, rate: float, seed: int) -> None:
     env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2), word_error_rate=rate))
-    check_that_errands_do_not_show(env, play, seed=seed, decisions=400)
+    check_tasks_are_not_visible(env, play, seed=seed, decisions=400)
 
 
 def play_in_silence(env: DuoWizardEnv, seed: int, decisions: int = 4) -> list[dict[str, Any]]:
@@ -112,7 +112,7 @@ def play_in_silence(env: DuoWizardEnv, seed: int, decisions: int = 4) -> list[di
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_co_wizard_reads_nothing_of_the_story(env: DuoWizardEnv, seed: int) -> None:
+def test_co_wizard_does_not_observe_story(env: DuoWizardEnv, seed: int) -> None:
     for observations in play_in_silence(env, seed):
         texts = {name: value for name, value in observations["co_wizard"].items() if isinstance(value, str)}
         assert texts == {"participant_text": ""}
@@ -120,14 +120,14 @@ def test_co_wizard_reads_nothing_of_the_story(env: DuoWizardEnv, seed: int) -> N
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_hidden_landmarks_are_not_on_the_co_wizards_map(env: DuoWizardEnv, seed: int) -> None:
+def test_co_wizard_map_lacks_hidden_landmarks(env: DuoWizardEnv, seed: int) -> None:
     for observations in play_in_silence(env, seed):
         known = [landmark for landmark in env.scenario.storyboard.landmarks if not landmark.hidden]
         table = observations["co_wizard"]["landmarks"]
         assert [(row[1], row[2]) for row in table if row[0]] == [landmark.position for landmark in known]
 
 
-def test_participant_does_not_see_subgoals_that_are_not_triggered_yet(env: DuoWizardEnv) -> None:
+def test_participant_does_not_observe_untriggered_subgoals(env: DuoWizardEnv) -> None:
     checked = 0
     for seed in range(12):
         observations = play_in_silence(env, seed, decisions=1)[-1]
@@ -143,7 +143,7 @@ def test_participant_does_not_see_subgoals_that_are_not_triggered_yet(env: DuoWi
     assert checked
 
 
-def test_participant_does_not_see_what_the_ad_wizard_may_do(env: DuoWizardEnv) -> None:
+def test_participant_does_not_observe_permissions(env: DuoWizardEnv) -> None:
     for seed in range(8):
         table = play_in_silence(env, seed, decisions=1)[-1]["participant"]["subgoals"]
         assert not table[:, SubgoalColumn.CAN_TRIGGER :].any()

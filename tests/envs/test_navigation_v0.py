@@ -7,6 +7,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from dorothie_gym.engine.config import RewardWeights
 from dorothie_gym.engine.scenario import draw_scenario
 from dorothie_gym.envs.navigation_config import NavigationWeights
 from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
@@ -71,7 +72,7 @@ def play(env: NavigationEnv, seed: int, steps: int) -> list[tuple[Any, float]]:
     return played
 
 
-def test_equal_seeds_and_actions_make_equal_episodes(env: NavigationEnv) -> None:
+def test_equal_seeds_and_actions_give_equal_episodes(env: NavigationEnv) -> None:
     first, second = play(env, 5, 60), play(NavigationEnv(), 5, 60)
     for (one, reward), (two, other) in zip(first, second, strict=True):
         np.testing.assert_array_equal(one, two)
@@ -238,12 +239,19 @@ def test_values_lie_in_the_ranges_of_their_fields() -> None:
         ({"render_mode": "ascii"}, "render_mode"),
     ],
 )  # fmt: skip
-def test_bad_settings_are_named(settings: dict[str, Any], named: str) -> None:
+def test_error_names_invalid_setting(settings: dict[str, Any], named: str) -> None:
     with pytest.raises(ValueError, match=named):
         NavigationEnv(**settings)
 
 
-def test_steps_need_a_session() -> None:
+def test_reward_weights_must_be_finite() -> None:
+    with pytest.raises(ValueError, match="NavigationWeights.progress is nan"):
+        NavigationWeights(progress=float("nan"))
+    with pytest.raises(ValueError, match="RewardWeights.time is inf"):
+        RewardWeights(time=float("inf"))
+
+
+def test_step_before_reset_raises_error() -> None:
     env = NavigationEnv(max_seconds=1.0)
     with pytest.raises(gym.error.ResetNeeded):
         env.step(0)

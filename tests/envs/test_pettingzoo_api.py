@@ -69,11 +69,11 @@ def test_aec_api() -> None:
     api_test(turns(), num_cycles=CYCLES)
 
 
-def test_same_seed_plays_the_same_in_turns() -> None:
+def test_equal_seeds_give_equal_aec_sessions() -> None:
     seed_test(turns, num_cycles=CYCLES)
 
 
-def test_same_seed_plays_the_same_in_parallel() -> None:
+def test_equal_seeds_give_equal_parallel_sessions() -> None:
     parallel_seed_test(parallel, num_cycles=CYCLES)
 
 

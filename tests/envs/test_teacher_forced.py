@@ -51,7 +51,7 @@ def test_gymnasium_accepts_the_environment(env_class: type[TeacherForcedEnv]) ->
 
 
 @pytest.mark.parametrize(("env_class", "count"), [(UfNEnv, 4), (RfNEnv, 3), (NfDEnv, 5)])
-def test_labels_earn_everything(env_class: type[TeacherForcedEnv], count: int) -> None:
+def test_labels_get_full_reward(env_class: type[TeacherForcedEnv], count: int) -> None:
     _observations, rewards, info = play(env_class([session(talk())]))
     assert rewards == [1.0] * count
     assert info["points_left"] == 0
@@ -60,7 +60,7 @@ def test_labels_earn_everything(env_class: type[TeacherForcedEnv], count: int) -
 
 
 @pytest.mark.parametrize("env_class", ENVS)
-def test_predictions_do_not_change_what_is_observed(env_class: type[TeacherForcedEnv]) -> None:
+def test_observations_do_not_depend_on_predictions(env_class: type[TeacherForcedEnv]) -> None:
     one, _, _ = play(env_class([session(talk())]))
     other, _, _ = play(env_class([session(talk())]), right=False)
     np.testing.assert_equal(one, other)
@@ -94,7 +94,7 @@ def test_observation_holds_the_history_newest_first() -> None:
     assert third["landmarks"][:, LandmarkColumn.NAME].tolist()[:2] == [4.0, 0.0]
 
 
-def test_only_ufn_sees_the_words() -> None:
+def test_only_ufn_observes_words() -> None:
     for env in (RfNEnv([session(talk())]), NfDEnv([session(talk())])):
         assert "utterance" not in env.observation_space.spaces  # type: ignore[attr-defined]
 
@@ -124,7 +124,7 @@ def test_reward_of_nfd_is_the_mean_of_action_and_joint_on_the_circle() -> None:
     assert (reward, info["reward_terms"]) == (0.5, {"action": 1.0, "joint": 0.0})
 
 
-def test_where_the_angle_is_not_known_only_the_action_counts() -> None:
+def test_reward_without_recorded_angle_is_that_of_the_action() -> None:
     env = NfDEnv([session([physical(1, PhysicalAction.J_TURN), physical(2, PhysicalAction.STOP)])])
     assert env.reset(seed=0)[1]["points_left"] == 2
     _, reward, _, _, info = env.step({"action": 3, "angle": 77})
@@ -145,14 +145,14 @@ def test_where_the_angle_is_not_known_only_the_action_counts() -> None:
         (NfDEnv, {"action": 1, "angle": 1.5}, "'angle' is 1.5"),
     ],
 )
-def test_malformed_action_is_told_by_field(env_class: type[TeacherForcedEnv], action: Any, message: str) -> None:
+def test_error_names_malformed_field(env_class: type[TeacherForcedEnv], action: Any, message: str) -> None:
     env = env_class([session(talk())])
     env.reset(seed=0)
     with pytest.raises(ValueError, match=message):
         env.step(action)
 
 
-def test_step_without_a_point_is_refused() -> None:
+def test_step_without_point_raises_error() -> None:
     env = UfNEnv([session(talk())])
     with pytest.raises(ResetNeeded, match=r"call reset\(\) first"):
         env.step({"move": 1, "slots": np.zeros(69, dtype=np.int8)})
@@ -172,17 +172,17 @@ def folder(tmp_path: Path) -> Path:
     ("split", "names"),
     [("all", "abcde"), ("train", "ab"), ("val", "c"), ("test", "de"), ("test_seen", "d"), ("test_unseen", "e")],
 )
-def test_a_split_is_a_fold_of_the_corpus(folder: Path, split: str, names: str) -> None:
+def test_split_selects_fold_of_corpus(folder: Path, split: str, names: str) -> None:
     env = gym.make("dorothie_gym/UfN-v0", corpus=folder, split=split)
     assert {env.reset(seed=seed)[1]["session"] for seed in range(30)} == set(names)
 
 
-def test_a_split_that_the_corpus_lacks_is_told_with_those_it_has(folder: Path) -> None:
+def test_error_for_missing_split_lists_folds(folder: Path) -> None:
     with pytest.raises(SessionError, match="split 'val_unseen' has no session; there are train, val_seen, test_seen"):
         UfNEnv(folder, split="val_unseen")
 
 
-def test_sessions_are_chosen_by_number_and_name(folder: Path) -> None:
+def test_session_is_selected_by_number_or_name(folder: Path) -> None:
     env = RfNEnv(Corpus.load(folder), split="train")
     assert env.reset(options={"session": 1})[1]["session"] == "b"
     assert env.reset(options={"session": "a"})[1]["session"] == "a"
@@ -193,7 +193,7 @@ def test_sessions_are_chosen_by_number_and_name(folder: Path) -> None:
 
 @pytest.mark.parametrize("env_class", ENVS)
 @pytest.mark.parametrize("layout", [release, sample, hub])
-def test_sessions_of_the_paper_s_corpus_can_be_played(
+def test_sdn_sessions_can_be_played(
     env_class: type[TeacherForcedEnv], layout: Callable[[Path], Path], tmp_path: Path
 ) -> None:
     layout(tmp_path / "val" / "seen" / "log_1")
@@ -215,12 +215,12 @@ def test_same_seed_draws_the_same_session() -> None:
     assert env.reset(seed=5)[1]["session"] == env.reset(seed=5)[1]["session"]
 
 
-def test_sessions_without_points_are_passed_over() -> None:
+def test_sessions_without_points_are_skipped() -> None:
     env = RfNEnv([session(talk()), session(utterance(30, Role.PARTICIPANT, 0, ("Okay", OKAY)), name="silent")])
     assert {env.reset(seed=seed)[1]["session"] for seed in range(10)} == {"one"}
 
 
-def test_no_sessions_are_one_clear_error(tmp_path: Path) -> None:
+def test_empty_corpus_raises_error(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="holds no session"):
         UfNEnv(tmp_path)
     with pytest.raises(SessionError, match="no such folder"):
@@ -231,7 +231,7 @@ def test_no_sessions_are_one_clear_error(tmp_path: Path) -> None:
         NfDEnv([session(utterance(30, Role.PARTICIPANT, 0, ("Fuller", STREET)))]).reset()
 
 
-def test_wrong_arguments_are_named() -> None:
+def test_error_names_wrong_argument() -> None:
     with pytest.raises(ValueError, match="render_mode is 'human'"):
         UfNEnv([session(talk())], render_mode="human")
     with pytest.raises(ValueError, match="split is 'dev'; it must be one of all, train, val_seen"):
@@ -251,7 +251,7 @@ def test_the_default_corpus_is_the_cached_one(tmp_path: Path, monkeypatch: pytes
     assert gym.make("dorothie_gym/UfN-v0", corpus="default").reset(seed=0)[1]["session"] == "cached"
 
 
-def test_render_shows_the_talk_and_the_words_in_question() -> None:
+def test_render_prints_dialogue_and_words_to_infer() -> None:
     env = UfNEnv([session(talk())], render_mode="ansi")
     env.reset(seed=0)
     env.step(env.action_space.sample())
