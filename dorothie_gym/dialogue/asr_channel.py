@@ -20,7 +20,7 @@ from dorothie_gym.dialogue.entity_recognition import sound_of
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
 from dorothie_gym.dialogue.talk_files import read_talk_files
-from dorothie_gym.ontology import DialogueMove, Role, Slot
+from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, Slot
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z']*")
 _CANDIDATES = 6
@@ -203,6 +203,9 @@ def _vocabulary_by_sound() -> Mapping[str, tuple[str, ...]]:
     return {sound: tuple(listed) for sound, listed in found.items()}
 
 
+_UNCLASSIFIED = DialogueAct(move=DialogueMove.IRRELEVANT)
+
+
 class Recogniser:
     """Recogniser of the utterances of a session, with the errors of an `AsrChannel`.
 
@@ -210,14 +213,16 @@ class Recogniser:
     that the act does not reveal the spoken words.
     """
 
-    def __init__(self, channel: AsrChannel, rng: np.random.Generator) -> None:
+    def __init__(self, channel: AsrChannel, rng: np.random.Generator, *, classify: bool = True) -> None:
         """Starts a session.
 
         Args:
             channel: error model.
             rng: source of randomness; unused if the error rate is 0.
+            classify: whether misrecognised spans are classified. Without it their act is Irrelevant, for listeners that
+                observe transcripts only and classify these themselves.
         """
-        self._channel, self._rng = channel, rng
+        self._channel, self._rng, self._classify = channel, rng, classify
         self._open: dict[Role, tuple[DialogueMove, float]] = {}
 
     def hear(self, utterance: Utterance) -> Utterance:
@@ -232,7 +237,9 @@ class Recogniser:
         spans = []
         for place, span in enumerate(utterance.spans):
             text = self._channel.transcribe(span.text, self._rng)
-            act = span.act if same_words(text, span.text) else guess_act(text, after if place == 0 else None)
+            act = span.act
+            if not same_words(text, span.text):
+                act = guess_act(text, after if place == 0 else None) if self._classify else _UNCLASSIFIED
             spans.append(Span(text, act))
         self._open[utterance.speaker] = (utterance.spans[-1].act.move, utterance.end)
         return replace(utterance, spans=tuple(spans))

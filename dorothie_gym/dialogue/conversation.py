@@ -82,7 +82,7 @@ class Utterance:
         return tuple(span.act for span in self.spans)
 
 
-_TICK = 1e-9
+_END_TOLERANCE = 1e-9
 """Tolerance for the rounding of summed decision periods [s]."""
 
 _ORDER = {role: place for place, role in enumerate((Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD, Role.AGENT))}
@@ -143,7 +143,7 @@ class Conversation:
         Returns:
             Utterances sorted by start; the participant comes first among equal starts.
         """
-        heard = [utterance for utterance in self._air.values() if utterance.end <= now + _TICK]
+        heard = [utterance for utterance in self._air.values() if utterance.end <= now + _END_TOLERANCE]
         for utterance in heard:
             del self._air[utterance.speaker]
         return sorted(heard, key=lambda utterance: (utterance.start, _ORDER[utterance.speaker]))

@@ -31,7 +31,7 @@ _Option = TypeVar("_Option")
 Draw = Callable[[], float]
 """Function that draws a number from [0, 1)."""
 
-_BATCH = 32
+_DRAWN_AT_ONCE = 32
 """Numbers per draw from numpy; a single number costs as much as a batch."""
 
 # Enum members are bound once: each look-up through the class costs as much as a random draw.
@@ -48,7 +48,7 @@ _DEIXIS = 0.5
 
 def draws_of(rng: np.random.Generator) -> Draw:
     """Returns a function that draws from [0, 1), in batches from `rng`."""
-    return itertools.chain.from_iterable(iter(lambda: rng.random(_BATCH).tolist(), None)).__next__
+    return itertools.chain.from_iterable(iter(lambda: rng.random(_DRAWN_AT_ONCE).tolist(), None)).__next__
 
 
 class SlotRealizer:

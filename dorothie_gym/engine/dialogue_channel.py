@@ -30,7 +30,9 @@ SpanRecord: TypeAlias = dict[str, object]
 
 @dataclass(frozen=True, kw_only=True)
 class DeliveredUtterance:
-    """Utterance that is over, with the one parse of its words.
+    """Utterance that is over, as the engine delivers it to observations, beliefs and the record.
+
+    A policy reads it back from its observation as a `HeardUtterance`.
 
     Attributes:
         said: the utterance as it was spoken.
@@ -80,7 +82,9 @@ class DialogueChannel:
         self._annotator = Annotator(storyboard.landmarks[subgoal.landmark].name for subgoal in storyboard.subgoals)
         self._words, rng = np.random.default_rng(words), np.random.default_rng(styles)
         self._styles = {role: draw_style(role, rng) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
-        self._recogniser = Recogniser(AsrChannel(rate=config.word_error_rate), np.random.default_rng(ears))
+        self._recogniser = Recogniser(
+            AsrChannel(rate=config.word_error_rate), np.random.default_rng(ears), classify=config.observe_acts
+        )
 
     @property
     def exchanges(self) -> int:

@@ -246,7 +246,12 @@ def place_on_path(town: Town, observation: ObservationMapping, ahead: float) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class HeardUtterance:
-    """Completed utterance: its acts in order, and its parsed words."""
+    """Utterance that ended since the last decision, as a policy reads it from its observation.
+
+    Attributes:
+        acts: acts in order; classified from the words where acts are not observed.
+        words: parsed words.
+    """
 
     acts: tuple[DialogueAct, ...]
     words: ParsedText

@@ -132,3 +132,13 @@ def test_misheard_words_are_classified_by_open_question() -> None:
 def test_equal_seeds_give_equal_transcripts() -> None:
     once, again = recogniser(0.2), recogniser(0.2)
     assert [once.hear(utterance) for utterance in TALK] == [again.hear(utterance) for utterance in TALK]
+
+
+def test_recogniser_without_classification_gives_equal_transcripts() -> None:
+    plain = Recogniser(AsrChannel(rate=0.5), np.random.default_rng(4), classify=False)
+    with_acts = recogniser(0.5)
+    for utterance in TALK:
+        heard, expected = plain.hear(utterance), with_acts.hear(utterance)
+        assert heard.text == expected.text
+        for span, spoken in zip(heard.spans, utterance.spans, strict=True):
+            assert span.act == spoken.act or span.act.move is DialogueMove.IRRELEVANT

@@ -20,7 +20,7 @@ from dorothie_gym.policies.observation_parser import (
 )
 from dorothie_gym.spaces import ObservationMapping
 
-TURNED = 0.8
+ACROSS_LANE = 0.8
 """Cosine of the angle between car and lane below which the car is in the middle of a U-turn."""
 
 
@@ -67,7 +67,7 @@ class ParticipantView:
             landmarks=read_landmarks(observation, town),
             subgoals=read_subgoals(observation),
             objects=read_objects(observation),
-            turning=math.cos(across) < TURNED,
+            turning=math.cos(across) < ACROSS_LANE,
         )
 
     @property
