@@ -11,11 +11,11 @@ import json
 import logging
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias, TypedDict
 
 import numpy as np
 
@@ -104,7 +104,7 @@ def unpack(data: bytes, key: str) -> Town:
             floats: Array = archive["floats"]
         if (document["format"], document["key"]) != (ARCHIVE_FORMAT, key):
             raise TownArchiveError("it is of another format or another town")
-        return _town(document, floats)
+        return _town(document["name"], document, floats)
     except TownArchiveError:
         raise
     except (
@@ -120,12 +120,13 @@ def unpack(data: bytes, key: str) -> Town:
         raise TownArchiveError(f"it holds no town: {error}") from error
 
 
-def _column(values: list[Any], arrays: list[Array]) -> _Column:
+def _column(values: list[object], arrays: list[Array]) -> _Column:
     """Returns one field of all elements as JSON; the numbers of arrays are appended to `arrays`."""
     if not values or not isinstance(values[0], np.ndarray):
         return values
-    arrays.extend(np.ascontiguousarray(value, dtype=np.float64).ravel() for value in values)
-    return {"shapes": [list(value.shape) for value in values]}
+    columns = [np.ascontiguousarray(value, dtype=np.float64) for value in values]
+    arrays.extend(column.ravel() for column in columns)
+    return {"shapes": [list(column.shape) for column in columns]}
 
 
 def _plain(value: object) -> object:
@@ -137,24 +138,33 @@ def _plain(value: object) -> object:
     raise TypeError(f"a town cannot be archived with a {type(value).__name__} in it: {value!r}")
 
 
-def _town(document: dict[str, Any], floats: Array) -> Town:
+def _town(name: str, document: Mapping[str, Mapping[str, _Column]], floats: Array) -> Town:
     numbers = _ArrayReader(floats)
     parts = {}
     for part, kind in PARTS.items():
-        columns = {name: list(numbers.values(name, column)) for name, column in document[part].items()}
+        columns = {field: list(numbers.values(field, column)) for field, column in document[part].items()}
         rows = zip(*columns.values(), strict=True)
         parts[part] = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
     if not numbers.at_end:
         raise TownArchiveError("it holds more numbers than its town has")
-    return Town(name=document["name"], **parts)
+    return Town(name=name, **parts)
 
 
-def _phases(rows: Any) -> tuple[LightPhase, ...]:
-    columns = ({name: _frozen(value) for name, value in row.items()} for row in rows)
-    return tuple(LightPhase(**column) for column in columns)
+class _PhaseRow(TypedDict):
+    """Light phase as JSON."""
+
+    duration: float
+    green: list[int]
+    yellow: list[int]
 
 
-_CONVERTERS: dict[str, Callable[[Any], object]] = {"type": LinkType, "kind": SignalKind, "phases": _phases}
+def _phases(rows: list[_PhaseRow]) -> tuple[LightPhase, ...]:
+    return tuple(
+        LightPhase(duration=row["duration"], green=tuple(row["green"]), yellow=tuple(row["yellow"])) for row in rows
+    )
+
+
+_CONVERTERS: dict[str, Callable[..., object]] = {"type": LinkType, "kind": SignalKind, "phases": _phases}
 """Constructors of the fields that are not plain numbers, strings or tuples of these."""
 
 
@@ -180,7 +190,7 @@ class _ArrayReader:
             yield from map(_CONVERTERS.get(name, _frozen), column)
 
 
-def _frozen(value: Any) -> Any:
+def _frozen(value: object) -> object:
     """Converts lists to tuples, nested ones included."""
     return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
 

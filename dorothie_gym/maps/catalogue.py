@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from functools import lru_cache
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from dorothie_gym.errors import TownError
+from dorothie_gym.files import JsonValue
 from dorothie_gym.maps.cache import through_cache
 from dorothie_gym.maps.model import LaneLink, SignalKind
 from dorothie_gym.maps.town import Town
@@ -92,7 +92,7 @@ def _compile(path: Path) -> Town:
 # --- Summary figures -------------------------------------------------------------------------------------------------
 
 
-def describe(town: Town) -> dict[str, Any]:
+def describe(town: Town) -> dict[str, JsonValue]:
     """Returns summary figures of a town as JSON-compatible values.
 
     Returns:

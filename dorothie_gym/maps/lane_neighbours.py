@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,14 +188,14 @@ class LaneEdges:
 
     def free(self, places: Array, margin: float) -> NDArray[np.bool_]:
         """Returns which positions (n, 3) keep a margin [m] to all lanes at their height (n,)."""
-        # Any: the stubs of scipy describe the result for a single point only
-        near: Any = self._tree.query_ball_point(places[:, :2], self._widest + margin, return_sorted=False)
+        found = self._tree.query_ball_point(places[:, :2], self._widest + margin, return_sorted=False)
+        near = cast(Sequence[list[int]], found)  # the stubs of scipy describe the result for a single point only
         counts = np.fromiter((len(discs) for discs in near), dtype=np.int64, count=len(places))
         free = np.ones(len(places), dtype=bool)
         if not counts.any():
             return free
         owners = np.repeat(np.arange(len(places)), counts)
-        discs = self._discs[np.concatenate([np.asarray(found, dtype=np.int64) for found in near if found])]
+        discs = self._discs[np.concatenate([np.asarray(discs, dtype=np.int64) for discs in near if discs])]
         gaps = np.hypot(*(discs[:, :2] - places[owners, :2]).T)
         free[owners[(gaps < discs[:, 3] + margin) & (np.abs(discs[:, 2] - places[owners, 2]) < LEVEL)]] = False
         return free

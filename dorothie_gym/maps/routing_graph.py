@@ -76,7 +76,7 @@ class RoutingEdges:
 
         Missing columns are 0, and the ranges of traversed cells are empty.
         """
-        table: dict[str, Any] = {}
+        table: dict[str, Any] = {}  # arrays of integers and of floats
         for field in fields(cls):
             value = columns.get(field.name, -1 if field.name in ("last", "until") else 0)
             real = field.name in ("cost", "leave", "land", "driven")

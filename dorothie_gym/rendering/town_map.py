@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -113,13 +113,29 @@ class MapPainter:
         self.missing: tuple[str, ...] = tuple(placer.missing)
 
     @classmethod
-    def at_scale(cls, town: Town, scale: float, **options: Any) -> MapPainter:
-        """Returns a painter with a picture of sufficient size at a scale [px/m]; other options as in the class."""
-        margin = options.setdefault("margin", 24)
+    def at_scale(
+        cls,
+        town: Town,
+        scale: float,
+        *,
+        street_names: Sequence[str] | None = None,
+        margin: int | tuple[int, int, int, int] = 24,
+        type_sizes: tuple[int, int] = (20, 11),
+        label_spacing: float = 380.0,
+    ) -> MapPainter:
+        """Returns a painter with a picture of sufficient size at a scale [px/m]; other arguments as in the class."""
         left, top, right, bottom = (margin,) * 4 if isinstance(margin, int) else margin
         x0, y0, x1, y1 = town_bounds(town, GROUND)
         size = (round((x1 - x0) * scale) + left + right, round((y1 - y0) * scale) + top + bottom)
-        return cls(town, size=size, border=GROUND + min(left, top, right, bottom) / scale, **options)
+        return cls(
+            town,
+            size=size,
+            street_names=street_names,
+            margin=margin,
+            type_sizes=type_sizes,
+            label_spacing=label_spacing,
+            border=GROUND + min(left, top, right, bottom) / scale,
+        )
 
     def surface(self, time: float | None = None) -> pygame.Surface:
         """Returns a copy of the base map to draw on; with lights in their colours at a time [s] if one is given."""

@@ -240,7 +240,7 @@ def test_a_crosswalk_lies_across_all_lanes_and_the_median(towns: dict[str, Town]
         assert inner > 2 * 3.5  # clear of the wider half of the street that crosses
 
 
-def test_pavements_run_beside_the_outermost_lanes_of_their_stretch(towns: dict[str, Town]) -> None:
+def test_pavements_run_beside_the_outermost_lanes_of_their_segment(towns: dict[str, Town]) -> None:
     town = towns["avenues"]
     assert len(town.sidewalks) == 2 * 8
     first, second = town.sidewalks[:2]

@@ -48,10 +48,10 @@ def test_roads_do_not_overlap_beside_a_junction(tmp_path: Path, text: str) -> No
 
 def _mouth(layout, arm):
     """Corners (4, 2) of the first ten metres of an arm's road."""
-    stretch, course = layout.stretches[arm.stretch], layout.courses[arm.stretch]
-    span = (0.0, 10.0) if arm.at_start else (course.path.length - 10.0, course.path.length)
+    segment, centreline = layout.segments[arm.segment], layout.centrelines[arm.segment]
+    span = (0.0, 10.0) if arm.at_start else (centreline.path.length - 10.0, centreline.path.length)
     right, left = (
-        course.beside(offset, span)[[0, -1], :2] for offset in (stretch.section.right, -stretch.section.left)
+        centreline.beside(offset, span)[[0, -1], :2] for offset in (segment.section.right, -segment.section.left)
     )
     return np.concatenate((right, left[::-1]))
 
@@ -69,13 +69,13 @@ def _apart(one, other) -> bool:
 
 def test_lanes_lie_beside_the_course_as_the_cross_section_says(tmp_path: Path) -> None:
     layout = laid_out(tmp_path, AVENUES)
-    avenue, lane = layout.stretches[0].section, layout.stretches[2].section
+    avenue, lane = layout.segments[0].section, layout.segments[2].section
     assert avenue.forward == pytest.approx((3.75, 7.25, 10.75)) and avenue.backward == pytest.approx(
         (-3.75, -7.25, -10.75)
     )
     assert (avenue.right, avenue.left, avenue.pocket) == pytest.approx((12.5, 12.5, 0.25))
     assert lane.forward == pytest.approx((1.75, 5.25)) and lane.backward == pytest.approx((-1.75,))
-    one_way = laid_out(tmp_path, PAIR).stretches[0].section
+    one_way = laid_out(tmp_path, PAIR).segments[0].section
     assert one_way.forward == pytest.approx((-1.75, 1.75)) and one_way.backward == ()
     assert (one_way.right, one_way.left) == pytest.approx((3.5, 3.5))
 
@@ -96,7 +96,7 @@ def test_turn_lanes_share_a_short_block(tmp_path: Path) -> None:
     )
     text = text.replace("[-150, 150], west, [-150, -150]", "[-100, 150], west, [-100, -150]")
     layout = laid_out(tmp_path, text)
-    length = layout.courses[0].path.length
+    length = layout.centrelines[0].path.length
     assert layout.pockets[0, False] == layout.pockets[0, True] == pytest.approx((length - 4.0) / 2.0)
 
 
@@ -131,10 +131,10 @@ def test_a_way_onto_a_ramp_leaves_its_lane_to_the_right_only(tmp_path: Path) -> 
 
 def test_a_ring_is_made_of_exact_arcs_driven_counter_clockwise(tmp_path: Path) -> None:
     layout = laid_out(tmp_path, CIRCUS)
-    ring = [(s, c) for s, c in zip(layout.stretches, layout.courses, strict=True) if s.arc is not None]
+    ring = [(s, c) for s, c in zip(layout.segments, layout.centrelines, strict=True) if s.arc is not None]
     assert len(ring) == 4 and {s.street.name for s, _ in ring} == {"circus"}
-    for _, course in ring:
-        points = course.beside(0.0)
+    for _, centreline in ring:
+        points = centreline.beside(0.0)
         assert np.hypot(*points[:, :2].T) == pytest.approx(30.0, abs=1e-6)
         bearing = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
         assert np.all(np.diff(bearing) < 0.0)  # y points south
@@ -153,12 +153,12 @@ def test_streets_meet_a_ring_radially(tmp_path: Path) -> None:
 
 def test_streets_climb_between_level_junctions(tmp_path: Path) -> None:
     layout = laid_out(tmp_path, INTERCHANGE)
-    for stretch, course in zip(layout.stretches, layout.courses, strict=True):
-        points = course.beside(0.0)
-        assert points[[0, -1], 2] == pytest.approx((stretch.start.height, stretch.end.height))
+    for segment, centreline in zip(layout.segments, layout.centrelines, strict=True):
+        points = centreline.beside(0.0)
+        assert points[[0, -1], 2] == pytest.approx((segment.start.height, segment.end.height))
         if np.ptp(points[:, 2]) > 0.0:
             assert np.hypot(*np.diff(points[:, :2], axis=0).T).max() <= 5.0 + 1e-9
-            assert np.all(np.diff(points[:, 2]) * (stretch.end.height - stretch.start.height) >= -1e-9)
+            assert np.all(np.diff(points[:, 2]) * (segment.end.height - segment.start.height) >= -1e-9)
 
 
 def test_an_unmarked_crossing_is_fine_only_with_headroom(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_wide_streets_take_more_room_at_the_streets_that_cross_them(tmp_path: Pa
     layout = laid_out(tmp_path, AVENUES)
     ends = {}
     for arm in layout.arms[0]:
-        path = layout.courses[arm.stretch].path
+        path = layout.centrelines[arm.segment].path
         ends.setdefault(arm.street.name, math.hypot(*(path.start if arm.at_start else path.end)[:2]))
     assert ends["Lane"] == pytest.approx(8.0 + 10.75)  # a corner and the outermost lane of the avenue
     assert ends["Avenue"] == pytest.approx(8.0 + 5.25)

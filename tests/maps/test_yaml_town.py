@@ -61,7 +61,7 @@ def smallest_radius(points: np.ndarray) -> float:
     return float(np.min(sides / np.maximum(2.0 * cross, 1e-9)))
 
 
-def test_village_has_two_lanes_a_stretch_and_a_connector_for_every_pair_of_arms(village: Town) -> None:
+def test_village_has_two_lanes_a_segment_and_a_connector_for_every_pair_of_arms(village: Town) -> None:
     inside = [lane for lane in village.lanes if lane.in_junction]
     assert len(village.lanes) - len(inside) == 2 * 5
     assert len(inside) == 4 * 3 + 3 * 2 + 3 * 2
@@ -70,7 +70,7 @@ def test_village_has_two_lanes_a_stretch_and_a_connector_for_every_pair_of_arms(
     assert [lane.id for lane in village.lanes] == list(range(len(village.lanes)))
 
 
-def test_the_two_lanes_of_a_stretch_share_a_road_and_keep_right(village: Town) -> None:
+def test_the_two_lanes_of_a_segment_share_a_road_and_keep_right(village: Town) -> None:
     along, against = village.lanes[0], village.lanes[1]
     assert (along.road_id, along.lane_id, against.road_id, against.lane_id) == (0, -1, 0, 1)
     assert along.points[0, 0] < along.points[-1, 0] and against.points[0, 0] > against.points[-1, 0]

@@ -1,4 +1,4 @@
-"""Arms of a crossing: stretches as seen from it, with incoming and outgoing lanes, and ramps."""
+"""Arms of a crossing: street segments as seen from it, with incoming and outgoing lanes, and ramps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Lane
 from dorothie_gym.maps.yaml.geometry import CurveSegment, Pose
 from dorothie_gym.maps.yaml.plan import StreetPlan
-from dorothie_gym.maps.yaml.segments import Crossing, Stretch
+from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 
 POCKET = -1
 """Number of a left-turn lane in the median."""
@@ -26,13 +26,13 @@ class LaneEnd:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Arm:
-    """Stretch seen from one of its crossings; offsets are positive to the right, seen outwards [m].
+    """Street segment seen from one of its crossings; offsets are positive to the right, seen outwards [m].
 
     Attributes:
         index: index among the arms of the crossing, which are in order of heading.
-        stretch: index of the stretch.
-        at_start: whether the stretch starts at this crossing instead of ending there.
-        leg: first segment of the stretch, outwards from the centre of the crossing.
+        segment: index of the segment.
+        at_start: whether the segment starts at this crossing instead of ending there.
+        leg: first straight or arc of the segment, outwards from the centre of the crossing.
         street: street in the plan.
         incoming, outgoing: lanes from the kerb inwards.
         right, left: distance from the line to the edges of the road, pavements included except on rings [m].
@@ -40,7 +40,7 @@ class Arm:
     """
 
     index: int
-    stretch: int
+    segment: int
     at_start: bool
     leg: CurveSegment
     street: StreetPlan
@@ -81,13 +81,13 @@ def turn_between(source: Arm, target: Arm) -> float:
     return wrap_radians(target.leg.heading - source.leg.heading - math.pi)
 
 
-def arms_at(crossing: Crossing, stretches: Sequence[Stretch], ends: Sequence[tuple[int, bool]]) -> tuple[Arm, ...]:
+def arms_at(crossing: Crossing, segments: Sequence[StreetSegment], ends: Sequence[tuple[int, bool]]) -> tuple[Arm, ...]:
     """Returns the arms of a crossing in clockwise order of heading, without left-turn lanes.
 
     Args:
         crossing: the crossing.
-        stretches: all stretches.
-        ends: ends of stretches at the crossing: index, and whether it is the start.
+        segments: all segments.
+        ends: ends of segments at the crossing: index, and whether it is the start.
 
     Raises:
         TownError: the crossing has no arm, or only one.
@@ -96,31 +96,31 @@ def arms_at(crossing: Crossing, stretches: Sequence[Stretch], ends: Sequence[tup
         crossing.plan.entry.fail("no street runs through it; put it into the course of one, or remove it")
     if len(ends) == 1:
         crossing.plan.entry.fail(
-            f"street {stretches[ends[0][0]].street.name!r} ends here and nothing goes on: dead ends are not supported;"
+            f"street {segments[ends[0][0]].street.name!r} ends here and nothing goes on: dead ends are not supported;"
             " lead another street here"
         )
-    order = sorted(ends, key=lambda end: (wrap_radians(stretches[end[0]].leg(end[1]).heading), end))
-    return tuple(_arm(place, *end, stretches[end[0]]) for place, end in enumerate(order))
+    order = sorted(ends, key=lambda end: (wrap_radians(segments[end[0]].leg(end[1]).heading), end))
+    return tuple(_arm(place, *end, segments[end[0]]) for place, end in enumerate(order))
 
 
-def _arm(place: int, k: int, at_start: bool, stretch: Stretch) -> Arm:
-    section = stretch.section
+def _arm(place: int, k: int, at_start: bool, segment: StreetSegment) -> Arm:
+    section = segment.section
     forward = tuple(LaneEnd(n, offset) for n, offset in enumerate(section.forward))[::-1]
     backward = tuple(LaneEnd(n, offset) for n, offset in enumerate(section.backward))[::-1]
     if not at_start:  # seen against the course
         forward, backward = _mirrored(forward), _mirrored(backward)
     return Arm(
         index=place,
-        stretch=k,
+        segment=k,
         at_start=at_start,
-        leg=stretch.leg(at_start),
-        street=stretch.street,
+        leg=segment.leg(at_start),
+        street=segment.street,
         incoming=backward if at_start else forward,
         outgoing=forward if at_start else backward,
         # the pavement around a ring ends at the corners of the streets that meet it, and takes no room there
-        right=section.side(at_start) if stretch.arc is None else section.edge(at_start),
-        left=section.side(not at_start) if stretch.arc is None else section.edge(not at_start),
-        on_ring=stretch.arc is not None,
+        right=section.side(at_start) if segment.arc is None else section.edge(at_start),
+        left=section.side(not at_start) if segment.arc is None else section.edge(not at_start),
+        on_ring=segment.arc is not None,
     )
 
 

@@ -1,4 +1,4 @@
-"""Courses: the middle line of each stretch between the edges of its crossings, with rounded bends and heights."""
+"""Centre lines of street segments between the edges of their crossings, with rounded bends and heights."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.yaml.geometry import LINE_SPACING, Curve, Point, bend_stations, line, rounded, turn_at
-from dorothie_gym.maps.yaml.segments import Stretch
+from dorothie_gym.maps.yaml.segments import StreetSegment
 
 STEEPEST = 0.12
 """Largest slope of a street."""
@@ -87,9 +87,9 @@ def height_profile(stations: Sequence[float], heights: Sequence[float | None]) -
 
 SMALLEST_BEND = 5.5
 """Smallest radius of the centre line of a lane [m]."""
-SMALLEST_STRETCH = 10.0
+SHORTEST_SEGMENT = 10.0
 """Shortest street between two junctions [m]."""
-SMALLEST_RING_STRETCH = 6.0
+SHORTEST_RING_SEGMENT = 6.0
 """The same on the ring of a roundabout [m]."""
 SLOPE_SPACING = 5.0
 """Largest distance between the points of a sloping line [m]."""
@@ -97,8 +97,8 @@ _SLOPE_SLACK = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Course:
-    """Line of a stretch from the edge of one crossing to that of the next, with its heights."""
+class Centreline:
+    """Centre line of a street segment from the edge of one crossing to that of the next, with its heights."""
 
     path: Curve
     heights: HeightProfile
@@ -111,82 +111,82 @@ class Course:
         return np.column_stack((plane, self.heights.at(stations + (0.0 if span is None else span[0]))))
 
 
-def course_of(stretch: Stretch, trim_start: float, trim_end: float) -> Course:
-    """Computes the line of a stretch.
+def centreline_of(segment: StreetSegment, trim_start: float, trim_end: float) -> Centreline:
+    """Computes the centre line of a street segment.
 
     Args:
-        stretch: the stretch.
+        segment: the segment.
         trim_start: distance from the centre of its first crossing to its start [m].
         trim_end: the same at its end [m].
 
     Raises:
         TownError: there is no room between the crossings, a bend is too tight, or the slope too steep.
     """
-    if stretch.arc is not None:
-        path = _on_ring(stretch, trim_start, trim_end)
+    if segment.arc is not None:
+        path = _on_ring(segment, trim_start, trim_end)
         stations = [0.0, path.length]
     else:
-        points = _between(stretch, trim_start, trim_end)
-        radii = _radii(stretch, points)
+        points = _between(segment, trim_start, trim_end)
+        radii = _radii(segment, points)
         path = rounded(points, radii)
-        _check_length(stretch, path.length)
+        _check_length(segment, path.length)
         stations = [0.0, *bend_stations(points, radii), path.length]
-    heights = height_profile(stations, stretch.heights)
+    heights = height_profile(stations, segment.heights)
     slope = heights.steepest()
     if slope > STEEPEST + _SLOPE_SLACK:
-        stretch.street.entry.fail(
-            f"{stretch.label()} it climbs too steeply: {100.0 * slope:.0f} %, at most {100.0 * STEEPEST:.0f} % are"
+        segment.street.entry.fail(
+            f"{segment.label()} it climbs too steeply: {100.0 * slope:.0f} %, at most {100.0 * STEEPEST:.0f} % are"
             " possible; make the way longer or the difference of heights smaller"
         )
-    return Course(path=path, heights=heights)
+    return Centreline(path=path, heights=heights)
 
 
-def _on_ring(stretch: Stretch, trim_start: float, trim_end: float) -> Curve:
-    arc = stretch.arc
+def _on_ring(segment: StreetSegment, trim_start: float, trim_end: float) -> Curve:
+    arc = segment.arc
     left = 0.0 if arc is None else arc.length - trim_start - trim_end
-    if arc is None or left < SMALLEST_RING_STRETCH:
-        stretch.street.entry.fail(
-            f"the streets that meet its ring at {stretch.start.name!r} and {stretch.end.name!r} are too close together:"
-            f" {SMALLEST_RING_STRETCH - left:.1f} m of ring are missing between them; give it a larger radius or let"
+    if arc is None or left < SHORTEST_RING_SEGMENT:
+        segment.street.entry.fail(
+            f"the streets that meet its ring at {segment.start.name!r} and {segment.end.name!r} are too close together:"
+            f" {SHORTEST_RING_SEGMENT - left:.1f} m of ring are missing between them; give it a larger radius or let"
             " them arrive from directions further apart"
         )
     return Curve((arc,)).part(trim_start, arc.length - trim_end)
 
 
-def _between(stretch: Stretch, trim_start: float, trim_end: float) -> list[Point]:
-    """Returns the corners of a stretch with its ends moved to the edges of its crossings."""
-    corners, street = stretch.corners, stretch.street
+def _between(segment: StreetSegment, trim_start: float, trim_end: float) -> list[Point]:
+    """Returns the corners of a segment with its ends moved to the edges of its crossings."""
+    corners, street = segment.corners, segment.street
     legs = [math.dist(a, b) for a, b in itertools.pairwise(corners)]
     room = legs[0] - trim_start - trim_end if len(legs) == 1 else min(legs[0] - trim_start, legs[-1] - trim_end)
-    if room < (SMALLEST_STRETCH if len(legs) == 1 else 0.5):
+    if room < (SHORTEST_SEGMENT if len(legs) == 1 else 0.5):
         street.entry.fail(
-            f"{stretch.label()} there is no room: the junctions take {trim_start:.1f} m and {trim_end:.1f} m of it;"
+            f"{segment.label()} there is no room: the junctions take {trim_start:.1f} m and {trim_end:.1f} m of it;"
             " move the junctions or the bends next to them further apart"
         )
     first, last = line(corners[0], corners[1]), line(corners[-1], corners[-2])
     return [first.at(trim_start)[:2], *corners[1:-1], last.at(trim_end)[:2]]
 
 
-def _check_length(stretch: Stretch, length: float) -> None:
-    if length < SMALLEST_STRETCH:
-        stretch.street.entry.fail(
-            f"{stretch.label()} only {length:.1f} m of street are left; {SMALLEST_STRETCH:g} m are needed:"
+def _check_length(segment: StreetSegment, length: float) -> None:
+    if length < SHORTEST_SEGMENT:
+        segment.street.entry.fail(
+            f"{segment.label()} only {length:.1f} m of street are left; {SHORTEST_SEGMENT:g} m are needed:"
             " move the junctions apart"
         )
 
 
-def _radii(stretch: Stretch, points: Sequence[Point]) -> list[float]:
+def _radii(segment: StreetSegment, points: Sequence[Point]) -> list[float]:
     """Returns the radius of each bend [m]: that of the street, else the largest if bends share their leg evenly."""
     legs = [math.dist(a, b) for a, b in itertools.pairwise(points)]
     rooms = [leg if k in (0, len(legs) - 1) else leg / 2.0 for k, leg in enumerate(legs)]
-    street, radii = stretch.street, list[float]()
+    street, radii = segment.street, list[float]()
     for k in range(1, len(points) - 1):
         signed = turn_at(points[k - 1], points[k], points[k + 1])
         turn = max(abs(signed), 1e-6)
         fits = min(rooms[k - 1], rooms[k]) / math.tan(min(turn, math.radians(179.0)) / 2.0)
         radius = fits if street.radius is None else street.radius
-        tightest = stretch.section.tightest(signed > 0.0, SMALLEST_BEND)
-        where = f"the bend at {[round(c, 2) for c in points[k]]} {stretch.label()}"
+        tightest = segment.section.tightest(signed > 0.0, SMALLEST_BEND)
+        where = f"the bend at {[round(c, 2) for c in points[k]]} {segment.label()}"
         if radius < tightest:
             street.entry.fail(
                 f"{where} is tighter than its lanes are wide: radius {radius:.1f} m, at least {tightest:.1f} m are"

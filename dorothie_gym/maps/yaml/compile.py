@@ -35,13 +35,13 @@ def read_yaml_town(path: str | FilePath) -> Town:
 
 
 def compile_town(layout: Layout) -> Town:
-    """Builds the town of a layout: first the lanes of all stretches, then the connectors.
+    """Builds the town of a layout: first the lanes of all segments, then the connectors.
 
     Raises:
         TownError: the phases of a light do not match its signals, or a site is far from all streets.
     """
     build = _Build(layout)
-    for k in range(len(layout.stretches)):
+    for k in range(len(layout.segments)):
         build.add_stretch(k)
     for crossing in layout.crossings:
         build.add_crossing(crossing)
@@ -81,7 +81,7 @@ class _Build:
     Attributes:
         layout: layout of the town.
         lanes, links, junctions: elements so far.
-        first, last: id of the first and last lane, by index of the stretch, whether along its course, and lane number.
+        first, last: id of the first and last lane, by index of the segment, whether along its course, and lane number.
         on_ramps: ids of the lanes of ramps.
         roads: number of roads so far.
     """
@@ -96,11 +96,11 @@ class _Build:
     roads: int = 0
 
     def add_stretch(self, k: int) -> None:
-        """Adds the lanes along a stretch's course, innermost first, then those against it.
+        """Adds the lanes along a segment's course, innermost first, then those against it.
 
         Where a left-turn lane opens, the lanes are split and a new road begins.
         """
-        length, section = self.layout.courses[k].path.length, self.layout.stretches[k].section
+        length, section = self.layout.centrelines[k].path.length, self.layout.segments[k].section
         road = self._road()
         for along, offsets, pocket in (
             (True, section.forward, section.pocket),
@@ -123,12 +123,12 @@ class _Build:
     def _add_side(
         self, k: int, road: int, offsets: Sequence[tuple[int, float]], span: tuple[float, float], *, along: bool
     ) -> dict[int, int]:
-        """Adds parallel lanes, innermost first, between two distances along a stretch; returns ids by number."""
-        street, course = self.layout.stretches[k].street, self.layout.courses[k]
-        whole = span == (0.0, course.path.length)
+        """Adds parallel lanes, innermost first, between two distances along a segment; returns ids by number."""
+        street, centreline = self.layout.segments[k].street, self.layout.centrelines[k]
+        whole = span == (0.0, centreline.path.length)
         ids: dict[int, int] = {}
         for place, (number, offset) in enumerate(offsets, start=1):
-            points = course.beside(offset, None if whole else span)
+            points = centreline.beside(offset, None if whole else span)
             ids[number] = self._add(
                 points if along else points[::-1].copy(),
                 road_id=road,
@@ -184,10 +184,10 @@ class _Build:
         return source.id, connector
 
     def _incoming(self, arm: Arm, lane: LaneEnd) -> int:
-        return self.last[arm.stretch, not arm.at_start, lane.number]
+        return self.last[arm.segment, not arm.at_start, lane.number]
 
     def _outgoing(self, arm: Arm, lane: LaneEnd) -> int:
-        return self.first[arm.stretch, arm.at_start, lane.number]
+        return self.first[arm.segment, arm.at_start, lane.number]
 
     def approaches(self, crossing: Crossing) -> list[Approach]:
         """Returns the arms of a crossing with their lanes."""

@@ -58,17 +58,17 @@ def _outline(approach: Approach) -> Array:
 
 
 def sidewalks(layout: Layout) -> tuple[Sidewalk, ...]:
-    """Returns the pavements beside all stretches whose street has them: right of its course, then left of it.
+    """Returns the pavements beside all segments whose street has them: right of its course, then left of it.
 
     A ring has a pavement on its outer (right) side only.
     """
     found: list[Sidewalk] = []
-    for stretch, course in zip(layout.stretches, layout.courses, strict=True):
-        street, width = stretch.street, stretch.street.sidewalk
+    for segment, centreline in zip(layout.segments, layout.centrelines, strict=True):
+        street, width = segment.street, segment.street.sidewalk
         if width > 0.0:
-            right, left = stretch.section.right + width / 2.0, -stretch.section.left - width / 2.0
-            for offset in (right, left) if stretch.arc is None else (right,):
-                points = course.beside(offset)
+            right, left = segment.section.right + width / 2.0, -segment.section.left - width / 2.0
+            for offset in (right, left) if segment.arc is None else (right,):
+                points = centreline.beside(offset)
                 found.append(Sidewalk(id=len(found), points=points, width=width, street=layout.numbers[street.id]))
     return tuple(found)
 

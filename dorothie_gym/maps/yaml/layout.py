@@ -1,4 +1,4 @@
-"""Layout of a YAML town: streets divided at crossings, bends rounded, crossings given room and movements."""
+"""Layout of a YAML town: street segments, centre lines, crossings with their movements, and rings of roundabouts."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from dorothie_gym.maps.yaml.arms import LARGEST_ANGLE, SMALLEST_ANGLE, Arm, arms_at, find_slips
-from dorothie_gym.maps.yaml.centrelines import Course, course_of
+from dorothie_gym.maps.yaml.centrelines import Centreline, centreline_of
 from dorothie_gym.maps.yaml.clearance import check_clearance, check_crossings
 from dorothie_gym.maps.yaml.geometry import CurveSegment, line
 from dorothie_gym.maps.yaml.movements import MovementPath, make_room, movements_at, with_pockets
 from dorothie_gym.maps.yaml.plan import JunctionPlan, StreetPlan, TownPlan
-from dorothie_gym.maps.yaml.segments import Crossing, CrossSection, StreetRun, Stretch, split, stretch_of
+from dorothie_gym.maps.yaml.segments import Crossing, CrossSection, StreetRun, StreetSegment, segment_of, split
 
 SMALLEST_RING = 8.0
 """Smallest radius of the innermost lane of a ring [m], for traffic that does not stop."""
@@ -28,13 +28,13 @@ class Ring:
             meet it.
         crossings: one for each end of a run at the ring, clockwise.
         ends: for each crossing the index of the run, and whether the run starts there.
-        stretches: stretches between the crossings.
+        segments: segments between the crossings.
     """
 
     street: StreetPlan
     crossings: tuple[Crossing, ...]
     ends: tuple[tuple[int, bool], ...]
-    stretches: tuple[Stretch, ...]
+    segments: tuple[StreetSegment, ...]
 
 
 def lay_ring(junction: JunctionPlan, runs: Sequence[StreetRun], *, street_id: int, crossing_id: int) -> Ring:
@@ -92,20 +92,20 @@ def lay_ring(junction: JunctionPlan, runs: Sequence[StreetRun], *, street_id: in
                 plan=junction,
             )
         )
-    stretches = tuple(
+    segments = tuple(
         _ring_stretch(street, crossings[k], crossings[k - 1], bearings[ends[k]], bearings[ends[k - 1]], plan.radius)
         for k in range(len(ends))
     )
-    return Ring(street=street, crossings=tuple(crossings), ends=tuple(ends), stretches=stretches)
+    return Ring(street=street, crossings=tuple(crossings), ends=tuple(ends), segments=segments)
 
 
 def _ring_stretch(
     street: StreetPlan, start: Crossing, end: Crossing, from_: float, to: float, radius: float
-) -> Stretch:
-    """Returns the stretch of the ring from one bearing [rad] back to a smaller one, or the full circle."""
+) -> StreetSegment:
+    """Returns the segment of the ring from one bearing [rad] back to a smaller one, or the full circle."""
     angle = (from_ - to) % (2.0 * math.pi) if start is not end else 2.0 * math.pi
     arc = CurveSegment(*start.centre, from_ - math.pi / 2.0, radius * angle, -1.0 / radius)
-    return Stretch(
+    return StreetSegment(
         street=street,
         section=CrossSection(street),
         start=start,
@@ -134,19 +134,19 @@ class Layout:
         plan: plan of the town.
         streets: streets of the plan, then the rings of roundabouts.
         crossings: junctions in the order of the file, then crossings on rings; ids may have gaps.
-        stretches: all stretches, those on rings last.
-        courses: line of each stretch, from the edge of its first crossing to that of its second.
+        segments: all segments, those on rings last.
+        centrelines: line of each segment, from the edge of its first crossing to that of its second.
         arms: arms in order of heading, by crossing id.
         ways: paths of all movements, by crossing id.
-        pockets: length of left-turn lanes [m], by index of the stretch and whether they lead to its start.
+        pockets: length of left-turn lanes [m], by index of the segment and whether they lead to its start.
         hosts: id of the street that each ramp leaves or else joins, by id of the ramp.
     """
 
     plan: TownPlan
     streets: tuple[StreetPlan, ...]
     crossings: tuple[Crossing, ...]
-    stretches: tuple[Stretch, ...]
-    courses: tuple[Course, ...]
+    segments: tuple[StreetSegment, ...]
+    centrelines: tuple[Centreline, ...]
     arms: Mapping[int, tuple[Arm, ...]]
     ways: Mapping[int, tuple[MovementPath, ...]]
     pockets: Mapping[tuple[int, bool], float]
@@ -174,46 +174,46 @@ def lay_out(plan: TownPlan) -> Layout:
     Raises:
         TownError: streets or junctions do not fit.
     """
-    streets, crossings, stretches = _graph(plan)
+    streets, crossings, segments = _graph(plan)
     ends: dict[int, list[tuple[int, bool]]] = {crossing.id: [] for crossing in crossings}
-    for k, stretch in enumerate(stretches):
-        ends[stretch.start.id].append((k, True))
-        ends[stretch.end.id].append((k, False))
+    for k, segment in enumerate(segments):
+        ends[segment.start.id].append((k, True))
+        ends[segment.end.id].append((k, False))
     arms: dict[int, tuple[Arm, ...]] = {}
     ways: dict[int, tuple[MovementPath, ...]] = {}
     trims: dict[tuple[int, bool], float] = {}
     for crossing in crossings:
-        here = with_pockets(crossing, arms_at(crossing, stretches, ends[crossing.id]), stretches)
+        here = with_pockets(crossing, arms_at(crossing, segments, ends[crossing.id]), segments)
         room = make_room(crossing, here, movements_at(crossing, here))
         arms[crossing.id], ways[crossing.id] = here, room.ways
-        trims.update({(arm.stretch, arm.at_start): trim for arm, trim in zip(here, room.trims, strict=True)})
+        trims.update({(arm.segment, arm.at_start): trim for arm, trim in zip(here, room.trims, strict=True)})
     hosts = _hosts(plan, crossings, arms)
     check_crossings(crossings, arms, trims)
-    courses = tuple(course_of(stretch, trims[k, True], trims[k, False]) for k, stretch in enumerate(stretches))
+    centrelines = tuple(centreline_of(segment, trims[k, True], trims[k, False]) for k, segment in enumerate(segments))
     layout = Layout(
         plan=plan,
         streets=streets,
         crossings=crossings,
-        stretches=stretches,
-        courses=courses,
+        segments=segments,
+        centrelines=centrelines,
         arms=arms,
         ways=ways,
-        pockets=_pockets(stretches, courses, arms),
+        pockets=_pockets(segments, centrelines, arms),
         hosts=hosts,
     )
-    check_clearance(crossings, stretches, courses, ways)
+    check_clearance(crossings, segments, centrelines, ways)
     return layout
 
 
-def _graph(plan: TownPlan) -> tuple[tuple[StreetPlan, ...], tuple[Crossing, ...], tuple[Stretch, ...]]:
-    """Returns streets, crossings and stretches, with roundabouts."""
+def _graph(plan: TownPlan) -> tuple[tuple[StreetPlan, ...], tuple[Crossing, ...], tuple[StreetSegment, ...]]:
+    """Returns streets, crossings and segments, with roundabouts."""
     runs = split(plan)
     plain = {
         name: Crossing(id=j.id, name=name, centre=j.centre, height=j.height, plan=j)
         for name, j in plan.junctions.items()
         if j.roundabout is None
     }
-    crossings, streets, ring_stretches = list(plain.values()), list(plan.streets), list[Stretch]()
+    crossings, streets, ring_segments = list(plain.values()), list(plan.streets), list[StreetSegment]()
     meeting: dict[tuple[int, bool], Crossing] = {}
     next_id = 1 + max(junction.id for junction in plan.junctions.values())
     for junction in plan.junctions.values():
@@ -221,14 +221,14 @@ def _graph(plan: TownPlan) -> tuple[tuple[StreetPlan, ...], tuple[Crossing, ...]
             ring = lay_ring(junction, runs, street_id=len(streets), crossing_id=next_id)
             streets.append(ring.street)
             crossings.extend(ring.crossings)
-            ring_stretches.extend(ring.stretches)
+            ring_segments.extend(ring.segments)
             meeting.update(zip(ring.ends, ring.crossings, strict=True))
             next_id += len(ring.crossings)
-    stretches = [
-        stretch_of(run, meeting.get((k, True)) or plain[run.start.name], meeting.get((k, False)) or plain[run.end.name])
+    segments = [
+        segment_of(run, meeting.get((k, True)) or plain[run.start.name], meeting.get((k, False)) or plain[run.end.name])
         for k, run in enumerate(runs)
     ]
-    return tuple(streets), tuple(crossings), (*stretches, *ring_stretches)
+    return tuple(streets), tuple(crossings), (*segments, *ring_segments)
 
 
 def _hosts(plan: TownPlan, crossings: Sequence[Crossing], arms: Mapping[int, tuple[Arm, ...]]) -> dict[int, int]:
@@ -251,20 +251,20 @@ def _hosts(plan: TownPlan, crossings: Sequence[Crossing], arms: Mapping[int, tup
 
 
 def _pockets(
-    stretches: Sequence[Stretch], courses: Sequence[Course], arms: Mapping[int, tuple[Arm, ...]]
+    segments: Sequence[StreetSegment], centrelines: Sequence[Centreline], arms: Mapping[int, tuple[Arm, ...]]
 ) -> dict[tuple[int, bool], float]:
     """Returns the lengths of left-turn lanes; two in one narrow median must not overlap."""
-    wanted = {(arm.stretch, arm.at_start): arm for row in arms.values() for arm in row if arm.pocket is not None}
+    wanted = {(arm.segment, arm.at_start): arm for row in arms.values() for arm in row if arm.pocket is not None}
     lengths = {}
     for (k, at_start), arm in wanted.items():
-        street, length = arm.street, courses[k].path.length
+        street, length = arm.street, centrelines[k].path.length
         shared = (k, not at_start) in wanted and street.median < 2.0 * street.width
         room = min(length - _POCKET_REST, (length - _POCKETS_APART) / 2.0 if shared else length)
         if room < SHORTEST_POCKET:
             needed = 2.0 * SHORTEST_POCKET + _POCKETS_APART if shared else SHORTEST_POCKET + _POCKET_REST
             street.entry.fail(
-                f"{stretches[k].label()} there is no room for the turn lane before"
-                f" {stretches[k].crossing(at_start).name!r}: {length:.1f} m of street lie between the junctions,"
+                f"{segments[k].label()} there is no room for the turn lane before"
+                f" {segments[k].crossing(at_start).name!r}: {length:.1f} m of street lie between the junctions,"
                 f" {needed:.0f} m are needed; move them apart or remove the turn lane"
             )
         lengths[k, at_start] = min(POCKET_LENGTH, room)

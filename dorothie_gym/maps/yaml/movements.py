@@ -19,7 +19,7 @@ from dorothie_gym.maps.yaml.arms import (
     turn_between,
 )
 from dorothie_gym.maps.yaml.geometry import Curve, connect
-from dorothie_gym.maps.yaml.segments import Crossing, Stretch
+from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
 
 STRAIGHT_BELOW = math.radians(35.0)
 """Largest change of heading of a straight movement [rad]."""
@@ -54,7 +54,7 @@ def kinds_of(turns: Mapping[int, float]) -> dict[int, LinkType]:
     return kinds
 
 
-def with_pockets(crossing: Crossing, arms: tuple[Arm, ...], stretches: Sequence[Stretch]) -> tuple[Arm, ...]:
+def with_pockets(crossing: Crossing, arms: tuple[Arm, ...], segments: Sequence[StreetSegment]) -> tuple[Arm, ...]:
     """Adds left-turn lanes to arms whose street requests them, if there is a left turn.
 
     Raises:
@@ -66,7 +66,7 @@ def with_pockets(crossing: Crossing, arms: tuple[Arm, ...], stretches: Sequence[
     for arm in arms:
         if arm in wanted and LinkType.LEFT in _kinds(arms, arm, slips).values() and arm.incoming:
             # between the middle of the median and the incoming lanes, which are on the left seen outwards
-            pocket = LaneEnd(POCKET, -stretches[arm.stretch].section.pocket)
+            pocket = LaneEnd(POCKET, -segments[arm.segment].section.pocket)
             arm = replace(arm, incoming=(*arm.incoming, pocket))
         result.append(arm)
     for street in {arm.street.id: arm.street for arm in wanted}.values():

@@ -1,4 +1,4 @@
-"""Streets divided into stretches at their crossings."""
+"""Street segments: streets divided at their crossings, and their cross-sections."""
 
 from __future__ import annotations
 
@@ -63,12 +63,12 @@ class CrossSection:
         return max(lane_radius + edge - self.street.width / 2.0, edge + max(self.street.sidewalk, 0.5) + 0.5)
 
 
-# --- Stretches -------------------------------------------------------------------------------------------------------
+# --- Segments ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Crossing:
-    """Meeting point of stretches: a junction, or the point where a street meets the ring of a roundabout.
+    """Meeting point of segments: a junction, or the point where a street meets the ring of a roundabout.
 
     Attributes:
         id: id of the junction of the town.
@@ -91,7 +91,7 @@ class Crossing:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stretch:
+class StreetSegment:
     """Part of a street from one crossing to the next.
 
     Attributes:
@@ -120,7 +120,7 @@ class Stretch:
         return self.start if at_start else self.end
 
     def leg(self, at_start: bool) -> CurveSegment:
-        """Returns its first segment outwards from the crossing at one end."""
+        """Returns its first straight or arc, outwards from the crossing at one end."""
         if self.arc is not None:
             return self.arc if at_start else self.arc.reversed()
         return line(*self.corners[:2]) if at_start else line(self.corners[-1], self.corners[-2])
@@ -128,7 +128,7 @@ class Stretch:
 
 @dataclass(frozen=True, kw_only=True)
 class StreetRun:
-    """Stretch before the layout of roundabouts: street, two junctions, and the points between them."""
+    """Street segment before the layout of roundabouts: street, two junctions, and the points between them."""
 
     street: StreetPlan
     start: JunctionPlan
@@ -175,9 +175,9 @@ def _check_points(run: StreetRun) -> None:
             run.street.entry.fail(f"points {list(a)} and {list(b)} of its course are less than 1 m apart; remove one")
 
 
-def stretch_of(run: StreetRun, start: Crossing, end: Crossing) -> Stretch:
-    """Returns the stretch of a run between two crossings."""
-    return Stretch(
+def segment_of(run: StreetRun, start: Crossing, end: Crossing) -> StreetSegment:
+    """Returns the segment of a run between two crossings."""
+    return StreetSegment(
         street=run.street,
         section=CrossSection(run.street),
         start=start,
