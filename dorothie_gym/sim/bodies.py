@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
@@ -26,7 +26,18 @@ from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import LaneIndex, Route
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.record_views import ArrayHolder, BodyView, field, field_offset, heading_field
+from dorothie_gym.sim.state.record_views import (
+    ArrayHolder,
+    BodyView,
+    Field,
+    Record_co,
+    converted_field,
+    field_offset,
+    flag_field,
+    float_field,
+    heading_field,
+    int_field,
+)
 from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord, record_dtype
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.step import update_lane
@@ -44,7 +55,7 @@ if len(_KIND_OF_SIZE) != len(PropKind):
     raise ImportError("two kinds of props have the same size, which distinguish their views")
 
 
-class TrafficVehicle(BodyView, IDMVehicle):
+class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
     """A vehicle of the traffic as a vehicle of highway-env.
 
     Attributes:
@@ -63,21 +74,21 @@ class TrafficVehicle(BodyView, IDMVehicle):
     enable_lane_change = True
 
     heading = heading_field(VEHICLE)
-    cos, sin = field(VEHICLE, "cos"), field(VEHICLE, "sin")
-    speed = field(VEHICLE, "speed")
-    height = field(VEHICLE, "height")
-    LENGTH, WIDTH = field(VEHICLE, "length"), field(VEHICLE, "width")
-    diagonal = field(VEHICLE, "radius", lambda radius: 2.0 * radius)
-    crashed = field(VEHICLE, "crashed")
-    target_speed = field(VEHICLE, "desired")
-    timer = field(VEHICLE, "timer")
-    standing = field(VEHICLE, "standing")
-    odometer = field(VEHICLE, "odometer")
-    key = field(VEHICLE, "key")
-    kind = field(VEHICLE, "kind", Kind)
-    lane_id = field(VEHICLE, "lane")
-    station, lateral = field(VEHICLE, "own_station"), field(VEHICLE, "own_lateral")
-    _followed, _planned = field(VEHICLE, "plan"), field(VEHICLE, "planned")
+    cos, sin = float_field(VEHICLE, "cos"), float_field(VEHICLE, "sin")
+    speed = float_field(VEHICLE, "speed")
+    height = float_field(VEHICLE, "height")
+    LENGTH, WIDTH = float_field(VEHICLE, "length"), float_field(VEHICLE, "width")
+    diagonal = converted_field(VEHICLE, "radius", lambda radius: 2.0 * radius)
+    crashed = flag_field(VEHICLE, "crashed")
+    target_speed = float_field(VEHICLE, "desired")
+    timer = float_field(VEHICLE, "timer")
+    standing = float_field(VEHICLE, "standing")
+    odometer = float_field(VEHICLE, "odometer")
+    key = int_field(VEHICLE, "key")
+    kind = converted_field(VEHICLE, "kind", Kind)
+    lane_id = int_field(VEHICLE, "lane")
+    station, lateral = float_field(VEHICLE, "own_station"), float_field(VEHICLE, "own_lateral")
+    _followed, _planned = int_field(VEHICLE, "plan"), int_field(VEHICLE, "planned")
 
     def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
         """Shows a row of `holder.arrays.vehicles`; `road` is a `TownRoad` of the same town."""
@@ -222,10 +233,10 @@ class Cyclist(TrafficVehicle):
     """A cyclist: a narrow, slow vehicle that keeps to the right."""
 
 
-class _Thing(BodyView):
+class _Thing(BodyView[Record_co]):
     """A body that is no vehicle: it has no lane of its own, and highway-env never moves it."""
 
-    height: Any
+    height: Field[float]
 
     @property
     def lane_index(self) -> LaneIndex:
@@ -240,7 +251,7 @@ class _Thing(BodyView):
         return lane
 
 
-class Pedestrian(_Thing, RoadObject):
+class Pedestrian(_Thing[PedestrianRecord], RoadObject):
     """A pedestrian as an object on highway-env's road.
 
     Attributes:
@@ -255,13 +266,13 @@ class Pedestrian(_Thing, RoadObject):
     diagonal = math.hypot(WALKER_SIZE, WALKER_SIZE)
 
     heading = heading_field(PEDESTRIAN)
-    cos, sin = field(PEDESTRIAN, "cos"), field(PEDESTRIAN, "sin")
-    speed = field(PEDESTRIAN, "speed")
-    height = field(PEDESTRIAN, "height")
-    crashed = field(PEDESTRIAN, "crashed")
-    odometer = field(PEDESTRIAN, "odometer")
-    key = field(PEDESTRIAN, "key")
-    state = field(PEDESTRIAN, "state", Walk)
+    cos, sin = float_field(PEDESTRIAN, "cos"), float_field(PEDESTRIAN, "sin")
+    speed = float_field(PEDESTRIAN, "speed")
+    height = float_field(PEDESTRIAN, "height")
+    crashed = flag_field(PEDESTRIAN, "crashed")
+    odometer = float_field(PEDESTRIAN, "odometer")
+    key = int_field(PEDESTRIAN, "key")
+    state = converted_field(PEDESTRIAN, "state", Walk)
 
     def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
         """Shows a row of `holder.arrays.pedestrians`; `road` is a `TownRoad` of the same town."""
@@ -278,7 +289,7 @@ class Pedestrian(_Thing, RoadObject):
         return self.on_lane()[0]
 
 
-class Prop(_Thing, Obstacle):
+class Prop(_Thing[PropRecord], Obstacle):
     """A prop that the Ad-Wizard placed on the road, across its lane.
 
     Attributes:
@@ -294,12 +305,12 @@ class Prop(_Thing, Obstacle):
     crashed = False
 
     heading = heading_field(PROP)
-    cos, sin = field(PROP, "cos"), field(PROP, "sin")
-    height = field(PROP, "height")
-    LENGTH, WIDTH = field(PROP, "length"), field(PROP, "width")
-    diagonal = field(PROP, "radius", lambda radius: 2.0 * radius)
-    key = field(PROP, "key")
-    lane_id, station = field(PROP, "lane"), field(PROP, "station")
+    cos, sin = float_field(PROP, "cos"), float_field(PROP, "sin")
+    height = float_field(PROP, "height")
+    LENGTH, WIDTH = float_field(PROP, "length"), float_field(PROP, "width")
+    diagonal = converted_field(PROP, "radius", lambda radius: 2.0 * radius)
+    key = int_field(PROP, "key")
+    lane_id, station = int_field(PROP, "lane"), float_field(PROP, "station")
 
     def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
         """Shows a row of `holder.arrays.props`; `road` is a `TownRoad` of the same town."""
@@ -311,39 +322,52 @@ class Prop(_Thing, Obstacle):
         return _KIND_OF_SIZE[self.LENGTH, self.WIDTH]
 
 
-class Bodies:
-    """Views of a world, each made at its first use."""
+View = TypeVar("View", TrafficVehicle, Pedestrian, Prop)
+
+
+class _Views(Generic[View]):
+    """Views of one kind of body, each made at its first use."""
 
     def __init__(self, road: TownRoad, holder: ArrayHolder) -> None:
-        """Shows the arrays of a holder on a road of the same town."""
         self._road, self._holder = road, holder
-        self._made: dict[tuple[type[BodyView], int], Any] = {}
+        self._made: dict[tuple[type[View], int], View] = {}
 
-    def vehicles(self) -> list[TrafficVehicle]:
-        """Returns the traffic, cyclists included, in the order of the rows, without vehicles driven from outside."""
-        kinds = np.asarray(self._holder.arrays.vehicles)["kind"].tolist()
-        return [self._view(_CLASSES[kind], row) for row, kind in enumerate(kinds) if kind in _CLASSES]
-
-    def pedestrians(self) -> list[Pedestrian]:
-        """Returns the pedestrians in the order of the rows."""
-        states = np.asarray(self._holder.arrays.pedestrians)["state"].tolist()
-        return [self._view(Pedestrian, row) for row, state in enumerate(states) if state != Walk.EMPTY]
-
-    def prop(self, row: int) -> Prop:
-        """Returns the prop in a row."""
-        view: Prop = self._view(Prop, row)
-        return view
-
-    def props(self) -> list[Prop]:
-        """Returns the props in the order of the rows."""
-        present = np.asarray(self._holder.arrays.props)["present"].tolist()
-        return [self._view(Prop, row) for row, here in enumerate(present) if here]
-
-    def _view(self, kind: type[BodyView], row: int) -> Any:
+    def at(self, kind: type[View], row: int) -> View:
+        """Returns the view of a row."""
         view = self._made.get((kind, row))
         if view is None:
             view = self._made[kind, row] = kind(self._road, self._holder, row)
         return view
+
+
+class Bodies:
+    """Views of a world."""
+
+    def __init__(self, road: TownRoad, holder: ArrayHolder) -> None:
+        """Shows the arrays of a holder on a road of the same town."""
+        self._holder = holder
+        self._vehicles = _Views[TrafficVehicle](road, holder)
+        self._pedestrians = _Views[Pedestrian](road, holder)
+        self._props = _Views[Prop](road, holder)
+
+    def vehicles(self) -> list[TrafficVehicle]:
+        """Returns the traffic, cyclists included, in the order of the rows, without vehicles driven from outside."""
+        kinds = np.asarray(self._holder.arrays.vehicles)["kind"].tolist()
+        return [self._vehicles.at(_CLASSES[kind], row) for row, kind in enumerate(kinds) if kind in _CLASSES]
+
+    def pedestrians(self) -> list[Pedestrian]:
+        """Returns the pedestrians in the order of the rows."""
+        states = np.asarray(self._holder.arrays.pedestrians)["state"].tolist()
+        return [self._pedestrians.at(Pedestrian, row) for row, state in enumerate(states) if state != Walk.EMPTY]
+
+    def prop(self, row: int) -> Prop:
+        """Returns the prop in a row."""
+        return self._props.at(Prop, row)
+
+    def props(self) -> list[Prop]:
+        """Returns the props in the order of the rows."""
+        present = np.asarray(self._holder.arrays.props)["present"].tolist()
+        return [self.prop(row) for row, here in enumerate(present) if here]
 
 
 _CLASSES: dict[int, type[TrafficVehicle]] = {int(Kind.CAR): TrafficVehicle, int(Kind.CYCLIST): Cyclist}

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any
 
 import gymnasium
 import numpy as np
+from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.road.lane import PolyLaneFixedWidth, StraightLane
 from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.behavior import IDMVehicle
@@ -28,12 +28,12 @@ INTERSECTION = "intersection-v0"
 _IDLE = 1
 """Its action that changes nothing."""
 
-_TASTE = ("DISTANCE_WANTED", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN")
-"""Settings that it changes of `IDMVehicle`."""
+_PARAMETERS = ("DISTANCE_WANTED", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN")
+"""Parameters of `IDMVehicle` that it changes."""
 
 
 def stock_road(network: TownNetwork, world: WorldArrays) -> Road:
-    """highway-env's own network, lanes and IDM vehicles where those of a world are, and nothing else.
+    """Returns highway-env's own network, lanes and IDM vehicles at the places of those of a world.
 
     Args:
         network: of the town.
@@ -55,7 +55,7 @@ def stock_road(network: TownNetwork, world: WorldArrays) -> Road:
 
 
 def stock_lane(lane: Lane) -> StraightLane | PolyLaneFixedWidth:
-    """A straight lane, or one through points 2 m apart."""
+    """Returns a straight lane, or one through points 2 m apart."""
     if float(np.ptp(lane.headings)) < STRAIGHT:
         return StraightLane(lane.points[0, :2], lane.points[-1, :2], speed_limit=lane.speed_limit)
     stations = np.linspace(0.0, lane.length, max(int(lane.length / POINTS_APART) + 1, 3))
@@ -64,7 +64,7 @@ def stock_lane(lane: Lane) -> StraightLane | PolyLaneFixedWidth:
 
 
 def run_stock(road: Road, substeps: int, dt: float) -> None:
-    """Lets a road of highway-env go on as its environments do: all decide, then all move.
+    """Steps a road of highway-env as its environments do: all vehicles decide, then all move.
 
     Args:
         road: with its vehicles.
@@ -77,10 +77,9 @@ def run_stock(road: Road, substeps: int, dt: float) -> None:
 
 
 class StockIntersection:
-    """`intersection-v0` with its own settings, in which the car drives on as it is.
+    """`intersection-v0` with its own settings, whose ego keeps its speed and lane.
 
-    Its `reset` writes its taste in driving into `IDMVehicle` itself, for every road of the process; `close` puts back
-    what was there.
+    Its `reset` changes parameters of the class `IDMVehicle`, for every road of the process; `close` restores them.
 
     Attributes:
         seconds_per_step: simulated time of a step [s].
@@ -88,21 +87,24 @@ class StockIntersection:
     """
 
     def __init__(self, seed: int = 0) -> None:
-        self._taste = {name: getattr(IDMVehicle, name) for name in _TASTE}
+        self._parameters = {name: getattr(IDMVehicle, name) for name in _PARAMETERS}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # that there are newer versions of it
-            self._env: Any = gymnasium.make(INTERSECTION, disable_env_checker=True)
+            self._env: gymnasium.Env[object, int] = gymnasium.make(INTERSECTION, disable_env_checker=True)
         self._env.reset(seed=seed)
-        inside: Any = self._env.unwrapped
-        config = inside.config
+        config = self._inside.config
         self.seconds_per_step = 1.0 / float(config["policy_frequency"])
         self.substeps_per_step = int(config["simulation_frequency"] // config["policy_frequency"])
         self._ended = False
 
     @property
+    def _inside(self) -> AbstractEnv:
+        return self._env.unwrapped
+
+    @property
     def vehicles(self) -> int:
         """Number of vehicles now, the ego included."""
-        return len(self._env.unwrapped.road.vehicles)
+        return len(self._inside.road.vehicles)
 
     def prepare(self) -> None:
         """Resets the environment where an episode has ended."""
@@ -111,12 +113,12 @@ class StockIntersection:
             self._ended = False
 
     def step(self) -> None:
-        """One step; call `prepare` before."""
+        """Plays one step; call `prepare` before."""
         *_, terminated, truncated, _ = self._env.step(_IDLE)
         self._ended = bool(terminated or truncated)
 
     def close(self) -> None:
-        """Lets it go, and the vehicles of other roads drive as before."""
+        """Closes the environment and restores the parameters of `IDMVehicle`."""
         self._env.close()
-        for name, value in self._taste.items():
+        for name, value in self._parameters.items():
             setattr(IDMVehicle, name, value)

@@ -1,9 +1,9 @@
-"""`Town-v0`: a plain highway-env environment in a town, without roles, talk or tasks."""
+"""`Town-v0`: a highway-env environment in a town, without roles, dialogue or tasks."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import ClassVar, TypedDict
 
 import numpy as np
 from gymnasium import spaces
@@ -28,22 +28,22 @@ from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import CLEAR_OF_CAR
 
 ROUNDS = 8
-"""Most rounds in which vehicles and pedestrians that are too close are replaced."""
+"""Largest number of rounds in which vehicles and pedestrians too close to the ego are placed again."""
 
 SEEDS = 2**31
-"""Seeds of what is drawn in the arrays are less than this."""
+"""Upper bound of the seeds of a world's random numbers."""
 
 
 def populate_around(
     network: TownNetwork, world: WorldArrays, rng: np.random.Generator, *, vehicles: int, pedestrians: int
 ) -> None:
-    """Adds others at random places, as many as fit and none close to the first vehicle of a world.
+    """Adds vehicles and pedestrians at random places, as many as fit and none close to the ego, the first vehicle.
 
     Args:
-        network: of the town.
-        world: arrays of the world; its first vehicle is there already.
-        rng: of the places.
-        vehicles: number of others.
+        network: network of the town.
+        world: arrays of the world with the ego.
+        rng: generator of the places.
+        vehicles: number of other vehicles.
         pedestrians: number of pedestrians.
     """
     town = town_arrays(network)
@@ -73,7 +73,7 @@ def _counts(world: WorldArrays) -> NDArray[np.int64]:
 
 
 class Kinematics(KinematicObservation):
-    """The same rows to the last bit: the observer, then those close to it, each feature scaled to [-1, 1]."""
+    """highway-env's `Kinematics`, bit for bit, with one scaling per column instead of one per vehicle."""
 
     def observe(self) -> NDArray[np.float32]:
         """Returns rows (`vehicles_count`, features); zeros for missing ones, NaN for features that an object lacks."""
@@ -89,13 +89,13 @@ class Kinematics(KinematicObservation):
             vehicles_only=not self.include_obstacles,
         )
         origin = None if self.absolute else observer
-        told = [observer.to_dict()]
+        rows_of = [observer.to_dict()]
         for other in close[: self.vehicles_count - 1]:
-            told.append(other.to_dict(origin, observe_intentions=self.observe_intentions))
+            rows_of.append(other.to_dict(origin, observe_intentions=self.observe_intentions))
         rows = np.zeros((self.vehicles_count, len(self.features)))
-        rows[: len(told)] = [[row.get(feature, math.nan) for feature in self.features] for row in told]
+        rows[: len(rows_of)] = [[row.get(feature, math.nan) for feature in self.features] for row in rows_of]
         if self.normalize:
-            self._scale(rows[: len(told)])
+            self._scale(rows[: len(rows_of)])
         if self.order == "shuffled":
             self.env.np_random.shuffle(rows[1:])
         return rows.astype(np.float32)
@@ -113,19 +113,19 @@ class Kinematics(KinematicObservation):
 
 
 class OccupancyGrid(OccupancyGridObservation):
-    """The same cells; images show 0 for those without a value, which highway-env leaves to the machine."""
+    """highway-env's `OccupancyGrid` with a defined value, 0, of empty cells in images."""
 
-    def observe(self) -> NDArray[Any]:
-        """A grid (features, cells along, cells across) around the observer: float32, or uint8 for images."""
+    def observe(self) -> NDArray[np.float32] | NDArray[np.uint8]:
+        """Returns a grid (features, cells along, cells across) around the observer: float32, or uint8 for images."""
         if not self.env.road or self.absolute:
-            return np.asarray(super().observe())  # nothing yet, or an error that there is no such grid
+            return np.asarray(super().observe())  # no road yet, or highway-env's error for an absolute grid
         self.grid.fill(np.nan)
         rows = [vehicle.to_dict(self.observer_vehicle) for vehicle in self.env.road.vehicles]
         self.normalize({})  # a table without columns: it sets the ranges and has nothing to scale
         cells = [self._cell(row) for row in rows]
-        told = {feature for row in rows for feature in row}
+        known = {feature for row in rows for feature in row}
         for layer, feature in enumerate(self.features):
-            if feature in told:
+            if feature in known:
                 self._fill(layer, feature, rows, cells)
             elif feature == "on_road":
                 self.fill_road_layer_by_lanes(layer)
@@ -157,11 +157,11 @@ class OccupancyGrid(OccupancyGridObservation):
                 self.grid[layer, *cell] = value if limits is None else lmap(value, limits, [-1, 1])
 
     def fill_road_layer_by_lanes(self, layer_index: int, lane_perception_distance: float = 100) -> None:
-        """Sets the cells that points of lanes fall into to 1; only lanes that reach into the grid are looked at.
+        """Sets the cells of points of lanes to 1; only lanes that reach into the grid are sampled.
 
         Args:
-            layer_index: of the grid.
-            lane_perception_distance: points are looked at so far along each lane before and behind the observer [m].
+            layer_index: index of the layer of the grid.
+            lane_perception_distance: range along each lane ahead of and behind the observer that is sampled [m].
         """
         spacing, network, place = np.amin(self.grid_step), self.env.road.network, self.observer_vehicle.position
         reach = float(np.linalg.norm(np.abs(self.grid_size).max(axis=1)))
@@ -181,27 +181,42 @@ class OccupancyGrid(OccupancyGridObservation):
             self.grid[layer_index, cells[inside, 0], cells[inside, 1]] = 1
 
 
-def quicken(kind: ObservationType) -> None:
-    """Lets highway-env's observation type, and those that it consists of, observe in the quick ways of this module."""
+def use_faster_observations(kind: ObservationType) -> None:
+    """Replaces the classes of highway-env's observation type and its parts by the faster ones of this module."""
     for part in parts_of(kind):
-        quick = _QUICK.get(type(part))
-        if quick is not None:
-            part.__class__ = quick  # they differ in what they do, not in what they keep
+        faster = _FASTER.get(type(part))
+        if faster is not None:
+            part.__class__ = faster  # the subclass adds no attributes
 
 
 def parts_of(kind: ObservationType) -> list[ObservationType]:
-    """A type of observation and those that it consists of."""
+    """Returns an observation type and the types that it consists of."""
     parts = [*getattr(kind, "observation_types", ()), *getattr(kind, "agents_observation_types", ())]
     return [kind, *(found for part in parts for found in parts_of(part))]
 
 
-_QUICK: dict[type[ObservationType], type[ObservationType]] = {
+_FASTER: dict[type[ObservationType], type[ObservationType]] = {
     KinematicObservation: Kinematics,
     OccupancyGridObservation: OccupancyGrid,
 }
 
 
 # --- Town-v0 ----------------------------------------------------------------------------------------------------------
+
+
+class TownConfig(TypedDict):
+    """Settings of `TownEnv`, with those of highway-env that the vectorised version reads."""
+
+    town: str
+    vehicles: int
+    pedestrians: int
+    duration: float
+    reward_speed: float
+    collision_reward: float
+    simulation_frequency: float
+    policy_frequency: float
+    observation: dict[str, object]
+    action: dict[str, object]
 
 
 class TownEnv(AbstractEnv):
@@ -242,21 +257,21 @@ class TownEnv(AbstractEnv):
     - v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 2}
+    metadata: ClassVar[dict[str, object]] = {"render_modes": ["human", "rgb_array"], "render_fps": 2}
 
     # set by highway-env's methods, which carry no types
-    observation_type: Any
-    observation_space: Any
+    observation_type: ObservationType
+    observation_space: spaces.Space[object]
 
-    def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
+    def __init__(self, config: dict[str, object] | None = None, render_mode: str | None = None) -> None:
         self._network: TownNetwork | None = None
         self._network_of: str | None = None
         super().__init__(config, render_mode)
 
     @classmethod
-    def default_config(cls) -> dict[str, Any]:
-        """Settings that hold where `config` gives no other."""
-        config: dict[str, Any] = super().default_config()
+    def default_config(cls) -> TownConfig:
+        """Returns the settings that hold where `config` gives no others."""
+        config = super().default_config()
         config.update(
             town="brookside",
             vehicles=10,
@@ -270,18 +285,19 @@ class TownEnv(AbstractEnv):
             screen_height=600,
             centering_position=[0.5, 0.5],
         )
-        return config
+        settings: TownConfig = config
+        return settings
 
     @property
     def ego(self) -> Array:
-        """The vehicle under control: x, y [m], heading [rad], speed [m/s]."""
+        """State of the ego: x, y [m], heading [rad], speed [m/s]."""
         vehicle = self.vehicle
         return np.array((*vehicle.position, vehicle.heading, vehicle.speed))
 
     def define_spaces(self) -> None:
-        """Sets the spaces, with finite bounds: nothing in a town is beyond `FARTHEST`."""
+        """Sets the spaces, with the finite bounds `FARTHEST`, which all values in a town keep."""
         super().define_spaces()
-        quicken(self.observation_type)
+        use_faster_observations(self.observation_type)
         self.observation_space = finite(self.observation_space)
         for kind in parts_of(self.observation_type):
             viewer = getattr(kind, "viewer", None)
@@ -305,7 +321,7 @@ class TownEnv(AbstractEnv):
             self.road, start.position(station), heading=start.heading_at(station), speed=0.0
         )
         vehicle.height = start.height_at(station)
-        vehicle.lane_index = network.index_of(lane)  # highway-env asks for the closest one, be it under a bridge
+        vehicle.lane_index = network.index_of(lane)  # highway-env finds the closest lane, which may be under a bridge
         vehicle.lane = network.get_lane(vehicle.lane_index)
         if isinstance(vehicle, ControlledVehicle):
             vehicle.target_lane_index = vehicle.lane_index
@@ -328,7 +344,7 @@ class TownEnv(AbstractEnv):
         }
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws as highway-env does, also under SDL's dummy video driver, where its viewer would show black."""
+        """Renders as highway-env does, also under SDL's dummy video driver, where its viewer would show black."""
         if self.viewer is None and self.render_mode is not None:
             viewer = EnvViewer(self)
             viewer.enabled = True
@@ -343,8 +359,8 @@ class TownEnv(AbstractEnv):
         return bool(self.time >= self.config["duration"])
 
 
-def finite(space: spaces.Space[Any]) -> spaces.Space[Any]:
-    """The same space with finite bounds; images have them."""
+def finite(space: spaces.Space[object]) -> spaces.Space[object]:
+    """Returns the same space with finite bounds; those of images are finite already."""
     if isinstance(space, spaces.Dict):
         return spaces.Dict({name: finite(part) for name, part in space.items()})
     if isinstance(space, spaces.Tuple):

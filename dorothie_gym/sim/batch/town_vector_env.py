@@ -1,9 +1,9 @@
-"""`Town-v0` many times over: what `gymnasium.make_vec` makes of it."""
+"""Vectorised `Town-v0`, the result of `gymnasium.make_vec`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TypeAlias, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -42,7 +42,10 @@ from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.records import RecordArray, empty_records
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.town_env import SEEDS, TownEnv, finite, populate_around
+from dorothie_gym.sim.town_env import SEEDS, TownConfig, TownEnv, finite, populate_around
+
+ActionArray: TypeAlias = "NDArray[np.int64] | NDArray[np.float32]"
+"""Meta actions (n,), or continuous actions (n, 1 or 2) in [-1, 1]."""
 
 _CODES = {"LANE_LEFT": LEFT, "IDLE": IDLE, "LANE_RIGHT": RIGHT, "FASTER": FASTER, "SLOWER": SLOWER}
 
@@ -55,12 +58,12 @@ class Actions:
         speeds: possible target speeds with meta actions [m/s]; empty for continuous actions.
     """
 
-    def __init__(self, config: Mapping[str, Any]) -> None:
+    def __init__(self, config: Mapping[str, object]) -> None:
         """Read highway-env's setting `action`; raises `ValueError` for what only plain environments can do."""
         if config.get("type") not in ("DiscreteMetaAction", "ContinuousAction"):
             raise _sync_only("action", f"type {config.get('type')!r}")
         self._stock = action_factory(None, dict(config))
-        self.space: spaces.Space[Any] = self._stock.space()
+        self.space: spaces.Space[ActionArray] = self._stock.space()
         self.speeds: Array = np.zeros(0)
         self._codes: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
         self._discrete = isinstance(self._stock, DiscreteMetaAction)
@@ -83,9 +86,9 @@ class Actions:
             raise _sync_only("action", f"a speed_range beyond {Vehicle.MAX_SPEED} m/s")
 
     def read(
-        self, actions: NDArray[Any], space: spaces.Space[Any], helms: RecordArray[HelmRecord]
+        self, actions: ActionArray, space: spaces.Space[ActionArray], helms: RecordArray[HelmRecord]
     ) -> NDArray[np.int32]:
-        """Codes (n,) of meta actions; continuous actions are written to the helms, and are no meta actions.
+        """Returns the codes (n,) of meta actions; continuous actions are written to the helms, and are no meta actions.
 
         Args:
             actions: (n, ...) one for each ego.
@@ -123,7 +126,7 @@ class Kinematics:
         shuffled: whether the rows of others are in random order.
     """
 
-    def __init__(self, config: Mapping[str, Any]) -> None:
+    def __init__(self, config: Mapping[str, object]) -> None:
         """Read highway-env's setting `observation`; raises `ValueError` for what only plain environments can do."""
         if config.get("type") != "Kinematics":
             raise _sync_only("observation", f"type {config.get('type')!r}")
@@ -172,8 +175,8 @@ def _sync_only(setting: str, what: str) -> ValueError:
 # --- Vector environment -----------------------------------------------------------------------------------------------
 
 
-class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
-    """`TownEnv` many times over, each with a world of its own, in one compiled call per step and thread.
+class TownVectorEnv(VectorEnv[NDArray[np.float32], ActionArray, NDArray[np.generic]]):
+    """Vectorised `TownEnv`: each environment has a world of its own, and a step is one compiled call per thread.
 
     ## Description
     Vehicles, rewards and episode ends are those of `TownEnv`; the ego is highway-env's `MDPVehicle` (or, with
@@ -190,7 +193,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
     As `TownEnv`; `infos["rewards"]` has the terms.
 
     ## Episode End
-    As `TownEnv`. What follows says `metadata["autoreset_mode"]`: by default an environment that ended is reset by the
+    As `TownEnv`. `metadata["autoreset_mode"]` selects the reset: by default an environment that ended is reset by the
     next step, whose action it ignores.
 
     ## Arguments
@@ -201,27 +204,27 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
     - v0: first version.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    metadata: dict[str, object] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(
         self,
         num_envs: int = 1,
-        config: dict[str, Any] | None = None,
+        config: dict[str, object] | None = None,
         render_mode: str | None = None,
         threads: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
     ) -> None:
-        """Make environments, to be reset before they are used.
+        """Makes environments, to be reset before they are used.
 
         Raises:
             ValueError: `config` asks for something that only the plain environments can do; they run side by side with
                 `vectorization_mode="sync"`.
         """
         if render_mode is not None:
-            raise ValueError(f'{render_mode=}: many towns are not drawn; vectorization_mode="sync" can')
+            raise ValueError(f'{render_mode=}: there are no pictures of many towns; use vectorization_mode="sync"')
         self.num_envs = num_envs
         self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(autoreset_mode)}
-        self.config = {**TownEnv.default_config(), **(config or {})}
+        self.config = cast(TownConfig, {**TownEnv.default_config(), **(config or {})})
         self._actions, self._kinematics = Actions(self.config["action"]), Kinematics(self.config["observation"])
         self.single_action_space = self._actions.space
         self.single_observation_space = finite(self._kinematics.space)
@@ -256,8 +259,8 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
     # --- Gymnasium's interface ----------------------------------------------------------------------------------------
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, object] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, object]]:
         """Begins new episodes.
 
         Args:
@@ -284,8 +287,8 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         return self._observe(mask), self._infos(mask, np.zeros(self.action_space.shape or (), self.action_space.dtype))
 
     def step(
-        self, actions: NDArray[Any]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        self, actions: ActionArray
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, object]]:
         """Plays a decision in every environment.
 
         Args:
@@ -298,7 +301,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             ValueError: actions that are not of the action space, or environments that were never reset (or are over,
                 where the autoreset mode leaves resets to the caller).
         """
-        actions = np.asarray(actions)
+        actions = cast(ActionArray, np.asarray(actions))
         mode = self.metadata["autoreset_mode"]
         if not self._begun.all():
             raise ValueError("reset the environments before the first step")
@@ -327,8 +330,8 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         return seed
 
     def _begin_at_once(
-        self, last: NDArray[np.float32], actions: NDArray[Any]
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        self, last: NDArray[np.float32], actions: ActionArray
+    ) -> tuple[NDArray[np.float32], dict[str, object]]:
         """Resets environments that are over; returns observations and infos as in the mode `SAME_STEP`."""
         over = self._over.copy()
         final = np.full(self.num_envs, None, dtype=object)
@@ -340,17 +343,18 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
         infos |= {"final_obs": final, "_final_obs": over, "final_info": ended, "_final_info": over.copy()}
         return self._observe(over), infos
 
-    def close_extras(self, **kwargs: Any) -> None:
-        """Lets the threads go."""
+    def close_extras(self, **_kwargs: object) -> None:
+        """Ends the threads."""
         self._worlds.close()
 
-    @property  # type: ignore[misc]
-    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+    # of many environments instead of one, and read-only
+    @property  # type: ignore[misc]  # gymnasium's is writable
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]  # see above
         """The environments' generators."""
         return tuple(self._generator(i) for i in range(self.num_envs))
 
     @property
-    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]  # see `np_random`
         """The environments' seeds."""
         return tuple(self._seeds[i] for i, _ in enumerate(self.np_random))
 
@@ -422,25 +426,30 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], NDArray[Any], NDArray[Any]]):
             "collision": self.config["collision_reward"] * outcomes["crashed"].astype(np.float64),
         }
 
-    def _infos(self, mask: NDArray[np.bool_], actions: NDArray[Any]) -> dict[str, Any]:
+    def _infos(self, mask: NDArray[np.bool_], actions: NDArray[np.generic]) -> dict[str, object]:
         """Returns the infos of `SyncVectorEnv`, for the environments of a mask."""
         outcomes = self._egos.outcomes
-        values: dict[str, Any] = {"speed": outcomes["speed"], "crashed": outcomes["crashed"], "action": actions}
-        infos: dict[str, Any] = {"rewards": _with_masks(self._terms(), mask), "_rewards": mask.copy()}
+        values: dict[str, NDArray[np.generic]] = {
+            "speed": outcomes["speed"],
+            "crashed": outcomes["crashed"],
+            "action": actions,
+        }
+        infos: dict[str, object] = {"rewards": _with_masks(self._terms(), mask), "_rewards": mask.copy()}
         return {**_with_masks(values, mask), **infos}
 
 
-def _with_masks(values: dict[str, NDArray[Any]], mask: NDArray[np.bool_]) -> dict[str, Any]:
-    """Values of the environments of a mask, zeros elsewhere, each with the mask under its name with an underscore."""
-    infos: dict[str, Any] = {}
+def _with_masks(values: Mapping[str, NDArray[np.generic]], mask: NDArray[np.bool_]) -> dict[str, object]:
+    """Returns the values of the environments of a mask, zeros elsewhere, and under `_name` the mask of each."""
+    infos: dict[str, object] = {}
     for name, value in values.items():
-        infos[name] = np.zeros_like(value)
-        infos[name][mask] = value[mask]
+        masked = np.zeros_like(value)
+        masked[mask] = value[mask]
+        infos[name] = masked
         infos[f"_{name}"] = mask.copy()
     return infos
 
 
-def _without(actions: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[Any]:
+def _without(actions: ActionArray, mask: NDArray[np.bool_]) -> ActionArray:
     """Returns a copy of the actions with zeros for the egos of a mask, which took none."""
     taken = actions.copy()
     taken[mask] = 0

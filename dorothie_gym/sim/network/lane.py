@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TypedDict
 
 import numpy as np
 from highway_env.road.lane import AbstractLane, LineType
@@ -14,6 +14,35 @@ from numpy.typing import NDArray
 from dorothie_gym.maps import polyline
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.polyline import LaneTable
+
+
+class TownLaneConfig(TypedDict):
+    """Lane of a town as JSON."""
+
+    id: int
+    road_id: int
+    lane_id: int
+    junction_id: int
+    points: list[list[float]]
+    widths: list[float]
+    speed_limit: float
+    street: int
+
+
+class PolylineLaneConfig(TypedDict):
+    """Arguments of a `PolylineLane` as JSON."""
+
+    town_lane: TownLaneConfig
+    line_types: list[int]
+    forbidden: bool
+    priority: int
+
+
+class LaneConfig(TypedDict):
+    """Lane as highway-env's `lane_from_config` reads it."""
+
+    class_path: str
+    config: PolylineLaneConfig
 
 
 class PolylineLane(AbstractLane):
@@ -35,7 +64,7 @@ class PolylineLane(AbstractLane):
 
     def __init__(
         self,
-        town_lane: Lane | Mapping[str, Any],
+        town_lane: Lane | TownLaneConfig,
         *,
         line_types: Sequence[int] | None = None,
         forbidden: bool = False,
@@ -44,12 +73,12 @@ class PolylineLane(AbstractLane):
         """Build a lane that measures with a table of its own; `TownNetwork` makes it share the network's.
 
         Args:
-            town_lane: lane of a town, or the mapping that `to_config` wrote for one.
+            town_lane: lane of a town, or the dict that `to_config` wrote for one.
             line_types: marks on the left and right; none in junctions and continuous elsewhere by default.
             forbidden: whether vehicles must not change to this lane.
             priority: right of way.
         """
-        lane = town_lane if isinstance(town_lane, Lane) else _lane_from_mapping(town_lane)
+        lane = town_lane if isinstance(town_lane, Lane) else _lane_of(town_lane)
         mark = LineType.NONE if lane.in_junction else LineType.CONTINUOUS
         self.town_lane = lane
         self.length = lane.length
@@ -117,11 +146,11 @@ class PolylineLane(AbstractLane):
         return polyline.local_coordinates_many(self._points, self._offsets, self._ends, self.row, places)
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> PolylineLane:
+    def from_config(cls, config: PolylineLaneConfig) -> PolylineLane:
         """The lane whose parameters `to_config` wrote under "config"."""
         return cls(**config)
 
-    def to_config(self) -> dict[str, Any]:
+    def to_config(self) -> LaneConfig:
         """The lane as a dict that JSON can hold and highway-env's `lane_from_config` reads."""
         lane = self.town_lane
         return {
@@ -144,6 +173,14 @@ class PolylineLane(AbstractLane):
         }
 
 
-def _lane_from_mapping(mapping: Mapping[str, Any]) -> Lane:
-    arrays = {name: np.array(mapping[name], dtype=np.float64) for name in ("points", "widths")}
-    return Lane(**{**mapping, **arrays})
+def _lane_of(config: TownLaneConfig) -> Lane:
+    return Lane(
+        id=config["id"],
+        road_id=config["road_id"],
+        lane_id=config["lane_id"],
+        junction_id=config["junction_id"],
+        points=np.array(config["points"], dtype=np.float64),
+        widths=np.array(config["widths"], dtype=np.float64),
+        speed_limit=config["speed_limit"],
+        street=config["street"],
+    )

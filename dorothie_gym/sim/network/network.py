@@ -6,7 +6,7 @@ import itertools
 import math
 from collections import defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from highway_env.road.lane import LineType
@@ -316,7 +316,7 @@ class TownNetwork(RoadNetwork):
         return path[::-1]
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> RoadNetwork:
+    def from_config(cls, config: Mapping[str, object]) -> RoadNetwork:
         """The plain highway-env network that `to_config` described; a config holds no links, so it is no town."""
         return RoadNetwork.from_config(config)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays
 if TYPE_CHECKING:
     from highway_env.vehicle.objects import RoadObject
 
+    from dorothie_gym.sim.network.lane import PolylineLane
     from dorothie_gym.sim.road import TownRoad
 
 
@@ -28,8 +29,23 @@ class ArrayHolder(Protocol):
     arrays: WorldArrays
 
 
-CASTS = {"f8": (0, "d"), "i4": (1, "i"), "b1": (2, "?")}
-"""Types of fields: the memory view of the row that holds them, and its format."""
+Record_co = TypeVar("Record_co", covariant=True)
+T = TypeVar("T")
+
+
+class Field(Protocol[T]):
+    """Attribute of a view that reads and writes a field of its row: a property, of which mypy knows the type."""
+
+    def __get__(self, view: BodyView[object], kind: type | None = None, /) -> T: ...
+
+    def __set__(self, view: BodyView[object], value: T, /) -> None: ...
+
+
+Cells: TypeAlias = "memoryview[float]"
+"""Cells of a row of one type: floats, integers or flags."""
+
+MEMORIES = {"f8": 0, "i4": 1, "b1": 2}
+"""Places in `BodyView.memory` of the types of fields."""
 
 
 def field_offset(dtype: np.dtype[np.void], name: str) -> int:
@@ -38,25 +54,63 @@ def field_offset(dtype: np.dtype[np.void], name: str) -> int:
     return dtype.fields[name][1]
 
 
-def field(dtype: np.dtype[np.void], name: str, cast: Callable[[Any], Any] | None = None) -> Any:
-    """Returns a property that reads and writes a field of the view's row; `cast` converts the value that is read."""
-    kind = dtype[name].base
-    which, _ = CASTS[kind.str[1:]]
-    at = field_offset(dtype, name) // kind.itemsize
+def float_field(dtype: np.dtype[np.void], name: str) -> Field[float]:
+    """Returns a property for a number of the view's row."""
+    return property(*_accessors(dtype, name))
 
-    def read(view: BodyView) -> Any:
+
+def int_field(dtype: np.dtype[np.void], name: str) -> Field[int]:
+    """Returns a property for an integer of the view's row; of an array of them the first one."""
+    return property(*_accessors(dtype, name))
+
+
+def flag_field(dtype: np.dtype[np.void], name: str) -> Field[bool]:
+    """Returns a property for a flag of the view's row."""
+    return property(*_accessors(dtype, name))
+
+
+def converted_field(dtype: np.dtype[np.void], name: str, convert: Callable[..., T]) -> Field[T]:
+    """Returns a property for a field of the view's row whose value is converted when it is read."""
+    which, at = _place(dtype, name)
+
+    def read(view: BodyView[object]) -> T:
+        return convert(view.memory()[which][at])
+
+    return property(read, _accessors(dtype, name)[1])
+
+
+def heading_field(dtype: np.dtype[np.void]) -> Field[float]:
+    """Returns a property for the heading of a body [rad]; its cosine and sine change with it."""
+    read, store = _accessors(dtype, "heading")
+
+    def write(view: BodyView[object], value: float) -> None:
+        store(view, value)
+        view.cos, view.sin = math.cos(value), math.sin(value)
+
+    return property(read, write)
+
+
+def _place(dtype: np.dtype[np.void], name: str) -> tuple[int, int]:
+    """Returns the memory that holds a field, and the number of its cell."""
+    kind = dtype[name].base
+    return MEMORIES[kind.str[1:]], field_offset(dtype, name) // kind.itemsize
+
+
+def _accessors(
+    dtype: np.dtype[np.void], name: str
+) -> tuple[Callable[[BodyView[object]], float], Callable[[BodyView[object], float], None]]:
+    which, at = _place(dtype, name)
+
+    def read(view: BodyView[object]) -> float:
         return view.memory()[which][at]
 
-    def read_cast(view: BodyView) -> Any:
-        return cast(view.memory()[which][at])  # type: ignore[misc]
-
-    def write(view: BodyView, value: Any) -> None:
+    def write(view: BodyView[object], value: float) -> None:
         view.memory()[which][at] = value
 
-    return property(read if cast is None else read_cast, write)
+    return read, write
 
 
-class BodyView:
+class BodyView(Generic[Record_co]):
     """A row of the arrays. Its memory is looked up once and again whenever the holder has other arrays.
 
     Attributes:
@@ -73,56 +127,57 @@ class BodyView:
     hit = False
     impact: Array | None = None
 
-    cos: Any
-    sin: Any
-    speed: Any
-    lane: Any
-    heading: Any
-    lane_id: Any
-    station: Any
+    cos: Field[float]
+    sin: Field[float]
+    heading: Field[float]
+    speed: Field[float] | float
 
     def __init__(self, road: TownRoad, holder: ArrayHolder, row: int) -> None:
-        """Looks at a row; `road` is a `TownRoad` of the same town."""
+        """Shows a row; `road` is a `TownRoad` of the same town."""
         self.road = road
         self._holder = holder
         self._row = row
         self._arrays: WorldArrays | None = None
-        self._views: tuple[Any, ...] = ()
+        self._cells: tuple[Cells, ...] = ()
+        self._position = np.zeros(2)
 
     @property
     def row(self) -> int:
         """Number of the row."""
         return self._row
 
-    def memory(self) -> tuple[Any, ...]:
-        """The row's memory as floats, integers and flags, and its place as an array (2,)."""
+    def memory(self) -> tuple[Cells, ...]:
+        """Returns the memory of the row as floats, integers and flags."""
         arrays = self._holder.arrays
         if arrays is not self._arrays:
             size = self.DTYPE.itemsize
             records = np.asarray(getattr(arrays, self.RECORDS)).view(np.uint8)
-            cells: Any = records[self._row * size : (self._row + 1) * size].data
-            place = np.frombuffer(cells, dtype=np.float64, count=2, offset=field_offset(self.DTYPE, "x"))
-            self._views = (*(cells.cast(code) for _, code in CASTS.values()), place)
+            row = records[self._row * size : (self._row + 1) * size].data
+            self._position = np.frombuffer(row, dtype=np.float64, count=2, offset=field_offset(self.DTYPE, "x"))
+            # for mypy all cells are floats: of which type they are depends on the index
+            self._cells = cast("tuple[Cells, ...]", (row.cast("d"), row.cast("i"), row.cast("?")))
             self._arrays = arrays
-        return self._views
+        return self._cells
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_arrays": None, "_views": ()}  # a copy finds its own memory
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "_arrays": None, "_cells": (), "_position": None}  # a copy looks its memory up again
 
     @property
-    def record(self) -> Any:
+    def record(self) -> Record_co:
         """The row itself, for the compiled functions; not to be kept."""
-        return getattr(self._holder.arrays, self.RECORDS)[self._row]
+        record: Record_co = getattr(self._holder.arrays, self.RECORDS)[self._row]
+        return record
 
     @property
     def position(self) -> Array:
         """Place of the middle (2,) [m]; as in highway-env an array that changes when the body moves."""
-        place: Array = self.memory()[3]
-        return place
+        self.memory()
+        return self._position
 
     @position.setter
     def position(self, value: Sequence[float]) -> None:
-        self.memory()[3][:] = value
+        self.memory()
+        self._position[:] = value
 
     @property
     def direction(self) -> Array:
@@ -133,6 +188,11 @@ class BodyView:
     def velocity(self) -> Array:
         """(2,) [m/s]."""
         return np.array((self.speed * self.cos, self.speed * self.sin))
+
+    @property
+    def lane(self) -> PolylineLane:
+        """The closest lane."""
+        raise NotImplementedError
 
     @property
     def lane_offset(self) -> Array:
@@ -147,8 +207,7 @@ class BodyView:
 
     def on_lane(self) -> tuple[float, float]:
         """Station and distance to the right on the closest lane [m]."""
-        found: tuple[float, float] = self.lane.local_coordinates(self.position)
-        return found
+        return self.lane.local_coordinates(self.position)
 
     def to_dict(self, origin_vehicle: RoadObject | None = None, observe_intentions: bool = True) -> dict[str, float]:
         """Returns the features that highway-env observes of a vehicle; those of pedestrians and props likewise.
@@ -170,14 +229,3 @@ class BodyView:
             "cos_d": to_x, "sin_d": to_y,
             "long_off": along, "lat_off": aside, "ang_off": self.lane.local_angle(heading, along),
         }  # fmt: skip
-
-
-def heading_field(dtype: np.dtype[np.void]) -> Any:
-    """Returns a property for the heading of a body [rad]; its cosine and sine change with it."""
-    plain = field(dtype, "heading")
-
-    def write(view: BodyView, value: float) -> None:
-        plain.fset(view, value)
-        view.cos, view.sin = math.cos(value), math.sin(value)
-
-    return property(plain.fget, write)

@@ -6,7 +6,7 @@ the fields for mypy and makes the dtype of the arrays; at runtime records are Nu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Annotated, Any, Protocol, TypeAlias, TypeVar, cast, get_type_hints, overload
 
@@ -43,13 +43,13 @@ class RecordArray(Protocol[Record]):
     def __iter__(self) -> Iterator[Record]: ...
 
     @overload
-    def __getitem__(self, key: int | np.integer[Any]) -> Record: ...
+    def __getitem__(self, key: int | np.integer) -> Record: ...
 
     @overload
-    def __getitem__(self, key: str) -> NDArray[Any]: ...
+    def __getitem__(self, key: str) -> NDArray[Any]: ...  # its dtype depends on the field
 
     @overload
-    def __getitem__(self, key: slice | NDArray[Any]) -> RecordArray[Record]: ...
+    def __getitem__(self, key: slice | NDArray[np.generic]) -> RecordArray[Record]: ...
 
     def __setitem__(self, key: object, value: object) -> None: ...
 
@@ -107,11 +107,11 @@ def empty_records(kind: type[Record], count: int) -> RecordArray[Record]:
     return cast("RecordArray[Record]", np.zeros(count, dtype=record_dtype(kind)).view(np.recarray))
 
 
-def filled_records(kind: type[Record], rows: list[tuple[Any, ...]]) -> RecordArray[Record]:
+def filled_records(kind: type[Record], rows: Sequence[tuple[object, ...]]) -> RecordArray[Record]:
     """Returns an array of records with given fields; a single record of zeros where there are none."""
     if not rows:
         return empty_records(kind, 1)
-    return cast("RecordArray[Record]", np.array(rows, dtype=record_dtype(kind)).view(np.recarray))
+    return cast("RecordArray[Record]", np.array(list(rows), dtype=record_dtype(kind)).view(np.recarray))
 
 
 def plain(records: RecordArray[Record]) -> NDArray[np.void]:
