@@ -192,7 +192,7 @@ def test_acts_of_one_utterance_are_joined():
         text = " ".join(span.text for span in spans)
         assert len(text) <= MAX_CHARACTERS
         assert "left" in spans[1].text
-        # What goes on in lower case goes on from a comma.
+        # a continuation in lower case follows a comma, not a full stop
         assert not re.search(r"\. [a-z]", text), text
 
 

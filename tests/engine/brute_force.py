@@ -1,8 +1,8 @@
-"""Which sites of a town a car can drive to, found by trying all it can do every two metres.
+"""Sites of a town that a car can reach, found by exhaustive search over places two metres apart.
 
-Made without the router and its cells, to check what rests on them. What is asked for by a way of the car is room: to
-stand 15 m before a prop, 14 m for a U-turn (its own lane ahead, the oncoming one behind the place where it ends), and
-14 m of road, free on both lanes, for a lane switch.
+The search is independent of the router and its cells, so that it can check them. It requires room to stop 15 m before a
+prop; 14 m for a U-turn, on the own lane ahead and on the oncoming lane behind the place where it ends; and 14 m of road,
+free on both lanes, for a lane switch.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 
 STEP = 2.0
 NEAREST = 15.0
-"""The middle of a car comes no nearer to that of a prop before it: 12.5 m and half the car's length."""
+"""Least distance between the middles of a car and of a prop ahead of it: 12.5 m and half the car's length [m]."""
 SWITCH = 15.0
 TURN = 14.0
 AFTER_TURN = 6.0
 
 
 class Move(NamedTuple):
-    """A move to another node, and the stretches (lane, from, to) [m] that have to be free of props for it."""
+    """Move to another node, with the stretches (lane, from, to) [m] that must be free of props."""
 
     target: int
     needs: tuple[tuple[int, float, float], ...]
 
 
 class BruteForce:
-    """The places of a town, two metres apart, and what a car can do at each."""
+    """Places of a town, two metres apart, and the moves of a car at each."""
 
     def __init__(self, town: Town) -> None:
         self._town = town
@@ -49,7 +49,7 @@ class BruteForce:
             self._sites.setdefault(self._node(site.lane, site.station), []).append(site.id)
 
     def sites(self, car: tuple[int, float], props: Iterable[tuple[int, float]]) -> set[int]:
-        """Ids of the sites that a car can come to from a lane and station, past props on lanes and stations."""
+        """Returns the ids of the sites that a car can reach from a lane and station, past props at given places."""
         blocks: dict[int, list[float]] = {}
         for lane, station in props:
             blocks.setdefault(lane, []).append(station)
@@ -75,7 +75,7 @@ class BruteForce:
     def _moves_from(self, lane_id: int, station: float, k: int) -> list[Move]:
         town = self._town
         lane = town.lanes[lane_id]
-        # on: nothing stands before the next place; who is past a prop's middle is past it
+        # driving on: no prop stands before the next place; a car past the middle of a prop has passed it
         ahead = (lane_id, station, station + STEP + NEAREST)
         if k + 1 < self._counts[lane_id]:
             found = [Move(int(self._first[lane_id]) + k + 1, (ahead,))]
@@ -105,5 +105,5 @@ class BruteForce:
 
 @lru_cache(maxsize=4)
 def brute_force(town: Town) -> BruteForce:
-    """The brute force of a town, made once."""
+    """Returns the search of a town, built once."""
     return BruteForce(town)

@@ -1,4 +1,4 @@
-"""Guesses of hidden places, from what is marked on the map and what is said."""
+"""Estimates of hidden places from marks on the map and from statements."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ SURE = 0.01 * np.eye(3)
 
 
 def scenario_with_neighbours() -> tuple[Scenario, Landmark, Landmark]:
-    """One in which a hidden landmark on a street and a known one stand close together, the only ones of their names."""
+    """Returns a scenario with a hidden landmark close to a known one on a street; both names are unique."""
     for seed in range(500):
         scenario = draw_scenario(TOWN, None, seed)
         landmarks = scenario.storyboard.landmarks
@@ -68,7 +68,7 @@ def beliefs() -> BeliefTracker:
     return BeliefTracker(TOWN, SCENARIO)
 
 
-def told(held: BeliefTracker, move: DialogueMove, *values: SlotValue, by: Role = Role.PARTICIPANT) -> None:
+def say(held: BeliefTracker, move: DialogueMove, *values: SlotValue, by: Role = Role.PARTICIPANT) -> None:
     held.hear(by, [DialogueAct.of(move, *values)])
 
 
@@ -82,7 +82,7 @@ def spread(held: BeliefTracker) -> float:
 
 def test_named_street_locates_landmark() -> None:
     held = beliefs()
-    told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
+    say(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
     place = held.places[HIDDEN.name]
     assert place.distance(*HIDDEN.position) < 9.0
     assert not held.guesses
@@ -90,27 +90,27 @@ def test_named_street_locates_landmark() -> None:
 
 def test_answer_without_name_refers_to_last_topic() -> None:
     held = beliefs()
-    told(held, DialogueMove.QUERY_W, HIDDEN.name, by=Role.CO_WIZARD)
-    told(held, DialogueMove.REPLY_W, STREET)
+    say(held, DialogueMove.QUERY_W, HIDDEN.name, by=Role.CO_WIZARD)
+    say(held, DialogueMove.REPLY_W, STREET)
     named = beliefs()
-    told(named, DialogueMove.REPLY_W, HIDDEN.name, STREET)
+    say(named, DialogueMove.REPLY_W, HIDDEN.name, STREET)
     assert held.places == named.places
 
 
 def test_named_neighbour_narrows_estimate() -> None:
     held = beliefs()
-    told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
+    say(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
     before = spread(held)
-    told(held, DialogueMove.REPLY_W, HIDDEN.name, KNOWN.name)
+    say(held, DialogueMove.REPLY_W, HIDDEN.name, KNOWN.name)
     assert spread(held) < before
 
 
 def test_repeated_statement_adds_no_information() -> None:
     held = beliefs()
-    told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
-    told(held, DialogueMove.EXPLAIN, HIDDEN.name, KNOWN.name)
+    say(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
+    say(held, DialogueMove.EXPLAIN, HIDDEN.name, KNOWN.name)
     before = dict(held.places)
-    told(held, DialogueMove.CLARIFY, HIDDEN.name, STREET)
+    say(held, DialogueMove.CLARIFY, HIDDEN.name, STREET)
     assert held.places == before
 
 
@@ -120,7 +120,7 @@ def test_repeated_statement_adds_no_information() -> None:
         (DialogueMove.INSTRUCT, (ActionValue.J_TURN, STREET), Role.PARTICIPANT),  # a turn, not a place
         (DialogueMove.QUERY_YN, (HIDDEN.name, STREET), Role.PARTICIPANT),
         (DialogueMove.REPLY_N, (HIDDEN.name, STREET), Role.PARTICIPANT),
-        (DialogueMove.EXPLAIN, (HIDDEN.name, STREET), Role.CO_WIZARD),  # it does not learn from itself
+        (DialogueMove.EXPLAIN, (HIDDEN.name, STREET), Role.CO_WIZARD),  # own statements add no information
         (DialogueMove.EXPLAIN, (HIDDEN.name, StreetName.UNKNOWN), Role.PARTICIPANT),
         (DialogueMove.EXPLAIN, (KNOWN.name, STREET), Role.PARTICIPANT),
     ],
@@ -129,15 +129,15 @@ def test_other_utterances_leave_estimates_unchanged(
     move: DialogueMove, values: tuple[SlotValue, ...], speaker: Role
 ) -> None:
     held = beliefs()
-    told(held, move, *values, by=speaker)
+    say(held, move, *values, by=speaker)
     assert not held.places
 
 
 def test_instruction_about_known_place_changes_topic() -> None:
     held = beliefs()
-    told(held, DialogueMove.QUERY_W, HIDDEN.name, by=Role.CO_WIZARD)
-    told(held, DialogueMove.INSTRUCT, KNOWN.name)
-    told(held, DialogueMove.REPLY_W, STREET)
+    say(held, DialogueMove.QUERY_W, HIDDEN.name, by=Role.CO_WIZARD)
+    say(held, DialogueMove.INSTRUCT, KNOWN.name)
+    say(held, DialogueMove.REPLY_W, STREET)
     assert HIDDEN.name not in held.places
 
 
@@ -155,7 +155,7 @@ def test_marks_and_statements_are_combined() -> None:
     held = beliefs()
     mark(held, HIDDEN.lane, HIDDEN.station)
     alone = spread(held)
-    told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
+    say(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET)
     assert spread(held) < alone
     again = dict(held.places)
     mark(held, HIDDEN.lane, HIDDEN.station)  # the same mark
@@ -168,7 +168,7 @@ def test_beliefs_do_not_depend_on_hidden_places() -> None:
     found = []
     for scenario in (SCENARIO, other):
         held = BeliefTracker(TOWN, scenario)
-        told(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET, KNOWN.name)
+        say(held, DialogueMove.EXPLAIN, HIDDEN.name, STREET, KNOWN.name)
         found.append(held.places)
     assert found[0] == found[1]
 

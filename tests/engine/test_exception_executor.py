@@ -33,7 +33,7 @@ def place(lane: int, metres: float, kind: ExceptionKind = ExceptionKind.PLACE_PR
 
 
 def crowd_of(world: World, kind: ExceptionKind) -> list[Any]:
-    """Those of whom an exception brings more."""
+    """Returns the actors that a spawn adds to."""
     return list(world.actors.vehicles if kind is ExceptionKind.SPAWN_VEHICLES else world.actors.pedestrians)
 
 
@@ -91,7 +91,7 @@ def test_no_more_props_than_fit() -> None:
 
 
 def search_sites(town: Town, start: tuple[int, float], blocks: dict[int, list[float]]) -> set[int]:
-    """Sites that are reached by driving on, changing lanes and turning round, found in steps of 2 m by hand."""
+    """Returns the sites that are reached by driving on, changing lanes and turning round, in steps of 2 m."""
     found: set[int] = set()
     first = (start[0], int(start[1] // 2))
     queue, seen = deque([first]), {first}
@@ -193,7 +193,7 @@ def test_spawn_is_limited_by_room(kind: ExceptionKind, extent: int) -> None:
     crowd = crowd_of(world, kind)
     assert sum(counts) == len(crowd)
     assert len(crowd) >= {5: 1, 15: 2, 40: 6}[extent]
-    for one, other in itertools.combinations(crowd, 2):  # some stand in the tunnel, others above it
+    for one, other in itertools.combinations(crowd, 2):  # some are in the tunnel, others above it
         assert abs(one.height - other.height) > 2.5 or not boxes_touch(OrientedBox.of(one), OrientedBox.of(other))
 
 
@@ -226,7 +226,7 @@ def test_props_may_block_a_direction_only_with_room_to_turn_round() -> None:
         beside = town.neighbour(lane.id, LinkType.LANE_CHANGE_LEFT)
         if lane.in_junction or beside is None or lane.length < 90.0:
             continue
-        # the car comes to the one, changes lanes, and comes to the other
+        # the car reaches one prop, changes lanes, and reaches the other
         if not isinstance(adversary.execute(place(lane.id, 40.0)), dict):
             continue
         across = town.lanes[beside].project(lane.position(40.0))[0]

@@ -1,4 +1,4 @@
-"""Sessions in which the participant and the Co-Wizard hear each other through a recogniser."""
+"""Sessions with word errors between participant and Co-Wizard."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def noisy(rate: float, **settings: Any) -> DuoWizardEnv:
 
 
 def talk(env: DuoWizardEnv, seed: int, decisions: int = 160) -> list[tuple[Any, list[dict[str, Any]]]]:
-    """Observations of each decision with the acts that ended in it."""
+    """Returns the observations of each decision with the acts that ended in it."""
     found = []
     for observations, _, _ in play_by_script(env, seed=seed, decisions=decisions):
         spoken = [{**event.data, "by": event.source} for event in env.last_events if event.type == "DialogueMove"]
@@ -67,7 +67,7 @@ def test_intended_act_is_not_observed_with_misheard_words(heard: Any) -> None:
 
 
 def test_observed_act_follows_from_transcript() -> None:
-    """An Instruct to go to the KFC by words that name no place arrives as these words alone would."""
+    """Instruct with the slot KFC but words without a place is observed like the words alone."""
     env = noisy(0.9)
     to_kfc = DialogueAct.of(DialogueMove.INSTRUCT, LandmarkName.KFC)
     observations, _ = env.reset(seed=5)
@@ -95,7 +95,7 @@ def test_sessions_without_word_errors_have_no_transcripts() -> None:
 
 
 def test_word_errors_use_their_own_random_stream() -> None:
-    """Actions given, only what is heard differs: the words found for acts and the traffic are the same."""
+    """With equal actions, only the transcripts differ; generated words and traffic are equal."""
     clear, unclear = (DuoWizardEnv(config=EnvConfig(word_error_rate=rate)) for rate in (0.0, 0.5))
     for env in (clear, unclear):
         env.reset(seed=8)

@@ -1,4 +1,4 @@
-"""During a GPS fault the Co-Wizard sees the world around the estimated pose, and nothing of the true one."""
+"""During a GPS fault, the Co-Wizard's observations follow the estimated pose and do not reveal the true one."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ KINDS = ObjectColumn.KIND
 
 
 def drifted_env(shift: tuple[float, float, float] = (0.0, 0.0, 0.0), vehicles: int = 8) -> DuoWizardEnv:
-    """A session in which the estimate is off by a way ahead and to the right [m] and an angle [rad]."""
+    """Returns a session whose pose estimate is off by distances ahead and to the right [m] and by an angle [rad]."""
     env = DuoWizardEnv(config=EnvConfig(world=WorldConfig(vehicles=vehicles, pedestrians=4)))
-    env.reset(seed=0)  # which begins more than 100 m before a junction
+    env.reset(seed=0)  # begins more than 100 m before a junction
     for _ in range(6):
         env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
     world = env.session.world
@@ -40,7 +40,7 @@ def seen(env: DuoWizardEnv) -> dict[str, Any]:
 def test_exact_estimate_gives_true_places() -> None:
     env = drifted_env()
     view, truth = seen(env), env.session.observations((Role.AD_WIZARD,))[Role.AD_WIZARD]
-    # the planner's own place is that of a frame ago
+    # the planner's place is that of the frame before
     np.testing.assert_allclose(view["waypoints"], truth["waypoints"], atol=0.35)
     watched = env.session.observations((Role.PARTICIPANT,))[Role.PARTICIPANT]
     np.testing.assert_allclose(view["objects"], watched["objects"], atol=1e-6)
@@ -54,7 +54,7 @@ def test_waypoints_and_exits_follow_the_estimated_place(ahead: float) -> None:
     assert drifted["exits"][0, ExitColumn.DISTANCE] == pytest.approx(
         straight["exits"][0, ExitColumn.DISTANCE] - ahead, abs=0.1
     )
-    # the first waypoint is 5 m from where the car believes itself to be, not from where it is
+    # the first waypoint is 5 m from the estimated place, not from the true one
     for view in (straight, drifted):
         assert math.hypot(*(view["waypoints"][0] - view["pose"][:2])) == pytest.approx(5.0, abs=0.2)
 
@@ -79,7 +79,7 @@ def test_objects_are_seen_around_the_estimated_pose() -> None:
 
 @pytest.mark.parametrize("shift", [(6.0, 0.0, 0.0), (-6.0, 0.0, 0.0), (4.0, 3.0, 0.2)])
 def test_observation_contains_no_true_place(shift: tuple[float, float, float]) -> None:
-    """No point shown lies where the true pose would put it."""
+    """No observed point lies at the place that the true pose gives."""
     env = drifted_env(shift)
     view, truth = seen(env), env.session.observations((Role.AD_WIZARD,))[Role.AD_WIZARD]
     assert np.hypot(*(view["waypoints"] - truth["waypoints"]).T).max() > 1.0

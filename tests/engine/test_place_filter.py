@@ -47,8 +47,8 @@ def test_statement_about_street_narrows_estimate_across_it_only() -> None:
 def test_two_landmarks_of_a_name_stay_possible() -> None:
     both = about(None, np.array([[-100.0, 0.0], [100.0, 0.0]]), 20.0)
     assert deviations(both)[0] > 100.0
-    told = about(near(80.0, 0.0, 30.0), np.array([[-100.0, 0.0], [100.0, 0.0]]), 20.0)
-    assert told.mean[0] == pytest.approx(94.0, abs=2.0)
+    estimate = about(near(80.0, 0.0, 30.0), np.array([[-100.0, 0.0], [100.0, 0.0]]), 20.0)
+    assert estimate.mean[0] == pytest.approx(94.0, abs=2.0)
 
 
 def test_marks_refine_each_other() -> None:
@@ -77,7 +77,7 @@ def test_estimate_without_points_raises_error() -> None:
 
 
 def test_coverage_of_ellipse_equals_its_probability() -> None:
-    """A place beside a landmark on a street, told of in either order, and marked."""
+    """Statements about a street and a neighbouring landmark, in either order, and a mark."""
     rng = np.random.default_rng(0)
     inside = []
     for _ in range(400):

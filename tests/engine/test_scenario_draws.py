@@ -1,4 +1,4 @@
-"""Any seed gives a session that can be played: in every town that is shipped, names, places and departures go round."""
+"""Scenarios of all seeds can be played in every shipped town, and vary names, places and departures."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_seeds_vary_street_names_sites_and_departures(name: str) -> None:
     drawn = [draw_scenario(town, None, seed) for seed in range(DRAWS)]
     given = [(scenario.street_names[k], k) for scenario in drawn for k in range(len(town.streets))]
     plain = sum(street.name != StreetName.HIGHWAY.label for street in town.streets)
-    assert len(set(given)) == 14 * plain + (len(town.streets) - plain)  # every street gets every name at some time
+    assert len(set(given)) == 14 * plain + (len(town.streets) - plain)  # every street gets every name
     for scenario in drawn:
         assert len(set(scenario.street_names)) == len(town.streets)
     sites = {landmark.site for scenario in drawn for landmark in scenario.storyboard.landmarks}

@@ -1,4 +1,4 @@
-"""Whatever the Ad-Wizard does, every landmark's place can still be driven to, wherever the car is."""
+"""Every site stays reachable from every place of the car, whatever the Ad-Wizard does."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ KINDS = (
 
 
 def random_action(world: World, rng: np.random.Generator) -> AdWizardAction:
-    """An exception anywhere in the town, half of the time near the car, where it hurts most."""
+    """Returns an exception anywhere in the town, half of the time near the car."""
     lanes = world.town.lanes
     streets = [lane.id for lane in lanes if not lane.in_junction]
     if rng.random() < 0.5:
@@ -56,7 +56,7 @@ def props(world: World) -> list[tuple[int, float]]:
 
 
 def unreachable(world: World) -> set[int]:
-    """Sites that the car cannot come to from its place, by brute force."""
+    """Returns the sites that the car cannot reach from its place, by exhaustive search."""
     car = world.planner.lane, world.planner.station
     return {site.id for site in world.town.sites} - brute_force(world.town).sites(car, props(world))
 
@@ -68,7 +68,7 @@ def car_anywhere(name: str, rng: np.random.Generator) -> World:
 
 
 def play_standing(name: str, seed: int, actions: int) -> int:
-    """A car stands at a random place while the Ad-Wizard does what it can; returns how many props were put."""
+    """Lets the Ad-Wizard place props around a car that stands at a random place; returns the number of props."""
     rng = np.random.default_rng([seed, TOWNS.index(name)])
     world = car_anywhere(name, rng)
     adversary = ExceptionExecutor(world, TaskState(draw_scenario(world.town, None, seed).storyboard), 16)
@@ -79,16 +79,16 @@ def play_standing(name: str, seed: int, actions: int) -> int:
         if isinstance(outcome, dict) and action.exception.is_plan_level:
             put += 1
             assert unreachable(world) == set(), f"{name}, seed {seed}: {action}"
-            for lane, station in props(world):  # nor is it trapped where it would stand before a prop
+            for lane, station in props(world):  # it is not trapped where it would stop before a prop either
                 stand = lane, station - 16.0
                 if any(other == lane and stand[1] - 16.0 < at < station for other, at in props(world)):
-                    continue  # nobody comes to stand there
+                    continue  # no car can stop there
                 assert len(brute_force(world.town).sites(stand, props(world))) == len(world.town.sites)
     return put
 
 
 def play_driving(name: str, seed: int, seconds: float) -> tuple[int, int]:
-    """The scripted others drive; returns how many props were put, and how many exceptions took effect."""
+    """Plays a session with the scripted roles; returns the numbers of props placed and of executed exceptions."""
     rng = np.random.default_rng([seed, TOWNS.index(name), 7])
     config = EnvConfig(max_seconds=seconds, world=WorldConfig(vehicles=3, pedestrians=2))
     env = DuoWizardEnv(name, config=config)
@@ -112,10 +112,10 @@ def play_driving(name: str, seed: int, seconds: float) -> tuple[int, int]:
 
 
 def play_session_at_random(seed: int, seconds: float) -> tuple[int, int]:
-    """Everybody does anything that the masks allow; the Ad-Wizard half of the time where it hurts most.
+    """Plays random actions within the masks for all roles; the Ad-Wizard acts near the car half of the time.
 
     Returns:
-        How many exceptions took effect, and how many decisions there were props in the town.
+        Number of executed exceptions, and number of decisions at which there were props in the town.
     """
     rng = np.random.default_rng([seed, 11])
     name = TOWNS[seed % len(TOWNS)]

@@ -1,4 +1,4 @@
-"""Drivers that follow instructions, from the observation alone."""
+"""Drivers that follow instructions and read the observation only."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def seek(observation: Any, mask: Any) -> int:
 
 
 def stops_in_time(speed: float, left: float) -> bool:
-    """Whether braking now stops the car closer to a place than braking half a second later."""
+    """Returns whether braking now stops the car closer to a place than braking half a second later."""
     return -2.0 < left - LAG * speed - speed**2 / (2.0 * BRAKING) <= speed / 4.0
 
 

@@ -1,4 +1,4 @@
-"""Sessions played in code, with every action kept, as tuples; and a digest of what they yield."""
+"""Sessions played in code with every action kept, and a digest of nested values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from dorothie_gym.testing.playing import ByAgent, play_random, play_scripted
 
 Moment = tuple[ByAgent, ByAgent, ByAgent]
-"""Observations, infos and actions of all agents; the last moment of a session has no actions."""
+"""Observations, infos and actions of all agents; the actions after the last decision are empty."""
 
 
 def play_at_random(env: Any, *, seed: int, decisions: int) -> Iterator[Moment]:
@@ -27,12 +27,12 @@ def play_by_script(env: Any, *, seed: int, decisions: int) -> Iterator[Moment]:
 
 
 def digest(value: Any) -> str:
-    """A hash of dicts, tuples, arrays, numbers and texts, to the last bit."""
+    """Returns a hash of nested dicts, tuples, arrays, numbers and texts."""
     found = hashlib.sha256()
 
     def add(part: Any) -> None:
         if isinstance(part, Mapping):
-            for key in part:  # in the order of the dict: that is to be the same too
+            for key in part:  # in the order of the dict, which must be equal too
                 found.update(str(key).encode())
                 add(part[key])
         elif isinstance(part, list | tuple):

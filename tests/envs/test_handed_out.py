@@ -1,4 +1,4 @@
-"""What an environment has handed out is its taker's: it never changes later, and changing it changes nothing."""
+"""Returned observations and infos belong to the caller: the environment neither changes nor reads them later."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a role must not know is not in what it observes."""
+"""Observations, masks and refusals contain no hidden information."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def env() -> DuoWizardEnv:
 
 
 def check_hidden_places_are_not_visible(env: DuoWizardEnv, play: Any, seed: int, decisions: int) -> None:
-    """Plays a session, and plays its actions again where hidden landmarks stand elsewhere."""
+    """Plays a session, and plays its actions again with hidden landmarks at other sites."""
     while not any(landmark.hidden for landmark in draw_scenario(env.town, None, seed).storyboard.landmarks):
         seed += 1000
     played = list(play(env, seed=seed, decisions=decisions))
@@ -37,7 +37,7 @@ def check_hidden_places_are_not_visible(env: DuoWizardEnv, play: Any, seed: int,
             np.testing.assert_array_equal(others[role][field], value, err_msg=f"{field}, decision {k}")
         for field in ("action_mask", "refused"):
             np.testing.assert_equal(other_infos[role][field], infos[role][field])
-        # the participant does see it: this test would notice
+        # the participant observes the difference, so the test would detect a leak
         assert not np.array_equal(others["participant"]["landmarks"], observations["participant"]["landmarks"])
 
 
@@ -63,7 +63,7 @@ def test_hidden_places_are_not_visible_with_word_errors(config: dict[str, Any]) 
 def check_tasks_are_not_visible(env: DuoWizardEnv, play: Any, seed: int, decisions: int) -> None:
     """Plays a session, and plays its actions again with other tasks and another story, up to the first arrival.
 
-    Actions of the Ad-Wizard on the task are left out: whether one is refused tells of the task, and is told to it.
+    Task exceptions of the Ad-Wizard are left out, because their refusals depend on the task.
     """
     played = list(play(env, seed=seed, decisions=decisions))
     idle = noop(Role.AD_WIZARD, env.limits)

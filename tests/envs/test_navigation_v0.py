@@ -155,18 +155,18 @@ def test_scenario_of_seed_is_that_of_all_environments(env: NavigationEnv) -> Non
 
 def test_turn_instructions_have_distance_to_junction(env: NavigationEnv) -> None:
     observation, info = env.reset(seed=0)
-    told = []
+    errors = []
     for _ in range(200):
         field = {name: observation[where] for name, where in FIELD.items()}
         if field["said"][0]:
             assert field["said"][1 + DialogueMove.INSTRUCT] == 1.0
             if field["said_action"][4] and field["junction"][0]:
-                told.append(float(field["said_distance"][0] - field["junction"][1]))
+                errors.append(float(field["said_distance"][0] - field["junction"][1]))
         observation, _, terminated, _, info = env.step(obey(observation, info["action_mask"]))
         if terminated:
             break
-    assert len(told) > 10
-    assert np.median(np.abs(told)) < 0.03  # of 100 m: what was said is how far it is
+    assert len(errors) > 10
+    assert np.median(np.abs(errors)) < 0.03  # in units of 100 m: the instructed distance is the true one
 
 
 def test_turn_guidance_does_not_reveal_goal(env: NavigationEnv) -> None:

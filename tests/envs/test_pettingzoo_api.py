@@ -10,7 +10,7 @@ from dorothie_gym.envs import duo_wizard_v0
 from dorothie_gym.sim.config import WorldConfig
 
 with warnings.catch_warnings():
-    # PettingZoo's tests import an environment of its own in a way that it has deprecated.
+    # PettingZoo's tests import one of its own environments in a deprecated way.
     warnings.filterwarnings("ignore", "The old environment creation API", DeprecationWarning)
     from pettingzoo.test import (
         api_test,
@@ -30,7 +30,7 @@ ADVICE = (
     "We recommend agents to be named in the format <descriptor>_<number>, like .player_0.",
     "Agents have different observation space sizes",
 )
-"""What PettingZoo advises, and the design does not follow: plain spaces, numbered names, equal spaces."""
+"""Warnings about conventions that the design does not follow: plain spaces, numbered names, equal spaces."""
 
 pytestmark = [pytest.mark.filterwarnings(f"ignore:{text}$:UserWarning:pettingzoo.test.api_test") for text in ADVICE]
 
