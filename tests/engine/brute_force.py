@@ -1,8 +1,8 @@
 """Sites of a town that a car can reach, found by exhaustive search over places two metres apart.
 
-The search is independent of the router and its cells, so that it can check them. It requires room to stop 15 m before a
-prop; 14 m for a U-turn, on the own lane ahead and on the oncoming lane behind the place where it ends; and 14 m of road,
-free on both lanes, for a lane switch.
+The search is independent of the router and its cells, so that it can check them. It requires room to stop 15 m before
+a prop; 14 m for a U-turn, on the own lane ahead and on the oncoming lane behind the place where it ends; and 14 m of
+road, free on both lanes, for a lane switch.
 """
 
 from __future__ import annotations
