@@ -14,7 +14,7 @@ from dorothie_gym.analysis.agreement import inconsistencies
 from dorothie_gym.analysis.diversity import has_language_models, plain, repetition, trigram_perplexity, words_of
 from dorothie_gym.analysis.majority_baselines import Anchors
 from dorothie_gym.analysis.phenomena import PHENOMENA, DialogueView, Phenomenon
-from dorothie_gym.analysis.profiles import Profiles
+from dorothie_gym.analysis.profiles import Profiles, counted
 from dorothie_gym.analysis.units import Units
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.recording.corpus import Corpus
@@ -126,6 +126,19 @@ class Counts:
     def utterances(self) -> int:
         """Number of utterances of participants and Co-Wizards."""
         return self.texts.total()
+
+    @property
+    def heading(self) -> str:
+        """Numbers of sessions, utterances, transactions and exchanges, as text."""
+        return " · ".join(
+            counted(count, noun)
+            for count, noun in (
+                (self.sessions, "session"),
+                (self.utterances, "utterance"),
+                (self.transactions, "transaction"),
+                (self.exchanges, "exchange"),
+            )
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Returns the figures of the table; the ratio is None without utterances."""

@@ -6,20 +6,18 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.analysis.corpus_stats import Counts
 from dorothie_gym.analysis.exception_attribution import Handled
-from dorothie_gym.analysis.profiles import CLASSES, SLOTS, Profile, Profiles
+from dorothie_gym.analysis.profiles import CLASSES, SLOTS, Profile, Profiles, counted
 from dorothie_gym.ontology import DialogueMove, Role
 from dorothie_gym.rendering.charts import GRID, INK, SHEET, SOFT, empty_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-SIZE: Final = (12.0, 9.2)
+CHART_SIZE: Final = (12.0, 9.2)
 """Width and height of the picture [inches]."""
 
-LETTERS: Final = 17
+LABEL_WIDTH: Final = 17
 """Characters in a line below a bar."""
 
 _COLOURS: Final = {
@@ -37,39 +35,27 @@ _NAMES: Final = {
 _SPEAKERS: Final = ((Role.PARTICIPANT, "human"), (Role.CO_WIZARD, "car"))
 
 
-def draw_profiles(profiles: Profiles, counts: Counts, title: str, path: Path) -> None:
+def draw_profiles(profiles: Profiles, heading: str, title: str, path: Path) -> None:
     """Draws moves and slots per transaction by speaker, and per exchange by the kind of exception that it handles.
 
     Args:
         profiles: profiles of the corpus.
-        counts: counts of the same sessions, for the heading.
+        heading: line below the title (`Counts.heading`).
         title: name of the corpus.
         path: PNG file to write.
 
     Raises:
         OSError: the file cannot be written.
     """
-    with empty_figure(*SIZE) as figure:
+    with empty_figure(*CHART_SIZE) as figure:
         grid = figure.add_gridspec(
             2, 2, left=0.06, right=0.98, top=0.84, bottom=0.09, hspace=0.42, wspace=0.13, width_ratios=(14, 8)
         )
-        _words(figure, counts, title)
+        figure.text(0.06, 0.95, title, fontsize=15, weight="bold")
+        figure.text(0.06, 0.918, heading, fontsize=10, color=SOFT)
         _per_transaction(figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1]), profiles.transactions)
         _per_exchange(figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1]), profiles)
         figure.savefig(path, format="png")
-
-
-def _words(figure: Figure, counts: Counts, title: str) -> None:
-    figure.text(0.06, 0.95, title, fontsize=15, weight="bold")
-    line = (
-        f"{_number(counts.sessions, 'session')} · {_number(counts.utterances, 'utterance')} · "
-        f"{_number(counts.transactions, 'transaction')} · {_number(counts.exchanges, 'exchange')}"
-    )
-    figure.text(0.06, 0.918, line, fontsize=10, color=SOFT)
-
-
-def _number(count: int, noun: str) -> str:
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
 def _per_transaction(moves: Axes, slots: Axes, profile: Profile) -> None:
@@ -94,7 +80,7 @@ def _per_exchange(moves: Axes, slots: Axes, profiles: Profiles) -> None:
     for place, (kind, k, role) in enumerate(bars):
         profile, colour = profiles.exchanges[kind], _COLOURS[kind][k]
         offset = (place - (len(bars) - 1) / 2) * width
-        units = "" if k else f" ({_number(profile.units, 'exchange')})"
+        units = "" if k else f" ({counted(profile.units, 'exchange')})"
         label = f"{_NAMES[kind]}, {_SPEAKERS[k][1]}{units}"
         heights = [profile.mean_move(role, *group) for group in CLASSES.values()]
         moves.bar([x + offset for x in range(len(CLASSES))], heights, width * 0.93, color=colour, label=label)
@@ -111,7 +97,7 @@ def _class_label(name: str) -> str:
     moves = [move.label for move in CLASSES[name]]
     if moves == [name]:
         return name
-    return "\n".join([name, *wrap(", ".join(moves), LETTERS)])
+    return "\n".join([name, *wrap(", ".join(moves), LABEL_WIDTH)])
 
 
 def _give_room(axes: Axes, times: float = 1.22) -> None:

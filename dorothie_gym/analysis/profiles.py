@@ -70,3 +70,8 @@ class Profiles:
 
 
 __all__ = ["CLASSES", "SLOTS", "SPEAKERS", "Profile", "Profiles"]
+
+
+def counted(count: int, noun: str) -> str:
+    """Returns a number with its noun, in the plural if needed."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"

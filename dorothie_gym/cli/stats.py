@@ -112,7 +112,7 @@ def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
     if picture is not None:
         from dorothie_gym.analysis.profile_charts import draw_profiles
 
-        draw_profiles(census.profiles, census.counts, corpus.root.resolve().name, picture)
+        draw_profiles(census.profiles, census.counts.heading, corpus.root.resolve().name, picture)
     table = census.to_json()
     if as_json:
         print_json(table)

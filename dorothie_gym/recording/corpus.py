@@ -266,7 +266,9 @@ class Corpus:
             SessionError: a session cannot be read.
             OSError: the folder cannot be written.
         """
-        return export_tables(((entry.fold, entry.load()) for entry in self.entries), Path(path))
+        return export_tables(
+            ((None if entry.fold is None else entry.fold.value, entry.load()) for entry in self.entries), Path(path)
+        )
 
 
 def _fits(kinds: frozenset[ExceptionKind], wanted: ExceptionKind | str) -> bool:

@@ -11,7 +11,6 @@ from dorothie_gym.files import replacing
 from dorothie_gym.ontology import VECTOR_SLOTS, Role
 from dorothie_gym.recording.points import PointView, history_angle, nfd_points
 from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.splits import Fold
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -19,15 +18,15 @@ if TYPE_CHECKING:
 UTTERANCES_FILE: Final = "utterances.parquet"
 DECISIONS_FILE: Final = "decision_points.parquet"
 
-HISTORY: Final = 10
+PAST_ACTIONS: Final = 10
 """Past actions in a row of the decision points."""
 
 
-def export_tables(sessions: Iterable[tuple[Fold | None, Session]], folder: Path) -> tuple[Path, Path]:
+def export_tables(sessions: Iterable[tuple[str | None, Session]], folder: Path) -> tuple[Path, Path]:
     """Writes both tables, reading one session at a time; each file appears when it is complete.
 
     Args:
-        sessions: the sessions with their folds.
+        sessions: the sessions with the names of their folds.
         folder: folder of the tables, created if it is missing; older tables are replaced.
 
     Returns:
@@ -82,7 +81,7 @@ def _utterance_schema() -> pa.Schema:
     )
 
 
-def _utterance_rows(fold: Fold | None, session: Session) -> Iterator[dict[str, object]]:
+def _utterance_rows(fold: str | None, session: Session) -> Iterator[dict[str, object]]:
     for utterance in session.utterances():
         for number, move in enumerate(utterance.moves):
             labels = move.act.slot_labels()
@@ -124,9 +123,9 @@ def _decision_schema() -> pa.Schema:
     )
 
 
-def _decision_rows(fold: Fold | None, session: Session) -> Iterator[dict[str, object]]:
+def _decision_rows(fold: str | None, session: Session) -> Iterator[dict[str, object]]:
     for point in nfd_points(session):
-        view, past = point.view, point.view.actions[-HISTORY:]
+        view, past = point.view, point.view.actions[-PAST_ACTIONS:]
         car = view.car
         yield {
             **_start(fold, session, point.index),
@@ -142,9 +141,8 @@ def _decision_rows(fold: Fold | None, session: Session) -> Iterator[dict[str, ob
         }
 
 
-def _start(fold: Fold | None, session: Session, event: int) -> dict[str, object]:
-    name = None if fold is None else fold.value
-    return {"fold": name, "session": session.name, "town": session.header.town, "event": event}
+def _start(fold: str | None, session: Session, event: int) -> dict[str, object]:
+    return {"fold": fold, "session": session.name, "town": session.header.town, "event": event}
 
 
 def _last_said(view: PointView, speaker: Role) -> str | None:
