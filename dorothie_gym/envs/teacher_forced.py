@@ -22,6 +22,7 @@ from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
+from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import (
     Corpus,
     CorpusEntry,
@@ -33,7 +34,6 @@ from dorothie_gym.recording import (
     Task,
     task_points,
 )
-from dorothie_gym.recording.towns import find_town
 from dorothie_gym.spaces import ActionMapping, SpaceLimits, StepInfo
 
 DEFAULT: Final = "default"

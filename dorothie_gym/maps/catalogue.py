@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from functools import lru_cache
 from importlib.resources import as_file, files
@@ -24,6 +25,7 @@ UNSEEN_TOWNS: tuple[str, ...] = ("brookside",)
 """Towns of the unseen fold (in the paper: CARLA's Town02)."""
 
 _SUFFIXES = (".xodr", ".yaml", ".yml")
+_PLAIN_NAME = re.compile(r"\w{1,60}")
 _FOLDER = files("dorothie_gym.maps") / "data"
 
 
@@ -61,6 +63,20 @@ def load_town(name_or_path: str | Path) -> Town:
             f"there is no such town; known towns are {', '.join(town_names())}, and files end in .xodr or .yaml",
         )
     return _load(path)
+
+
+def find_town(name: str, maps: Path | None) -> Town | None:
+    """Returns the town that a recording names: a shipped one, or a file `<name>.xodr` or `.yaml` in `maps`; or None.
+
+    Raises:
+        TownError: the file is malformed.
+    """
+    if not _PLAIN_NAME.fullmatch(name):  # a name from a file must not be a path
+        return None
+    if name in town_names():
+        return load_town(name)
+    candidates = [] if maps is None else [maps / f"{name}{suffix}" for suffix in _SUFFIXES]
+    return next((load_town(path) for path in candidates if path.is_file()), None)
 
 
 def _load(path: Path) -> Town:

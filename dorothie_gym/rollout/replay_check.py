@@ -11,8 +11,8 @@ from pathlib import Path
 from dorothie_gym._version import __version__
 from dorothie_gym.errors import SessionError, StoryboardError, TownError
 from dorothie_gym.maps import Town, load_town
+from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import CorpusEntry, Difference, Session, first_difference
-from dorothie_gym.recording.towns import find_town
 from dorothie_gym.rollout.processes import run_tasks
 from dorothie_gym.rollout.resimulation import resimulate
 from dorothie_gym.tasks import StoryboardTemplate, load_template

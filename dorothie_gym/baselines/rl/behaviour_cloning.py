@@ -14,12 +14,12 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
+from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation import NavigationAction
 from dorothie_gym.policies.navigation.demonstrations import Demonstration, DemonstrationRecorder
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
 from dorothie_gym.recording import Corpus, Session
-from dorothie_gym.recording.towns import find_town
 from dorothie_gym.rollout import watch_session
 from dorothie_gym.spaces import CoWizardAction, SpaceLimits
 

@@ -20,9 +20,9 @@ from dorothie_gym.benchmark.features.store import keep, recall
 from dorothie_gym.errors import SessionError, TownError
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.cache import compiler_digest
+from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import FOLDS, Corpus, CorpusEntry, Fold, Session
 from dorothie_gym.recording.file_names import ACTIONS_FILE
-from dorothie_gym.recording.towns import find_town
 
 _STARTS = {"landmarks": "place", "streets": "text"}
 """Groups whose rows are found by session, with a column that gives their number."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dorothie_gym.errors import SessionError
+from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording.events import Event
 from dorothie_gym.recording.file_names import MAX_FRAME
 from dorothie_gym.recording.header import SessionHeader
@@ -34,7 +35,6 @@ from dorothie_gym.recording.sdn.plan_files import ViewReader
 from dorothie_gym.recording.sdn.trajectory import CarPoses, read_places, read_scene, trajectory_of_places
 from dorothie_gym.recording.sdn.turn_angles import SignVote, vote, with_roads, with_sign
 from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.towns import find_town
 from dorothie_gym.recording.validation import ReadReport
 
 FROM_START: Final = 600

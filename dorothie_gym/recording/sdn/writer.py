@@ -12,6 +12,7 @@ import numpy as np
 
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.maps import Town
+from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import (
     SPEED_STEP,
     ArgumentKind,
@@ -41,7 +42,6 @@ from dorothie_gym.recording.sdn.files import (
 )
 from dorothie_gym.recording.sdn.trajectory import COLUMNS, write_scene
 from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.towns import find_town
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, TENTHS
 
 _ACT: Final = ("move", "slots", "exchange", "transaction", "span", "utterance", "start", "end")
