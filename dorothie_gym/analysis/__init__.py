@@ -4,15 +4,15 @@ from dorothie_gym.analysis.agreement import Agreement, agreement, inconsistencie
 from dorothie_gym.analysis.behaviour import CLAIMS, BehaviourClaim, BehaviourVerdict, verdicts_of
 from dorothie_gym.analysis.corpus_stats import (
     PAPER,
-    PAPER_FOLDS,
+    Anchors,
     CorpusStats,
     Counts,
+    anchors_of,
     corpus_stats_of,
     faults_of_corpus,
     phenomena_of,
 )
 from dorothie_gym.analysis.exception_attribution import Handled, handled_by, handling, handling_of_events
-from dorothie_gym.analysis.majority_baselines import Anchors, anchors_of
 from dorothie_gym.analysis.phenomena import PHENOMENA, DialogueView, Occurrence, Phenomenon
 from dorothie_gym.analysis.profiles import Profile, Profiles
 from dorothie_gym.analysis.units import SaidUnit, Units
@@ -20,7 +20,6 @@ from dorothie_gym.analysis.units import SaidUnit, Units
 __all__ = [
     "CLAIMS",
     "PAPER",
-    "PAPER_FOLDS",
     "PHENOMENA",
     "Agreement",
     "Anchors",

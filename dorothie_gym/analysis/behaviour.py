@@ -22,7 +22,7 @@ from dorothie_gym.analysis.units import Units
 from dorothie_gym.ontology import DialogueMove, MoveGroup, Role, Slot
 from dorothie_gym.recording.session import Session
 
-MOST: Final = 0.5
+MAX_UNDEFINED_SHARE: Final = 0.5
 """Share of undefined bootstrap samples from which on the interval is undefined."""
 
 _HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
@@ -168,7 +168,7 @@ def _verdict(claim: BehaviourClaim, whole: Totals, drawn: Totals | None) -> Beha
     if np.isnan(difference):
         return BehaviourVerdict(claim=claim, difference=None, low=None, high=None)
     figures = np.full(1, np.nan) if drawn is None else claim.figure(drawn)
-    if np.isnan(figures).mean() >= MOST:
+    if np.isnan(figures).mean() >= MAX_UNDEFINED_SHARE:
         return BehaviourVerdict(claim=claim, difference=difference, low=None, high=None)
     low, high = percentile_interval(figures)
     return BehaviourVerdict(claim=claim, difference=difference, low=low, high=high)

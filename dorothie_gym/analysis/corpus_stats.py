@@ -12,15 +12,13 @@ from typing import Any, Final
 
 from dorothie_gym.analysis.agreement import inconsistencies
 from dorothie_gym.analysis.diversity import has_language_models, plain, repetition, trigram_perplexity, words_of
-from dorothie_gym.analysis.majority_baselines import Anchors
 from dorothie_gym.analysis.phenomena import PHENOMENA, DialogueView, Phenomenon
 from dorothie_gym.analysis.profiles import Profiles, counted
 from dorothie_gym.analysis.units import Units
-from dorothie_gym.ontology import PhysicalAction, Role
-from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.ontology import NAVIGATION_ACTIONS, PhysicalAction, Role
+from dorothie_gym.recording.corpus import Corpus, Fold
 from dorothie_gym.recording.events import ActionRecord
 from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.splits import FOLDS, Fold
 
 _STEADY = (PhysicalAction.STOP, PhysicalAction.LANE_FOLLOW)
 """Navigation actions without an effect when repeated."""
@@ -67,11 +65,6 @@ PAPER: Final[Mapping[str, float]] = MappingProxyType(
     }
 )
 """Table 2 of the paper."""
-
-PAPER_FOLDS: Final[Mapping[Fold, int]] = MappingProxyType(
-    dict(zip(FOLDS, (123, 14, 6, 25, 15), strict=True)),
-)
-"""Sessions of each fold of the paper's corpus (table 2)."""
 
 
 @dataclass
@@ -166,6 +159,92 @@ def _spoken_seconds(stretches: Iterable[tuple[float, float]]) -> float:
         total += max(0.0, end - max(start, until))
         until = max(until, end)
     return total
+
+
+# --- Most frequent labels --------------------------------------------------------------------------------------------
+
+SEEN_SHARES: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "commonest_human_move": 0.315,
+        "commonest_car_move": 0.244,
+        "commonest_navigation_action": 0.315,
+        "human_moves_without_slot": 0.369,
+        "car_moves_without_slot": 0.557,
+    }
+)
+"""Shares in the paper's seen towns (spec of the dialogue, Anchors)."""
+
+UNSEEN_SHARES: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "commonest_human_move": 0.376,
+        "commonest_car_move": 0.307,
+        "commonest_navigation_action": 0.369,
+        "human_moves_without_slot": 0.262,
+        "car_moves_without_slot": 0.548,
+    }
+)
+"""Shares in the paper's unseen town."""
+
+ANCHOR_TOLERANCE = 0.08
+"""Accepted difference from the shares in seen towns."""
+
+
+@dataclass
+class Anchors:
+    """Counts of the labels of the three tasks: flagged moves of both speakers, flagged navigation actions."""
+
+    moves: dict[Role, Counter[str]] = field(
+        default_factory=lambda: {Role.PARTICIPANT: Counter(), Role.CO_WIZARD: Counter()}
+    )
+    without_slot: Counter[Role] = field(default_factory=Counter)
+    actions: Counter[str] = field(default_factory=Counter)
+
+    def add(self, session: Session) -> None:
+        """Counts the points of a session."""
+        for move in session.all_moves:
+            if move.flagged and move.speaker in self.moves:
+                self.moves[move.speaker][move.act.move.label] += 1
+                self.without_slot[move.speaker] += not move.act.slots
+        for action in session.physical_actions:
+            if action.flagged and action.source is Role.CO_WIZARD and action.action in NAVIGATION_ACTIONS:
+                self.actions[action.action.label] += 1
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns for each anchor `share` and `points` (and `label` of the most frequent class), `paper`, `within`.
+
+        `paper` is the share in seen towns, `within` whether the corpus differs by at most `ANCHOR_TOLERANCE`. Share and
+        `within` are None without a point.
+        """
+        human, car = self.moves[Role.PARTICIPANT], self.moves[Role.CO_WIZARD]
+        rows = {
+            "commonest_human_move": _commonest(human),
+            "commonest_car_move": _commonest(car),
+            "commonest_navigation_action": _commonest(self.actions),
+            "human_moves_without_slot": _share(self.without_slot[Role.PARTICIPANT], human.total()),
+            "car_moves_without_slot": _share(self.without_slot[Role.CO_WIZARD], car.total()),
+        }
+        for name, row in rows.items():
+            row["paper"], row["paper_unseen"] = SEEN_SHARES[name], UNSEEN_SHARES[name]
+            share = row["share"]
+            row["within"] = None if share is None else abs(share - SEEN_SHARES[name]) <= ANCHOR_TOLERANCE
+        return rows
+
+
+def anchors_of(sessions: Iterable[Session]) -> dict[str, Any]:
+    """Returns the anchors of sessions in the form of `Anchors.to_json`."""
+    anchors = Anchors()
+    for session in sessions:
+        anchors.add(session)
+    return anchors.to_json()
+
+
+def _commonest(counts: Counter[str]) -> dict[str, Any]:
+    label, count = min(counts.items(), key=lambda item: (-item[1], item[0])) if counts else (None, 0)
+    return {"label": label, **_share(count, counts.total())}
+
+
+def _share(count: int, points: int) -> dict[str, Any]:
+    return {"share": count / points if points else None, "points": points}
 
 
 # --- Statistics of a corpus ------------------------------------------------------------------------------------------

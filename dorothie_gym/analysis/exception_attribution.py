@@ -1,14 +1,14 @@
 """Attribution of exchanges to the exceptions that they handle, by a rule over events and references.
 
-An exchange handles an exception if it begins within `WINDOW` after it, and one of its acts refers to it:
+An exchange handles an exception if it begins within `HANDLING_WINDOW` after it, and one of its acts refers to it:
 
-- weather: to the object classes it covers (sky, ground, water), or in words to fog, rain, night, ...; within `PROMPT`
-  also to speed or lights;
+- weather: to the object classes it covers (sky, ground, water), or in words to fog, rain, night, ...; within
+  `PROMPT_WINDOW` also to speed or lights;
 - appearing vehicles or pedestrians: to their object class;
 - an object on the road: to an obstacle, or in words to a blocked or cleared way; the window starts again when the car
-  comes near, and within `PROMPT` from then on, references to a U-turn or another lane count as well;
-- a sensor fault: in words to a sensor or its picture; or the car begins the exchange within `FAULT` with a question
-  for an action;
+  comes near, and within `PROMPT_WINDOW` from then on, references to a U-turn or another lane count as well;
+- a sensor fault: in words to a sensor or its picture; or the car begins the exchange within `MAX_FAULT_DURATION` with
+  a question for an action;
 - a task exception: to the landmark of the task, or to an abandoned or postponed goal.
 
 A question within `ANSWER_TIMEOUT` after an exchange that handles an object on the road belongs to it if it names no
@@ -46,16 +46,16 @@ from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
 
-WINDOW: Final = 60.0
+HANDLING_WINDOW: Final = 60.0
 """Time within which an exception is handled [s]."""
 
-PROMPT: Final = 20.0
+PROMPT_WINDOW: Final = 20.0
 """Longest time between an exception and an act that refers to it only by an action of the car [s]."""
 
-FAULT: Final = 30.0
+MAX_FAULT_DURATION: Final = 30.0
 """Longest duration of a sensor fault [s] (spec: design)."""
 
-NEAR: Final = 60.0
+MEETING_DISTANCE: Final = 60.0
 """Distance at which the car meets an object on the road [m]: the object is visible from there by day."""
 
 OBSTACLES: Final = (
@@ -135,7 +135,7 @@ def time_met(session: Session, event: Event) -> float:
     if not isinstance(x, int | float) or not isinstance(y, int | float):
         return math.inf
     rows = session.trajectory[session.trajectory["frame"] >= event.frame]
-    near = np.flatnonzero((rows["x"] - x) ** 2 + (rows["y"] - y) ** 2 <= NEAR**2)
+    near = np.flatnonzero((rows["x"] - x) ** 2 + (rows["y"] - y) ** 2 <= MEETING_DISTANCE**2)
     return float(rows["frame"][near[0]]) / FRAME_RATE if len(near) else math.inf
 
 
@@ -152,7 +152,9 @@ def handled_by(units: Units) -> dict[int, Event]:
     found: dict[int, Event] = {}
     last: tuple[float, _Happened] | None = None
     for exchange in sorted(units.exchanges, key=lambda unit: unit.start):
-        fresh = range(bisect.bisect_left(times, exchange.start - WINDOW), bisect.bisect_right(times, exchange.start))
+        fresh = range(
+            bisect.bisect_left(times, exchange.start - HANDLING_WINDOW), bisect.bisect_right(times, exchange.start)
+        )
         latest = (happened[k] for k in sorted({*fresh, *met}, reverse=True))
         cause = next((each for each in latest if each.is_handled_in(exchange)), None)
         if (
@@ -210,9 +212,9 @@ class _Happened:
 
     def is_handled_in(self, exchange: SaidUnit) -> bool:
         """Returns whether an exchange is within the window and one of its acts refers to the exception."""
-        is_near = 0.0 <= exchange.start - self.met <= WINDOW
+        is_near = 0.0 <= exchange.start - self.met <= HANDLING_WINDOW
         since = exchange.start - self.event.time
-        if not is_near and not 0.0 <= since <= WINDOW:
+        if not is_near and not 0.0 <= since <= HANDLING_WINDOW:
             return False
         values = {value for move in exchange.moves for value in move.act.slots}
         if self.kind.is_task:
@@ -222,13 +224,13 @@ class _Happened:
         words = _WORDS.get(self.kind)
         if words is not None and any(words.search(move.span.casefold().replace("’", "'")) for move in exchange.moves):
             return True
-        return self.kind is ExceptionKind.SENSOR_FAULT and since <= FAULT and _asks_what_to_do(exchange)
+        return self.kind is ExceptionKind.SENSOR_FAULT and since <= MAX_FAULT_DURATION and _asks_what_to_do(exchange)
 
     def _is_met_by(self, values: set[SlotValue], time: float) -> bool:
-        """Returns whether an action named at a time [s] responds to the exception, within `PROMPT` after it."""
+        """Returns whether an action named at a time [s] responds to the exception, within `PROMPT_WINDOW` after it."""
         if self.kind is ExceptionKind.WEATHER:
-            return time - self.event.time <= PROMPT and bool(values & _CAUTION)
-        return 0.0 <= time - self.met <= PROMPT and bool(values & _AROUND)
+            return time - self.event.time <= PROMPT_WINDOW and bool(values & _CAUTION)
+        return 0.0 <= time - self.met <= PROMPT_WINDOW and bool(values & _AROUND)
 
     def is_asked_on(self, exchange: SaidUnit) -> bool:
         """Returns whether an exchange, right after one that handles the exception, continues it by a question."""

@@ -23,7 +23,7 @@ from dorothie_gym.cli.output import (
 
 if TYPE_CHECKING:
     from dorothie_gym.rendering.playback import Playback
-    from dorothie_gym.rollout.replay_check import ReplayCheck, ReplaySources
+    from dorothie_gym.rollout.replay import ReplayCheck, ReplaySources
 
 _DIFFERENT = 1
 """Exit code where a session differs from its replay."""
@@ -60,7 +60,7 @@ def replay(
         fail("--check and --video exclude each other; give one of them")
     if video is not None:
         check_video(video)
-    from dorothie_gym.rollout.replay_check import ReplaySources
+    from dorothie_gym.rollout.replay import ReplaySources
 
     sources = ReplaySources(town=town, maps=maps, storyboard=storyboard)
     try:
@@ -76,7 +76,7 @@ def replay(
 
 def _check(path: Path, sources: ReplaySources, workers: int | None, *, as_json: bool) -> None:
     from dorothie_gym.recording import Corpus
-    from dorothie_gym.rollout.replay_check import check_replays
+    from dorothie_gym.rollout.replay import check_replays
 
     checks = []
     for check in check_replays(Corpus.load(path, maps=sources.maps).entries, sources, workers=workers or processors()):

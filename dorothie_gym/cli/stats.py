@@ -110,7 +110,7 @@ def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
 
     census = corpus_stats_of(corpus)
     if picture is not None:
-        from dorothie_gym.analysis.profile_charts import draw_profiles
+        from dorothie_gym.analysis.profiles import draw_profiles
 
         draw_profiles(census.profiles, census.counts.heading, corpus.root.resolve().name, picture)
     table = census.to_json()
@@ -158,7 +158,7 @@ def _per_session(value: float, sessions: float, key: str) -> str:
 
 
 def _folds(folds: Mapping[str, int]) -> Table:
-    from dorothie_gym.analysis import PAPER_FOLDS
+    from dorothie_gym.recording import PAPER_FOLDS
 
     shown = Table(box=None, pad_edge=False)
     for title in ("fold", "sessions", "paper"):
@@ -169,7 +169,7 @@ def _folds(folds: Mapping[str, int]) -> Table:
 
 
 def _anchors(anchors: Mapping[str, Any]) -> Table:
-    from dorothie_gym.analysis.majority_baselines import TOLERANCE
+    from dorothie_gym.analysis.corpus_stats import ANCHOR_TOLERANCE
 
     shown = Table(box=None, pad_edge=False)
     for title in ("how easy the tasks are", "here", "allowed", "paper", "unseen"):
@@ -180,7 +180,7 @@ def _anchors(anchors: Mapping[str, Any]) -> Table:
         note = row.get("label") or ""
         if row["within"] is False:
             note += f"{', ' if note else ''}out of range"
-        allowed = f"{100 * (row['paper'] - TOLERANCE):.1f} to {100 * (row['paper'] + TOLERANCE):.1f} %"
+        allowed = f"{100 * (row['paper'] - ANCHOR_TOLERANCE):.1f} to {100 * (row['paper'] + ANCHOR_TOLERANCE):.1f} %"
         shown.add_row(
             title, _percent(row["share"]), allowed, _percent(row["paper"]), _percent(row["paper_unseen"]), note
         )

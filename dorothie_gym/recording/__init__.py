@@ -4,11 +4,16 @@ from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.action_log import Decision
 from dorothie_gym.recording.comparison import Difference, compare_folders, first_difference
 from dorothie_gym.recording.corpus import (
+    FOLDS,
+    PAPER_FOLDS,
     Corpus,
     CorpusEntry,
+    Fold,
     load_readable,
     load_sessions,
     manifest_row,
+    read_session,
+    session_folders,
     split_by_name,
     write_manifest,
 )
@@ -22,7 +27,6 @@ from dorothie_gym.recording.events import (
     UtteranceRecord,
 )
 from dorothie_gym.recording.file_names import SessionState, safe_name
-from dorothie_gym.recording.folder import session_state
 from dorothie_gym.recording.header import FORMAT_VERSION, LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.recording.points import (
     ANGLE_TOLERANCE,
@@ -45,10 +49,8 @@ from dorothie_gym.recording.points import (
     ufn_points,
     unpointed_events,
 )
-from dorothie_gym.recording.reading import read_session, session_folders
 from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, ObjectKind, last_perceived
-from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.splits import FOLDS, Fold
+from dorothie_gym.recording.session import Session, session_state
 from dorothie_gym.recording.surroundings import (
     ACTOR_DTYPE,
     LIGHT_DTYPE,
@@ -81,6 +83,7 @@ __all__ = [
     "LIGHT_STATES",
     "NO_LANE",
     "OBJECT_VALUES",
+    "PAPER_FOLDS",
     "TRAJECTORY_COLUMNS",
     "TRAJECTORY_DTYPE",
     "WAY_LENGTH",

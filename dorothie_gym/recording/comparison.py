@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
+from dorothie_gym.recording.corpus import layout_of, read_session
 from dorothie_gym.recording.events import encode_event
 from dorothie_gym.recording.json_io import canonical, from_line
-from dorothie_gym.recording.reading import layout_of, read_session
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.surroundings import SceneTable
 

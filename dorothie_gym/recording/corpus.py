@@ -1,12 +1,14 @@
-"""A corpus: a folder of sessions, divided into folds."""
+"""Corpora: folders of sessions in any layout, their folds, and their manifest."""
 
 from __future__ import annotations
 
+import enum
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, Self
 
 from dorothie_gym.errors import OntologyError, SessionError
@@ -14,108 +16,118 @@ from dorothie_gym.files import write_atomically
 from dorothie_gym.ontology import ExceptionKind, parse_exception
 from dorothie_gym.recording.events import Event, EventType, decode_event
 from dorothie_gym.recording.export import export_tables
-from dorothie_gym.recording.file_names import EVENTS_FILE
-from dorothie_gym.recording.folder import read_session_file
+from dorothie_gym.recording.file_names import EVENTS_FILE, HEADER_FILE
 from dorothie_gym.recording.header import parse_version
 from dorothie_gym.recording.json_io import Fields, decode_text, from_line, read_bytes, to_page
-from dorothie_gym.recording.reading import layout_of, read_session, session_folders, sign_of
-from dorothie_gym.recording.sdn import SignVote
-from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.splits import FOLDS, Fold, check_fold, fold_of_folder
+from dorothie_gym.recording.sdn import SignVote, detect_layout, read_sdn, settle_sign
+from dorothie_gym.recording.session import Session, read_session_file
 
-MANIFEST_FILE: Final = "manifest.json"
-MANIFEST_VERSION: Final = "1.0"
+# --- Folds -----------------------------------------------------------------------------------------------------------
 
 
-def manifest_row(session: Session, folder: Path, root: Path) -> dict[str, Any]:
-    """Returns the manifest row of a session: path within the corpus, fold, town, counts, hash of its content.
+class Fold(enum.StrEnum):
+    """Fold of a corpus; its value is the folder. Towns of the unseen folds do not occur in training (paper)."""
+
+    TRAIN = "train"
+    VAL_SEEN = "val/seen"
+    VAL_UNSEEN = "val/unseen"
+    TEST_SEEN = "test/seen"
+    TEST_UNSEEN = "test/unseen"
+    VAL = "val"
+    TEST = "test"
+
+    def matches(self, wanted: str) -> bool:
+        """Returns whether the fold is `wanted` or one of its parts: "val" and "seen" have two each."""
+        return wanted == self.value or wanted in self.value.split("/")
+
+
+SPLITS: Final = ("train", "val", "test")
+TOWN_GROUPS: Final = ("seen", "unseen")
+
+FOLDS: Final = (Fold.TRAIN, Fold.VAL_SEEN, Fold.VAL_UNSEEN, Fold.TEST_SEEN, Fold.TEST_UNSEEN)
+"""The folds of the paper's corpus."""
+
+PAPER_FOLDS: Final[Mapping[Fold, int]] = MappingProxyType(dict(zip(FOLDS, (123, 14, 6, 25, 15), strict=True)))
+"""Sessions of each fold of the paper's corpus, 183 in all (paper, section 4, table 2)."""
+
+
+def fold_of_folder(folder: Path) -> Fold | None:
+    """Returns the fold of a session's folder; None outside of folds."""
+    parts = folder.absolute().parts[-3:-1]
+    if len(parts) == 2 and parts[0] in SPLITS and parts[1] in TOWN_GROUPS:
+        name = "/".join(parts)
+    else:
+        name = parts[-1] if parts else ""
+    return next((fold for fold in Fold if fold.value == name), None)
+
+
+def check_fold(wanted: str) -> str:
+    """Returns the name of a fold or of a group of folds ("val", "seen"); raises `SessionError` for other names."""
+    known = sorted({part for fold in Fold for part in (fold.value, *fold.value.split("/"))})
+    if str(wanted) not in known:
+        raise SessionError(f"fold: {str(wanted)!r} is unknown; choose from {', '.join(known)}")
+    return str(wanted)
+
+
+# --- Sessions of any layout ------------------------------------------------------------------------------------------
+
+
+def layout_of(folder: Path) -> str | None:
+    """Returns "native", or the SDN layout of the session in a folder; None without a session."""
+    if (folder / HEADER_FILE).is_file():
+        return "native"
+    found = detect_layout(folder)
+    return None if found is None else str(found)
+
+
+def read_session(path: Path | str, *, maps: Path | str | None = None, sign: SignVote | None = None) -> Session:
+    """Returns the session in a folder, of any layout.
 
     Args:
-        session: the session.
-        folder: its folder.
-        root: folder of the corpus.
-    """
-    fold = fold_of_folder(folder)
-    return {
-        "path": _relative(folder, root),
-        "fold": None if fold is None else fold.value,
-        "town": session.header.town,
-        "seed": session.header.seed,
-        "complete": session.complete,
-        "events": len(session.events),
-        "frames": len(session.trajectory),
-        "sha256": session.digest,
-    }
-
-
-def write_manifest(root: Path, rows: Sequence[Mapping[str, object]]) -> Path:
-    """Writes the manifest of a corpus, rows sorted by path, with a hash of all rows.
-
-    Returns:
-        Its path.
+        path: the folder.
+        maps: folder with the maps of SDN's towns.
+        sign: vote on the sign of angles in an SDN session; see `read_sdn`.
 
     Raises:
-        OSError: it cannot be written.
+        SessionError: there is no session, or it cannot be read.
     """
-    ordered = sorted(rows, key=lambda row: str(row["path"]))
-    page = {"version": MANIFEST_VERSION, "sha256": _digest(ordered), "sessions": [dict(row) for row in ordered]}
-    write_atomically(root / MANIFEST_FILE, to_page(page))
-    return root / MANIFEST_FILE
+    folder = Path(path)
+    if layout_of(folder) in ("native", None):
+        return Session.load(folder)
+    return read_sdn(folder, maps=maps, sign=sign)
 
 
-def read_manifest(root: Path) -> dict[str, str]:
-    """Returns the hash of each session by its path within the corpus.
+def session_folders(path: Path | str) -> tuple[Path, ...]:
+    """Returns the session folders in a folder and in its folds, by name; for a session, the folder itself.
 
     Raises:
-        SessionError: there is no manifest, it is damaged, or of another major version.
+        SessionError: there is no such folder, or it holds no session.
     """
-    path = root / MANIFEST_FILE
-    if not path.is_file():
-        raise SessionError(f"{path}: is missing; write it with Corpus.write_manifest")
-    fields = Fields(from_line(decode_text(read_bytes(path), str(path)), str(path)), str(path))
-    parse_version(fields.text("version"), str(path), MANIFEST_VERSION)
-    rows = [{"path": row.text("path"), "sha256": row.text("sha256")} for row in fields.objects("sessions")]
-    if _digest(rows) != fields.text("sha256"):
-        raise SessionError(f"{path}: its rows do not match its hash; it was changed or is damaged")
-    return {row["path"]: row["sha256"] for row in rows}
+    root = Path(path)
+    if not root.is_dir():
+        raise SessionError(f"{root}: there is no such folder; give a folder of sessions")
+    if layout_of(root) is not None:
+        return (root,)
+    folders = tuple(_within(root, 2))
+    if not folders:
+        raise SessionError(f"{root}: holds no session (no folder in it has a {HEADER_FILE})")
+    return folders
 
 
-def verify_manifest(root: Path, sessions: Mapping[Path, Callable[[], Session]]) -> tuple[str, ...]:
-    """Returns the differences between a corpus and its manifest, one sentence each.
-
-    Args:
-        root: folder of the corpus.
-        sessions: reader of each session found, by folder. No path of the manifest is opened.
-
-    Raises:
-        SessionError: there is no manifest, or it is damaged.
-    """
-    expected = read_manifest(root)
-    faults = []
-    found = {_relative(folder, root): load for folder, load in sessions.items()}
-    for path in sorted(expected.keys() - found.keys()):
-        faults.append(f"{path}: is missing")
-    for path, load in sorted(found.items()):
-        if path not in expected:
-            faults.append(f"{path}: is not in the manifest")
+def _within(folder: Path, depth: int) -> Iterator[Path]:
+    for child in sorted(folder.iterdir()):
+        if child.name.startswith(".") or not child.is_dir():
             continue
-        try:
-            digest = load().digest
-        except SessionError as error:
-            faults.append(f"{path}: cannot be read ({error})")
-            continue
-        if digest != expected[path]:
-            faults.append(f"{path}: its content was changed")
-    return tuple(faults)
+        if layout_of(child) is not None:
+            yield child
+        elif depth and child.name in (*SPLITS, *TOWN_GROUPS):
+            yield from _within(child, depth - 1)
 
 
-def _relative(folder: Path, root: Path) -> str:
-    return folder.absolute().relative_to(root.absolute()).as_posix()
-
-
-def _digest(rows: Sequence[Mapping[str, object]]) -> str:
-    lines = (f"{row['sha256']}  {row['path']}\n" for row in rows)
-    return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
+def sign_of(folders: Sequence[Path]) -> SignVote | None:
+    """Returns the vote of the SDN sessions among the folders on the sign of angles; None without SDN sessions."""
+    read = [folder for folder in folders if layout_of(folder) not in ("native", None)]
+    return settle_sign(read) if read else None
 
 
 # --- Corpora ---------------------------------------------------------------------------------------------------------
@@ -317,3 +329,100 @@ def split_by_name(sessions: Sequence[Session]) -> tuple[tuple[Session, ...], tup
     ordered = sorted(sessions, key=lambda session: session.name)
     middle = len(ordered) // 2
     return tuple(ordered[:middle]), tuple(ordered[middle:])
+
+
+# --- Manifest --------------------------------------------------------------------------------------------------------
+
+MANIFEST_FILE: Final = "manifest.json"
+MANIFEST_VERSION: Final = "1.0"
+
+
+def manifest_row(session: Session, folder: Path, root: Path) -> dict[str, Any]:
+    """Returns the manifest row of a session: path within the corpus, fold, town, counts, hash of its content.
+
+    Args:
+        session: the session.
+        folder: its folder.
+        root: folder of the corpus.
+    """
+    fold = fold_of_folder(folder)
+    return {
+        "path": _relative(folder, root),
+        "fold": None if fold is None else fold.value,
+        "town": session.header.town,
+        "seed": session.header.seed,
+        "complete": session.complete,
+        "events": len(session.events),
+        "frames": len(session.trajectory),
+        "sha256": session.digest,
+    }
+
+
+def write_manifest(root: Path, rows: Sequence[Mapping[str, object]]) -> Path:
+    """Writes the manifest of a corpus, rows sorted by path, with a hash of all rows.
+
+    Returns:
+        Its path.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    ordered = sorted(rows, key=lambda row: str(row["path"]))
+    page = {"version": MANIFEST_VERSION, "sha256": _digest(ordered), "sessions": [dict(row) for row in ordered]}
+    write_atomically(root / MANIFEST_FILE, to_page(page))
+    return root / MANIFEST_FILE
+
+
+def read_manifest(root: Path) -> dict[str, str]:
+    """Returns the hash of each session by its path within the corpus.
+
+    Raises:
+        SessionError: there is no manifest, it is damaged, or of another major version.
+    """
+    path = root / MANIFEST_FILE
+    if not path.is_file():
+        raise SessionError(f"{path}: is missing; write it with Corpus.write_manifest")
+    fields = Fields(from_line(decode_text(read_bytes(path), str(path)), str(path)), str(path))
+    parse_version(fields.text("version"), str(path), MANIFEST_VERSION)
+    rows = [{"path": row.text("path"), "sha256": row.text("sha256")} for row in fields.objects("sessions")]
+    if _digest(rows) != fields.text("sha256"):
+        raise SessionError(f"{path}: its rows do not match its hash; it was changed or is damaged")
+    return {row["path"]: row["sha256"] for row in rows}
+
+
+def verify_manifest(root: Path, sessions: Mapping[Path, Callable[[], Session]]) -> tuple[str, ...]:
+    """Returns the differences between a corpus and its manifest, one sentence each.
+
+    Args:
+        root: folder of the corpus.
+        sessions: reader of each session found, by folder. No path of the manifest is opened.
+
+    Raises:
+        SessionError: there is no manifest, or it is damaged.
+    """
+    expected = read_manifest(root)
+    faults = []
+    found = {_relative(folder, root): load for folder, load in sessions.items()}
+    for path in sorted(expected.keys() - found.keys()):
+        faults.append(f"{path}: is missing")
+    for path, load in sorted(found.items()):
+        if path not in expected:
+            faults.append(f"{path}: is not in the manifest")
+            continue
+        try:
+            digest = load().digest
+        except SessionError as error:
+            faults.append(f"{path}: cannot be read ({error})")
+            continue
+        if digest != expected[path]:
+            faults.append(f"{path}: its content was changed")
+    return tuple(faults)
+
+
+def _relative(folder: Path, root: Path) -> str:
+    return folder.absolute().relative_to(root.absolute()).as_posix()
+
+
+def _digest(rows: Sequence[Mapping[str, object]]) -> str:
+    lines = (f"{row['sha256']}  {row['path']}\n" for row in rows)
+    return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()

@@ -49,10 +49,10 @@ OBJECT_VALUES: Final = ("distance", "bearing", "ahead", "aside", "heading", "spe
 in metres ahead and to the left, heading relative to the car's [degrees, positive left], speed [m/s], length and width
 [m]; for a light, distance, bearing and position are those of its stop line, and the rest is 0."""
 
-MOST_OBJECTS: Final = 64
+MAX_OBJECTS: Final = 64
 """Most objects of a look, the nearest ones: more than any batch takes."""
 
-FACING: Final = 90.0
+MAX_LIGHT_ANGLE: Final = 90.0
 """Largest angle between the car's heading and the lane of a visible light [degrees]."""
 
 
@@ -82,7 +82,7 @@ def perceived(
     ends = np.cumsum(np.bincount(owner, minlength=len(looks)))
     for look, (frame, stop) in enumerate(zip(looks.tolist(), ends.tolist(), strict=True)):
         start = int(ends[look - 1]) if look else 0
-        chosen = slice(start, min(stop, start + MOST_OBJECTS))
+        chosen = slice(start, min(stop, start + MAX_OBJECTS))
         yield frame, kind[chosen], values[chosen]
 
 
@@ -152,7 +152,7 @@ def _lights(
     values = np.zeros((len(rows), len(OBJECT_VALUES)))
     values[:, :4] = _relative(line[:, :2], at[owner])
     aslant = np.abs(_wrap(at[owner, 2] - line[:, 2]))
-    shown = (numbers[place] == rows["signal"]) & (aslant < FACING) & (values[:, 2] > 0.0)
+    shown = (numbers[place] == rows["signal"]) & (aslant < MAX_LIGHT_ANGLE) & (values[:, 2] > 0.0)
     return owner[shown], ObjectKind.LIGHT_GREEN + rows["state"][shown].astype(np.int64), values[shown]
 
 

@@ -95,7 +95,7 @@ def _frames(session: Session) -> Iterator[str]:
 
 # --- Report of a reader ----------------------------------------------------------------------------------------------
 
-MOST_NAMES: Final = 100
+MAX_REPORTED_NAMES: Final = 100
 """Most names of one kind that a report counts separately."""
 
 OTHERS: Final = "(others)"
@@ -156,7 +156,7 @@ def report_lines(report: Mapping[str, Any]) -> list[str]:
 
 def _count(names: Counter[str], name: str, count: int) -> None:
     name = name if len(name) <= 200 else name[:200] + "..."
-    names[name if name in names or len(names) < MOST_NAMES else OTHERS] += count
+    names[name if name in names or len(names) < MAX_REPORTED_NAMES else OTHERS] += count
 
 
 def _times(count: int) -> str:

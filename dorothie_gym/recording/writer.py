@@ -27,10 +27,10 @@ from dorothie_gym.recording.file_names import (
     PICTURES_FOLDER,
     SESSION_FILES,
 )
-from dorothie_gym.recording.folder import SessionFile, picture_name
 from dorothie_gym.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
 from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.recording.json_io import canonical
+from dorothie_gym.recording.session import SessionFile, picture_name
 from dorothie_gym.recording.surroundings import Rows, actor_rows, light_rows, weather_rows
 from dorothie_gym.recording.trajectory import check_rising, checked_rows
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -13,15 +12,11 @@ import numpy as np
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.policies import ALL_SCRIPTED
-from dorothie_gym.recording import FOLDS, Fold, SessionState, manifest_row, session_state, write_manifest
+from dorothie_gym.recording import FOLDS, PAPER_FOLDS, Fold, SessionState, manifest_row, session_state, write_manifest
 from dorothie_gym.rollout.runner import PlayedSession, SessionJob, run_sessions
 
-PAPER_FOLDS: Final[Mapping[Fold, int]] = MappingProxyType(
-    {Fold.TRAIN: 123, Fold.VAL_SEEN: 14, Fold.VAL_UNSEEN: 6, Fold.TEST_SEEN: 25, Fold.TEST_UNSEEN: 15}
-)
-"""Sessions of each fold of the original corpus, 183 in all (paper, section 4)."""
-
 PAPER_SESSIONS: Final = sum(PAPER_FOLDS.values())
+"""Sessions of the paper's corpus."""
 
 ManifestRow: TypeAlias = Mapping[str, Any]
 """Row of a session in the manifest of a corpus (`manifest_row`)."""

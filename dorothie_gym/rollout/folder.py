@@ -19,7 +19,7 @@ from dorothie_gym.recording import FORMAT_VERSION
 if sys.platform != "win32":
     import fcntl
 
-PARTS: Final = ".parts"
+PARTS_FOLDER: Final = ".parts"
 """Folder of unfinished sessions within the folder of a series; removed when all sessions are finished."""
 
 
@@ -41,7 +41,7 @@ class PlannedSession(Protocol):
 
 @contextlib.contextmanager
 def locked_folder(root: Path, file: str, settings: Mapping[str, object]) -> Iterator[None]:
-    """Locks a folder as long as the block lasts, and creates the folder and an empty `PARTS` in it.
+    """Locks a folder as long as the block lasts, and creates the folder and an empty `PARTS_FOLDER` in it.
 
     Args:
         root: the folder.
@@ -54,10 +54,10 @@ def locked_folder(root: Path, file: str, settings: Mapping[str, object]) -> Iter
     """
     with _lock(root):
         _check_settings(root / file, settings)
-        shutil.rmtree(root / PARTS, ignore_errors=True)
-        (root / PARTS).mkdir()
+        shutil.rmtree(root / PARTS_FOLDER, ignore_errors=True)
+        (root / PARTS_FOLDER).mkdir()
         yield
-        shutil.rmtree(root / PARTS)
+        shutil.rmtree(root / PARTS_FOLDER)
 
 
 def _check_settings(path: Path, settings: Mapping[str, object]) -> None:

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 
 from dorothie_gym.errors import ProcessError
 from dorothie_gym.recording import SessionState, session_state
-from dorothie_gym.rollout.folder import PARTS, PlannedSession
+from dorothie_gym.rollout.folder import PARTS_FOLDER, PlannedSession
 
 Plan = TypeVar("Plan", bound=PlannedSession)
 Result = TypeVar("Result")
@@ -97,7 +97,7 @@ def _play(prepare: Callable[[Path], Callable[[Plan], Result]], plan: Plan) -> tu
     """Plays a session in a temporary folder on a machine of the cluster; returns its result and its files."""
     with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
         root = Path(folder)
-        (root / PARTS).mkdir()
+        (root / PARTS_FOLDER).mkdir()
         result = prepare(root)(plan)
         session = root / plan.path
         files = (path for path in sorted(session.rglob("*")) if path.is_file())
@@ -108,7 +108,7 @@ def _store(root: Path, path: str, files: Mapping[str, bytes]) -> None:
     """Writes the files of a session, whose folder appears in one step; a failed session has no files."""
     if not files:
         return
-    part, folder = root / PARTS / Path(path).name, root / path
+    part, folder = root / PARTS_FOLDER / Path(path).name, root / path
     for name, content in files.items():
         (part / name).parent.mkdir(parents=True, exist_ok=True)
         (part / name).write_bytes(content)

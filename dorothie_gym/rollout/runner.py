@@ -25,7 +25,7 @@ from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Player
 from dorothie_gym.recording import Session, SessionState, session_state
 from dorothie_gym.recording.json_io import to_page
-from dorothie_gym.rollout.folder import PARTS, PlannedSession, locked_folder
+from dorothie_gym.rollout.folder import PARTS_FOLDER, PlannedSession, locked_folder
 from dorothie_gym.rollout.on_ray import run_on_ray
 from dorothie_gym.rollout.play import play_session
 from dorothie_gym.rollout.processes import run_tasks
@@ -71,7 +71,7 @@ class SessionMaker:
             return session, folder, False
         if folder.is_dir() and any(folder.iterdir()):
             raise SessionError(f"{folder}: is in the way, and no finished session; remove it")
-        part = self.root / PARTS / folder.name
+        part = self.root / PARTS_FOLDER / folder.name
         engine = self.engine(plan.town)
         policies = {role: self.cast[role].make(role, engine.limits) for role in AGENT_ROLES}
         play_session(engine, policies, seed=plan.seed, folder=part)

@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
-from dorothie_gym.recording import FOLDS
+from dorothie_gym.recording import FOLDS, PAPER_FOLDS
 from dorothie_gym.rollout import plan_corpus
-from dorothie_gym.rollout.corpus_generation import PAPER_FOLDS, fold_sizes
+from dorothie_gym.rollout.corpus_generation import fold_sizes
 
 
 def test_folds_of_183_sessions_are_the_papers() -> None:

@@ -14,7 +14,6 @@ import pytest
 from dorothie_gym.analysis import (
     CLAIMS,
     PAPER,
-    PAPER_FOLDS,
     BehaviourVerdict,
     corpus_stats_of,
     faults_of_corpus,
@@ -23,7 +22,7 @@ from dorothie_gym.analysis import (
 )
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.ontology import DialogueMove, Role
-from dorothie_gym.recording import Corpus, Fold
+from dorothie_gym.recording import PAPER_FOLDS, Corpus, Fold
 from dorothie_gym.rollout import generate_corpus
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]

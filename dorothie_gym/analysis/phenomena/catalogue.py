@@ -5,7 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Final
 
-from dorothie_gym.analysis.phenomena import changes, questions, ways
+from dorothie_gym.analysis.phenomena import changes, questions
+from dorothie_gym.analysis.phenomena import routes as ways
 from dorothie_gym.analysis.phenomena.dialogue_view import DialogueView, Phenomenon, Query, both_speak
 from dorothie_gym.ontology import ExceptionKind
 

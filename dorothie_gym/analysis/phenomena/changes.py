@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 from dorothie_gym.analysis.exception_attribution import OBSTACLES
 from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, DialogueView, Occurrence, Turn, labels
-from dorothie_gym.analysis.phenomena.ways import asks_where_next
+from dorothie_gym.analysis.phenomena.routes import asks_where_next
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
@@ -37,10 +37,10 @@ _COMPARES = re.compile(
     r"|\binstead\b|\bdetour\b|\bshortcut\b|\bother way\b|\bjam\b|\bavoid\b"
 )
 
-BEFORE = 10.0
+MAX_SIGHT_LEAD = 10.0
 """Longest time between sight of an object on the road and the car's coming near [s]."""
 
-SOON = 60.0
+SETTLEMENT_WINDOW = 60.0
 """Time within which a roadblock, or an unknown place, is settled [s]."""
 
 
@@ -49,13 +49,15 @@ def hidden_place(talk: DialogueView) -> Iterator[Occurrence]:
     for turn in talk.by(CAR, M.EXPLAIN, M.QUERY_W, M.QUERY_YN, M.CHECK, M.CONFUSE, M.REPLY_N):
         unknown = turn.mentions(GoalStatus.UNKNOWN) and labels(turn.names(Slot.LANDMARK)) & talk.hidden_goals
         described = (
-            next((a for a in talk.answers(turn, within=SOON) if _describes(a, unknown)), None) if unknown else None
+            next((a for a in talk.answers(turn, within=SETTLEMENT_WINDOW) if _describes(a, unknown)), None)
+            if unknown
+            else None
         )
         if described is None:
             continue
         since = described.start
-        if talk.believed(MentalAction.KNOWLEDGE_UPDATE, since=since, until=described.end + SOON):
-            steps = talk.answers(turn, M.INSTRUCT, within=3 * SOON)
+        if talk.believed(MentalAction.KNOWLEDGE_UPDATE, since=since, until=described.end + SETTLEMENT_WINDOW):
+            steps = talk.answers(turn, M.INSTRUCT, within=3 * SETTLEMENT_WINDOW)
             refined = any(a.number > described.number and a.names(Slot.ACTION) for a in steps)
             yield Occurrence(turn, "described, refined" if refined else "described")
 
@@ -76,13 +78,13 @@ def roadblock(talk: DialogueView) -> Iterator[Occurrence]:
     for turn in talk.by(CAR, M.EXPLAIN):
         if not any(set(act.slots) & set(OBSTACLES) for act in turn.doing(M.EXPLAIN)):
             continue
-        if not any(-BEFORE <= turn.start - met <= SOON for met in talk.met_roadblocks):
+        if not any(-MAX_SIGHT_LEAD <= turn.start - met <= SETTLEMENT_WINDOW for met in talk.met_roadblocks):
             continue
-        following = [turn, *talk.later(turn, within=SOON)]
+        following = [turn, *talk.later(turn, within=SETTLEMENT_WINDOW)]
         proposal = next((t for t in following if t.speaker is CAR and t.does(M.QUERY_YN, M.QUERY_W, M.CHECK)), None)
         instruction = next((t for t in following if t.speaker is HUMAN and t.does(M.INSTRUCT, M.REPLY_W)), None)
         first = proposal or instruction
-        if first is not None and _goes_another_way(talk, since=turn.start, until=first.end + SOON):
+        if first is not None and _goes_another_way(talk, since=turn.start, until=first.end + SETTLEMENT_WINDOW):
             yield Occurrence(turn, "proposed" if proposal is not None else "told")
 
 
@@ -196,7 +198,7 @@ def completion(talk: DialogueView) -> Iterator[Occurrence]:
     """Finds 14: the participant says that a task is done, or the car asks for the next destination."""
     for event in _completed(talk):
         for turn in talk.turns:
-            if not 0.0 <= turn.start - event.time <= SOON:
+            if not 0.0 <= turn.start - event.time <= SETTLEMENT_WINDOW:
                 continue
             places = labels(turn.names(Slot.LANDMARK))
             is_it = not places or str(event.data.get("landmark")) in places
@@ -236,7 +238,7 @@ def _has_grounds(talk: DialogueView, turn: Turn) -> bool:
     grounds = [turn, *(other for other in talk.before(turn, within=10.0) if other.speaker is CAR)]
     grounds = [other for other in grounds if other.does(M.EXPLAIN)]
     changed = [event.time for event in talk.exceptions(ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_CHANGE)]
-    fresh = any(0.0 <= turn.start - time <= SOON for time in (*changed, *talk.met_roadblocks))
+    fresh = any(0.0 <= turn.start - time <= SETTLEMENT_WINDOW for time in (*changed, *talk.met_roadblocks))
     return any(fresh or other.says(_COMPARES) or turn.says(_COMPARES) for other in grounds)
 
 

@@ -31,7 +31,7 @@ from dorothie_gym.recording.events import Event, EventType, UtteranceRecord
 from dorothie_gym.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
 
-ANSWER = 15.0
+ANSWER_WINDOW = 15.0
 """Time after a turn within which its answer begins [s]: patience of an exchange, and duration of the answer."""
 
 _LONGEST = 60.0
@@ -125,17 +125,17 @@ class DialogueView:
         """Yields the turns of a speaker with one of the moves, or all of them if none is given."""
         return (turn for turn in self.turns if turn.speaker is speaker and (not moves or turn.does(*moves)))
 
-    def answers(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> Iterator[Turn]:
+    def answers(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER_WINDOW) -> Iterator[Turn]:
         """Yields the other speaker's turns that begin during or soon after a turn and have one of the moves."""
         for other in self.later(turn, within=within):
             if other.speaker is not turn.speaker and (not moves or other.does(*moves)):
                 yield other
 
-    def answered(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> bool:
+    def answered(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER_WINDOW) -> bool:
         """Returns whether there is such an answer."""
         return any(True for _ in self.answers(turn, *moves, within=within))
 
-    def replies(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> Iterator[Turn]:
+    def replies(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER_WINDOW) -> Iterator[Turn]:
         """Yields the answers with one of the moves within an exchange of the turn.
 
         If the exchange is unknown, any answer counts.
@@ -146,7 +146,7 @@ class DialogueView:
             if None in own or any(act.move in moves and (k is None or k in own) for act, k in placed):
                 yield other
 
-    def replied(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER) -> bool:
+    def replied(self, turn: Turn, *moves: DialogueMove, within: float = ANSWER_WINDOW) -> bool:
         """Returns whether there is such a reply."""
         return any(True for _ in self.replies(turn, *moves, within=within))
 

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from dorothie_gym.analysis.diversity import plain, words_of
 from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, DialogueView, Occurrence, Turn
-from dorothie_gym.analysis.phenomena.ways import asks_why
+from dorothie_gym.analysis.phenomena.routes import asks_why
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT, EXPECTATIONS
 from dorothie_gym.ontology import DialogueMove, PhysicalAction, Slot, SlotValue
 from dorothie_gym.recording.events import EventType
@@ -16,10 +16,10 @@ from dorothie_gym.recording.events import EventType
 M = DialogueMove
 
 QUESTIONS = (M.QUERY_YN, M.QUERY_W, M.CHECK, M.ALIGN)
-AGAIN = 30.0
+REPEAT_WINDOW = 30.0
 """Time within which a question is repeated [s]."""
 
-LATELY = 45.0
+MENTION_WINDOW = 45.0
 """Time within which a named place counts as mentioned before [s]."""
 
 _YES_NO: Mapping[DialogueMove, str] = MappingProxyType(
@@ -131,7 +131,7 @@ def abandoned(talk: DialogueView) -> Iterator[Occurrence]:
 
 def _asked_again(talk: DialogueView, turn: Turn) -> bool:
     slots = {value.slot for act in turn.doing(*QUESTIONS) for value in act.slots}
-    for other in talk.later(turn, within=AGAIN):
+    for other in talk.later(turn, within=REPEAT_WINDOW):
         if other.speaker is turn.speaker and other.does(*QUESTIONS) and plain(other.text) != plain(turn.text):
             if not slots or slots & {value.slot for act in other.doing(*QUESTIONS) for value in act.slots}:
                 return True
@@ -163,7 +163,7 @@ def speech_trouble(talk: DialogueView) -> Iterator[Occurrence]:
 
 def _said_lately(talk: DialogueView, turn: Turn) -> frozenset[SlotValue]:
     """Returns the places that were named in a turn, or by any speaker shortly before it."""
-    turns = [turn, *talk.before(turn, within=LATELY)]
+    turns = [turn, *talk.before(turn, within=MENTION_WINDOW)]
     return frozenset(value for each in turns for slot in (Slot.LANDMARK, Slot.STREET) for value in each.names(slot))
 
 

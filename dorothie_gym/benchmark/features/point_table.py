@@ -13,8 +13,8 @@ from dorothie_gym.benchmark.features.columns import CO_WIZARD, PARTICIPANT, Colu
 from dorothie_gym.benchmark.labels import NO_ANGLE, Unscored
 from dorothie_gym.ontology import LABELS
 from dorothie_gym.recording import Fold, Task
+from dorothie_gym.recording.corpus import check_fold
 from dorothie_gym.recording.points import Moments, RowRange, earlier_spans, visible_rows
-from dorothie_gym.recording.splits import check_fold
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

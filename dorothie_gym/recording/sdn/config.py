@@ -19,7 +19,7 @@ from dorothie_gym.recording.sdn.files import (
     plain,
     whole_of,
 )
-from dorothie_gym.recording.sdn.maps import SdnMap
+from dorothie_gym.recording.sdn.trajectory import SdnMap
 from dorothie_gym.recording.validation import ReadReport
 
 _KNOWN: Final = {

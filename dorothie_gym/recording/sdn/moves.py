@@ -27,10 +27,10 @@ from dorothie_gym.recording.validation import ReadReport
 WORDS_A_SECOND: Final = 2.5
 """Speech rate for utterances without a recorded duration (spec: design, Time)."""
 
-NEAR: Final = 20
+MAX_SPEECH_GAP: Final = 20
 """Frames (10 Hz) between a stretch of speech and a move that belongs to it."""
 
-AT_ONCE: Final = 50
+MAX_CANDIDATES: Final = 50
 """Latest stretches of one speaker that are candidates for a move."""
 
 _ACT_FIELDS: Final = {"move", "slots", "exchange", "transaction", "span", "utterance", "start", "end", MORE}
@@ -156,13 +156,13 @@ class MoveReader:
         if isinstance(file, str) and file in self._files:
             return self._files[file]
         own = self._by_speaker[speaker]
-        begun = bisect.bisect_right(own, frame + NEAR, key=lambda stretch: stretch.start)
+        begun = bisect.bisect_right(own, frame + MAX_SPEECH_GAP, key=lambda stretch: stretch.start)
         near = [
             (max(stretch.start - frame, frame - stretch.end, 0), -stretch.start, stretch.file)
-            for stretch in own[max(begun - AT_ONCE, 0) : begun]
+            for stretch in own[max(begun - MAX_CANDIDATES, 0) : begun]
         ]
         best = min(near, default=None)
-        return self._files[best[2]] if best is not None and best[0] <= NEAR else None
+        return self._files[best[2]] if best is not None and best[0] <= MAX_SPEECH_GAP else None
 
     def _times(self, act: JsonObject, stretch: Speech | None, frame: int, text: str) -> tuple[float, float]:
         start, end = number_of(act.get("start")), number_of(act.get("end"))

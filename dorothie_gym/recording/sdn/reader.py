@@ -30,14 +30,13 @@ from dorothie_gym.recording.sdn.files import (
     read_json,
     whole_of,
 )
-from dorothie_gym.recording.sdn.maps import SdnMap
 from dorothie_gym.recording.sdn.plan_files import ViewReader
-from dorothie_gym.recording.sdn.trajectory import CarPoses, read_places, read_scene, trajectory_of_places
+from dorothie_gym.recording.sdn.trajectory import CarPoses, SdnMap, read_places, read_scene, trajectory_of_places
 from dorothie_gym.recording.sdn.turn_angles import SignVote, vote, with_roads, with_sign
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.validation import ReadReport
 
-FROM_START: Final = 600
+MAX_START_OFFSET: Final = 600
 """Largest distance of `start_frame` from the first row; a larger one belongs to another clock [frames at 10 Hz]."""
 
 
@@ -198,7 +197,7 @@ def _first_frame(config: JsonObject, rows: list[JsonObject], places: CarPoses) -
     seen = [frame_of(row) or 0 for row in rows[:1]] + places.frames[:1].tolist()
     first = min(seen, default=0)
     given = whole_of(config.get("start_frame"))
-    if given is not None and 0 <= given < MAX_FRAME and 0 <= first - given <= FROM_START:
+    if given is not None and 0 <= given < MAX_FRAME and 0 <= first - given <= MAX_START_OFFSET:
         return given
     return first
 

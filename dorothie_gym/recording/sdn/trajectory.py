@@ -1,8 +1,9 @@
-"""SDN's `trajectory.csv`: pose of the car at 10 Hz."""
+"""SDN's `trajectory.csv`: poses of the car at 10 Hz, and their lanes on the map of the town."""
 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -11,25 +12,93 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
+from dorothie_gym.maps import NO_STREET, Town
 from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES
 from dorothie_gym.recording.frames import read_frames, write_frames
 from dorothie_gym.recording.sdn.files import number_of, read_csv
-from dorothie_gym.recording.sdn.maps import SdnMap
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.surroundings import Surroundings
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, NO_LANE, TENTHS, TRAJECTORY_DTYPE, Trajectory
 from dorothie_gym.recording.validation import ReadReport
 
-COLUMNS: Final = ("frame", "x", "y", "yaw", "junction_id", "road_id", "lane_id")
+MAX_LANE_DISTANCE: Final = 10.0
+"""Largest distance of a position from the lane that it is assigned to [m]."""
+
+
+@dataclass(frozen=True)
+class LanePosition:
+    """Position in the town: lane (-1: none), distance along it [m], street (-1: none)."""
+
+    lane: int = NO_LANE
+    station: float = 0.0
+    street: int = NO_STREET
+
+
+class SdnMap:
+    """Lookup of positions in a town that may be unknown.
+
+    Args:
+        town: the town, or None: lookups then find nothing.
+    """
+
+    def __init__(self, town: Town | None) -> None:
+        self.town = town
+        self._by_ids: dict[tuple[int, int], list[int]] = defaultdict(list)
+        for lane in town.lanes if town is not None else ():
+            self._by_ids[lane.road_id, lane.lane_id].append(lane.id)
+
+    def locate(self, x: float, y: float, road: int | None = None, lane: int | None = None) -> LanePosition:
+        """Returns the position closest to (x, y) [m], on lanes with the given numbers if the town has them."""
+        if self.town is None:
+            return LanePosition()
+        known = self._by_ids.get((road, lane)) if road is not None and lane is not None else None
+        position = np.array([x, y])
+        found = [(*self.town.lanes[k].project(position), k) for k in known or range(len(self.town.lanes))]
+        station, lateral, number = min(found, key=lambda item: (abs(item[1]), item[2]))
+        if known is None and abs(lateral) > MAX_LANE_DISTANCE:
+            return LanePosition()
+        return LanePosition(number, station, self.town.lanes[number].street)
+
+    def lane_of(self, x: float, y: float, road: int, lane: int) -> int:
+        """Returns the lane with the given numbers at (x, y), or -1; fast enough for every frame."""
+        known = self._by_ids.get((road, lane), ())
+        if len(known) == 1:
+            return known[0]
+        return self.locate(x, y, road, lane).lane if known else NO_LANE
+
+    def turn_angle(self, lane: int, road: int) -> float | None:
+        """Returns the angle [degrees, positive left] of the turn from a lane into a road, through one junction.
+
+        Args:
+            lane: lane of the car.
+            road: number of the target road, or of the connecting road to it.
+        """
+        town = self.town
+        if town is None or lane < 0:
+            return None
+        for _ in range(len(town.lanes)):  # along the road to the junction
+            exits = town.exits(lane)
+            for way in exits:
+                if road in (town.lanes[way.lane].road_id, town.lanes[way.connector].road_id):
+                    return float(way.angle)
+            if len(exits) != 1 or exits[0].junction_id >= 0:
+                return None
+            lane = exits[0].lane
+        return None
+
+
+# --- SDN's `trajectory.csv`: pose of the car at 10 Hz ----------------------------------------------------------------
+
+CSV_COLUMNS: Final = ("frame", "x", "y", "yaw", "junction_id", "road_id", "lane_id")
 """Columns of the layout; those after `yaw` are optional."""
 
-_NEEDED: Final = COLUMNS[:4]
-_IDS: Final = COLUMNS[4:]
+_NEEDED: Final = CSV_COLUMNS[:4]
+_IDS: Final = CSV_COLUMNS[4:]
 
-FARTHEST: Final = 1e9
+MAX_COORDINATE: Final = 1e9
 """Largest magnitude of a valid coordinate or yaw [m, degrees]."""
 
-MOVED: Final = 0.2
+MIN_MOTION: Final = 0.2
 """Distance between two frames from which on the motion gives the heading [m]."""
 
 
@@ -65,7 +134,7 @@ def read_places(path: Path, report: ReadReport) -> CarPoses:
     """
     if not path.is_file():
         report.miss(path.name)
-        return _places(np.empty((0, len(COLUMNS))), list(COLUMNS))
+        return _places(np.empty((0, len(CSV_COLUMNS))), list(CSV_COLUMNS))
     lines = read_csv(path, MAX_FRAMES)
     start = next((k for k, line in enumerate(lines) if line), len(lines))
     names = [name.casefold() for name in lines[start]] if start < len(lines) else []
@@ -74,7 +143,7 @@ def read_places(path: Path, report: ReadReport) -> CarPoses:
             shown = ", ".join(names)[:100]
             raise SessionError(f"{path}, line {start + 1}: the columns are {shown!r}; {name!r} is missing")
     for name in names:
-        if name not in COLUMNS:
+        if name not in CSV_COLUMNS:
             report.keep(f"{path.name}: column {name[:40]!r}")
     for name in _IDS:
         if name not in names:
@@ -97,7 +166,11 @@ def _numbers(path: Path, lines: list[list[str]], start: int, names: list[str], r
         row = [math.nan if value is None else value for value in values[: len(names)]]
         row += [math.nan] * (len(names) - len(row))
         frame = row[needed[0]]
-        if any(not abs(row[k]) <= FARTHEST for k in needed[1:]) or not 0 <= frame < MAX_FRAME or frame != int(frame):
+        if (
+            any(not abs(row[k]) <= MAX_COORDINATE for k in needed[1:])
+            or not 0 <= frame < MAX_FRAME
+            or frame != int(frame)
+        ):
             bad += 1
         else:
             rows.append(row)
@@ -126,14 +199,14 @@ def _places(table: NDArray[np.float64], names: list[str]) -> CarPoses:
         y=y,
         heading=yaw if _is_radians(x, y, yaw) else np.radians(yaw),
         ids={name: values.astype(np.int64) for name, values in ids.items()},
-        further={name: values for name, values in columns.items() if name not in COLUMNS},
+        further={name: values for name, values in columns.items() if name not in CSV_COLUMNS},
     )
 
 
 def _is_radians(x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64]) -> bool:
     """Returns whether yaw is in radians, not degrees: the unit that agrees with the motion of the car."""
     dx, dy = np.diff(x), np.diff(y)
-    moved = np.hypot(dx, dy) > MOVED
+    moved = np.hypot(dx, dy) > MIN_MOTION
     if not np.any(moved) or np.any(np.abs(yaw) > 2 * np.pi):
         return False
     course, looked = np.arctan2(dy, dx)[moved], yaw[:-1][moved]

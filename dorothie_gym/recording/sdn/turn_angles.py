@@ -11,16 +11,15 @@ import numpy as np
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.recording.events import Event, EventType
-from dorothie_gym.recording.sdn.maps import SdnMap
-from dorothie_gym.recording.sdn.trajectory import CarPoses
+from dorothie_gym.recording.sdn.trajectory import CarPoses, SdnMap
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 
-SHARP: Final = 30.0
-"""Angles and turns from here to `BLUNT` distinguish left from right [degrees]."""
+MIN_CLEAR_TURN: Final = 30.0
+"""Angles and turns from here to `MAX_CLEAR_TURN` distinguish left from right [degrees]."""
 
-BLUNT: Final = 150.0
+MAX_CLEAR_TURN: Final = 150.0
 
-SOON: Final = 600
+MAX_TURN_DELAY: Final = 600
 """Longest time from a JTurn to its junction [frames at 10 Hz]."""
 
 
@@ -59,10 +58,14 @@ def vote(events: Sequence[Event], places: CarPoses, first_frame: int) -> SignVot
     """Returns the vote of a session's JTurns, with angles as in the file."""
     result = SignVote()
     for event in events:
-        if not _is_turn(event) or event.data["angle"] is None or not SHARP <= abs(event.data["angle"]) <= BLUNT:
+        if (
+            not _is_turn(event)
+            or event.data["angle"] is None
+            or not MIN_CLEAR_TURN <= abs(event.data["angle"]) <= MAX_CLEAR_TURN
+        ):
             continue
         turned = _turn_after(places, event.frame // FRAMES_PER_TENTH + first_frame)
-        if turned is not None and SHARP <= abs(turned) <= BLUNT:
+        if turned is not None and MIN_CLEAR_TURN <= abs(turned) <= MAX_CLEAR_TURN:
             agrees = (event.data["angle"] > 0) == (turned > 0)
             result += SignVote(left=1) if agrees else SignVote(right=1)
     return result
@@ -71,7 +74,7 @@ def vote(events: Sequence[Event], places: CarPoses, first_frame: int) -> SignVot
 def _turn_after(places: CarPoses, frame: int) -> float | None:
     """Returns the angle of the car's turn at the next junction [degrees, positive left]; None without one."""
     start = int(np.searchsorted(places.frames, frame))
-    end = int(np.searchsorted(places.frames, frame + SOON))
+    end = int(np.searchsorted(places.frames, frame + MAX_TURN_DELAY))
     inside = places.ids["junction_id"][start:] >= 0
     if not inside[: end - start].any():
         return None

@@ -25,7 +25,6 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.file_names import EVENTS_FILE
-from dorothie_gym.recording.folder import new_session_folder
 from dorothie_gym.recording.header import LandmarkRow, SessionHeader
 from dorothie_gym.recording.json_io import canonical
 from dorothie_gym.recording.sdn.event_log import FOREIGN, LEFT, RIGHT
@@ -40,8 +39,8 @@ from dorothie_gym.recording.sdn.files import (
     PLAN_FILE,
     SCENE_FILE,
 )
-from dorothie_gym.recording.sdn.trajectory import COLUMNS, write_scene
-from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.sdn.trajectory import CSV_COLUMNS, write_scene
+from dorothie_gym.recording.session import Session, new_session_folder
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, TENTHS
 
 _ACT: Final = ("move", "slots", "exchange", "transaction", "span", "utterance", "start", "end")
@@ -346,7 +345,7 @@ def _place_lines(session: Session, town: Town | None, first: int) -> list[str]:
     kept = trajectory["frame"] % FRAMES_PER_TENTH == 0
     rows = trajectory[kept]
     ids = np.full((3, len(rows)), _NONE, dtype=np.int64)
-    for k, name in enumerate(COLUMNS[4:]):
+    for k, name in enumerate(CSV_COLUMNS[4:]):
         if name in session.scene.columns:
             ids[k] = session.scene.columns[name][kept]
         elif town is not None:
@@ -354,4 +353,4 @@ def _place_lines(session: Session, town: Town | None, first: int) -> list[str]:
             ids[k] = [table[lane] if 0 <= lane < len(table) else _NONE for lane in rows["lane"].tolist()]
     frames = (rows["frame"] // FRAMES_PER_TENTH + first).tolist()
     columns = (frames, rows["x"].tolist(), rows["y"].tolist(), np.degrees(rows["heading"]).tolist(), *ids.tolist())
-    return [", ".join(COLUMNS), *(", ".join(map(repr, row)) for row in zip(*columns, strict=True))]
+    return [", ".join(CSV_COLUMNS), *(", ".join(map(repr, row)) for row in zip(*columns, strict=True))]

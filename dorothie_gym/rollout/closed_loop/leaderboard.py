@@ -19,10 +19,10 @@ from dorothie_gym.rollout.runner import COST_FILE
 OTHER: Final = "other"
 """Part of the leaderboard for rollouts in towns of both folds, or of neither."""
 
-PARTS: Final[Mapping[str, str]] = {"seen": "Seen towns", "unseen": "Unseen towns", OTHER: "Other towns"}
+PART_TITLES: Final[Mapping[str, str]] = {"seen": "Seen towns", "unseen": "Unseen towns", OTHER: "Other towns"}
 """Parts of the page and their titles."""
 
-COLUMNS: Final = (
+PAGE_METRICS: Final = (
     "success", "goal_condition_success", "spl", "route_completion", "infraction_score", "driving_score", "seconds",
     "exchanges_per_subgoal", "clarification_rate", "exceptions_recovered", "recovery_seconds",
 )  # fmt: skip
@@ -61,7 +61,7 @@ class LeaderboardEntry:
 
     @property
     def part(self) -> str:
-        """Part of the page, a key of `PARTS`."""
+        """Part of the page, a key of `PART_TITLES`."""
         return fold_of_towns(self.result.settings["towns"]) or OTHER
 
     @property
@@ -86,9 +86,9 @@ def read_entries(folders: Sequence[Path | str]) -> tuple[LeaderboardEntry, ...]:
         other = entries.setdefault((entry.part, entry.policy), entry)
         if other is not entry:
             raise RolloutError(
-                f"{folder}: {entry.policy} in {PARTS[entry.part].lower()} is also in {other.folder}; give one"
+                f"{folder}: {entry.policy} in {PART_TITLES[entry.part].lower()} is also in {other.folder}; give one"
             )
-    order = list(PARTS)
+    order = list(PART_TITLES)
     return tuple(sorted(entries.values(), key=lambda entry: (order.index(entry.part), entry.rank)))
 
 
@@ -108,7 +108,7 @@ def leaderboard_page(entries: Sequence[LeaderboardEntry], picture: str | None = 
     ]
     if picture is not None:
         lines += ["", f"![Success and driving score of each policy, with intervals]({picture})"]
-    for part, title in PARTS.items():
+    for part, title in PART_TITLES.items():
         chosen = [entry for entry in entries if entry.part == part]
         if chosen:
             lines += ["", f"## {title}", "", *_figures(chosen)]
@@ -119,7 +119,7 @@ def leaderboard_page(entries: Sequence[LeaderboardEntry], picture: str | None = 
 
 def _figures(entries: Sequence[LeaderboardEntry]) -> list[str]:
     columns: list[ClosedLoopMetric | RecoverySeconds] = [
-        next(metric for metric in ALL_METRICS if metric.key == key) for key in COLUMNS
+        next(metric for metric in ALL_METRICS if metric.key == key) for key in PAGE_METRICS
     ]
     rows = [["Co-Wizard", "sessions", "errored", *(metric.title for metric in columns)]]
     for entry in entries:
@@ -181,7 +181,7 @@ def _read(folder: Path) -> LeaderboardEntry:
 
 # --- picture ----------------------------------------------------------------------------------------------------------
 
-PANELS: Final = ("success", "goal_condition_success", "driving_score", "spl")
+CHART_METRICS: Final = ("success", "goal_condition_success", "driving_score", "spl")
 """Metrics of the panels of the picture."""
 
 _ROW, _TOP, _BOTTOM = 0.5, 1.2, 0.6
@@ -204,9 +204,9 @@ def draw_leaderboard(entries: Sequence[LeaderboardEntry], path: Path | str) -> P
     names = list(dict.fromkeys(entry.policy for entry in sorted(entries, key=lambda entry: entry.rank)))
     height = _TOP + _BOTTOM + _ROW * max(len(names), 1)
     with empty_figure(12.0, height) as figure:
-        axes = figure.subplots(1, len(PANELS), sharey=True, squeeze=False)[0]
+        axes = figure.subplots(1, len(CHART_METRICS), sharey=True, squeeze=False)[0]
         figure.subplots_adjust(left=0.2, right=0.98, top=1 - _TOP / height, bottom=_BOTTOM / height, wspace=0.09)
-        for key, panel in zip(PANELS, axes, strict=True):
+        for key, panel in zip(CHART_METRICS, axes, strict=True):
             _panel(panel, entries, names, key)
         axes[0].set_yticks(range(len(names)), names, fontsize=9, color=INK)
         axes[0].set_ylim(len(names) - 0.5, -0.5)
@@ -217,7 +217,7 @@ def draw_leaderboard(entries: Sequence[LeaderboardEntry], path: Path | str) -> P
 
 
 def _panel(axes: Any, entries: Sequence[LeaderboardEntry], names: Sequence[str], key: str) -> None:
-    parts = [part for part in PARTS if any(entry.part == part for entry in entries)]
+    parts = [part for part in PART_TITLES if any(entry.part == part for entry in entries)]
     for entry in entries:
         figure = entry.page[key]
         if figure["mean"] is None:
@@ -236,7 +236,7 @@ def _legend(figure: Any, entries: Sequence[LeaderboardEntry], height: float) -> 
 
     handles = [
         Line2D([], [], color=_COLOURS[part], marker="o", label=title.lower())
-        for part, title in PARTS.items()
+        for part, title in PART_TITLES.items()
         if any(entry.part == part for entry in entries)
     ]
     figure.legend(

@@ -287,7 +287,7 @@ class RecoverySeconds:
 
 # --- figures over sessions --------------------------------------------------------------------------------------------
 
-SEED: Final = 0
+BOOTSTRAP_SEED: Final = 0
 """Seed of the bootstrap samples: equal sessions give equal intervals."""
 
 
@@ -331,7 +331,7 @@ def interval_of(metric: ClosedLoopMetric, records: Sequence[SessionRecord], erro
         return MetricInterval(mean=None)
     sums = np.array(parts, dtype=np.float64)  # (n, 2)
     upper, lower = sums.sum(axis=0)
-    drawn = bootstrap_weights(len(parts), seed=SEED) @ sums  # (RESAMPLES, 2)
+    drawn = bootstrap_weights(len(parts), seed=BOOTSTRAP_SEED) @ sums  # (RESAMPLES, 2)
     drawn = drawn[drawn[:, 1] > 0.0]
     return _between(float(upper / lower), drawn[:, 0] / drawn[:, 1], len(parts))
 
@@ -345,7 +345,7 @@ def _median(records: Sequence[SessionRecord]) -> MetricInterval:
     owners = [k for k, record in enumerate(records) for _ in metric.values(record)]
     values = np.array([seconds for record in records for seconds in metric.values(record)])
     order = np.argsort(values, kind="stable")
-    counts = bootstrap_weights(len(records), seed=SEED)[
+    counts = bootstrap_weights(len(records), seed=BOOTSTRAP_SEED)[
         :, np.array(owners)[order]
     ]  # occurrences of each value in each sample
     counts = counts[counts.sum(axis=1) > 0.0]

@@ -15,8 +15,8 @@ from dorothie_gym.analysis.intervals import CONFIDENCE, RESAMPLES
 from dorothie_gym.errors import RolloutError
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind
 from dorothie_gym.rollout.closed_loop.metrics import (
+    BOOTSTRAP_SEED,
     METRICS,
-    SEED,
     ClosedLoopMetric,
     MetricInterval,
     RecoverySeconds,
@@ -93,7 +93,7 @@ class RolloutResult:
             "per_town": self._parts(dict.fromkeys(row.town for row in self.rows), lambda row, town: row.town == town),
             "per_exception": self.per_exception(),
             "seeds": [row.seed for row in self.rows],
-            "interval": {"share": CONFIDENCE, "resamples": RESAMPLES, "seed": SEED},
+            "interval": {"share": CONFIDENCE, "resamples": RESAMPLES, "seed": BOOTSTRAP_SEED},
             "rows": [row.to_json() for row in self.rows],
         }
 
@@ -194,7 +194,7 @@ def _only(row: RolloutRow, kind: ExceptionKind) -> RolloutRow:
 
 ALL_METRICS: Final[tuple[ClosedLoopMetric | RecoverySeconds, ...]] = (*METRICS, RecoverySeconds())
 
-MAIN: Final = (
+TOWN_METRICS: Final = (
     "success",
     "goal_condition_success",
     "spl",
@@ -205,10 +205,10 @@ MAIN: Final = (
 )
 """Metrics of the table of towns."""
 
-HANDLING: Final = ("success", "driving_score", "exceptions_met", "exceptions_recovered", "recovery_seconds")
+EXCEPTION_METRICS: Final = ("success", "driving_score", "exceptions_met", "exceptions_recovered", "recovery_seconds")
 """Metrics of the table of exceptions."""
 
-SEEDS: Final = 20
+MAX_PRINTED_SEEDS: Final = 20
 """Number of seeds that are printed; the file and --json have all."""
 
 
@@ -220,11 +220,11 @@ def print_result(result: RolloutResult, console: Console) -> None:
     errors = f", {page['errored']} of them ended in an error" if page["errored"] else ""
     console.print(f"{page['sessions']} sessions{errors}: {cast}", markup=False, soft_wrap=True)
     console.print(_overall(page))
-    console.print(_parts("town", page["per_town"], MAIN))
-    console.print(_parts("exception", page["per_exception"], HANDLING))
+    console.print(_parts("town", page["per_town"], TOWN_METRICS))
+    console.print(_parts("exception", page["per_exception"], EXCEPTION_METRICS))
     seeds = [str(row.seed) for row in result.rows]
-    more = "" if len(seeds) <= SEEDS else f", ... ({len(seeds)} in all, see --json)"
-    console.print(f"Seeds (of --seed {settings['seed']}): {', '.join(seeds[:SEEDS])}{more}", soft_wrap=True)
+    more = "" if len(seeds) <= MAX_PRINTED_SEEDS else f", ... ({len(seeds)} in all, see --json)"
+    console.print(f"Seeds (of --seed {settings['seed']}): {', '.join(seeds[:MAX_PRINTED_SEEDS])}{more}", soft_wrap=True)
     for row in result.rows:
         if row.error is not None:
             console.print(f"Session {row.number} ({row.town}, seed {row.seed}): {row.error}", markup=False)

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from dorothie_gym.analysis.exception_attribution import NEAR, kind_of, time_met
+from dorothie_gym.analysis.exception_attribution import MEETING_DISTANCE, kind_of, time_met
 from dorothie_gym.analysis.units import Units
 from dorothie_gym.dialogue.exchanges import ExchangeState
 from dorothie_gym.maps import Town
@@ -73,10 +73,10 @@ def talk_of(session: Session) -> TalkRecord:
 
 # --- Exceptions and recovery ------------------------------------------------------------------------------------------
 
-FORWARD: Final = 10.0
+MIN_PROGRESS: Final = 10.0
 """The car has come forward when so much less is left [m at 40 km/h]: a cell of the router's, its accuracy."""
 
-STEP: Final = 1.0
+PROBE_PERIOD: Final = 1.0
 """The car's place is looked at so often [s]."""
 
 
@@ -138,7 +138,7 @@ def when_met(session: Session, event: Event, kind: ExceptionKind) -> float:
     rows = session.trajectory[session.trajectory["frame"] >= event.frame]
     aside = np.maximum(np.maximum(x0 - rows["x"], rows["x"] - x1), 0.0)
     along = np.maximum(np.maximum(y0 - rows["y"], rows["y"] - y1), 0.0)
-    near = np.flatnonzero(aside**2 + along**2 <= NEAR**2)
+    near = np.flatnonzero(aside**2 + along**2 <= MEETING_DISTANCE**2)
     return float(rows["frame"][near[0]]) / FRAME_RATE if len(near) else math.inf
 
 
@@ -156,7 +156,7 @@ def _seconds_to_recovery(session: Session, town: Town, index: int, met: float) -
     if step is None:
         return math.inf
     at_step = round((step - frame) / FRAME_RATE, 3)
-    frames = range(frame, step, round(STEP * FRAME_RATE))
+    frames = range(frame, step, round(PROBE_PERIOD * FRAME_RATE))
     places = places_of(session, town, frames)
     if not places or len(places) < len(frames):
         return at_step  # the recording does not know its lanes
@@ -164,8 +164,8 @@ def _seconds_to_recovery(session: Session, town: Town, index: int, met: float) -
     left = [way.left(place) for place in places]
     if not math.isfinite(left[0]):
         return at_step
-    behind = max(k for k, metres in enumerate(left) if left[0] - metres < FORWARD)
-    return min((behind + 1) * STEP, at_step) if behind + 1 < len(left) else at_step
+    behind = max(k for k, metres in enumerate(left) if left[0] - metres < MIN_PROGRESS)
+    return min((behind + 1) * PROBE_PERIOD, at_step) if behind + 1 < len(left) else at_step
 
 
 def _on_road(session: Session, events: int) -> tuple[Place, ...]:
