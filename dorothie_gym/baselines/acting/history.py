@@ -5,20 +5,19 @@ All content comes from the Co-Wizard's own observations and actions, so that not
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
-from dorothie_gym.baselines.acting.observation_frames import ObservationFrame, header_of, rows_between, scene_of
+from dorothie_gym.baselines.acting.observation_frames import header_of, observed_frame
 from dorothie_gym.benchmark.features import HistorySizes
-from dorothie_gym.benchmark.features.incremental import IncrementalColumns
+from dorothie_gym.benchmark.features.incremental import IncrementalColumns, ObservedFrame
 from dorothie_gym.dialogue import Span
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role, Slot
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.recording import FRAME_RATE, ActionRecord, MoveRecord, UtteranceRecord
-from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
-from dorothie_gym.spaces import Physical
+from dorothie_gym.spaces import ObservationMapping, Physical
 
 _TAKES_ANGLE = (ArgumentKind.ANGLE, ArgumentKind.SIDE)
 _TAKES_UP = (ArgumentKind.SPEED_STEP, ArgumentKind.SWITCH)
@@ -30,20 +29,20 @@ class History:
 
     Attributes:
         encoded: what a benchmark model can still be shown of them, as columns.
-        newest: the last observation; None before the first.
         events: number of dialogue moves and physical actions so far.
         utterances: number of utterances so far.
-        named_before: label of the landmark that was named last in utterances that are no longer kept.
+        landmark: label of the landmark that was named last, by either speaker.
+        named_before: the same in utterances that are no longer kept.
     """
 
     encoded: IncrementalColumns
-    newest: ObservationFrame | None = None
     events: int = 0
     utterances: int = 0
+    landmark: str | None = None
     named_before: str | None = None
 
     @classmethod
-    def begin(cls, observation: Mapping[str, Any], town: Town, sizes: HistorySizes) -> Self:
+    def begin(cls, observation: ObservationMapping, town: Town, sizes: HistorySizes) -> Self:
         """Returns an empty history.
 
         Args:
@@ -54,22 +53,19 @@ class History:
         return cls(encoded=IncrementalColumns.begin(header_of(observation, town), town, sizes))
 
     @property
-    def frame(self) -> int:
-        """Frame of the last observation; there must be one."""
-        assert self.newest is not None
-        return self.newest.frame
+    def newest(self) -> ObservedFrame | None:
+        """The last observation; None before the first."""
+        frames = self.encoded.window.frames
+        return frames[-1] if frames else None
 
     @property
-    def landmark(self) -> str | None:
-        """Label of the landmark that was named last, by either speaker."""
-        return _last_landmark(self.encoded.utterances) or self.named_before
+    def frame(self) -> int:
+        """Frame of the last observation; there must be one."""
+        return self.encoded.window.frames[-1].frame
 
     def seen(self, view: CoWizardView, town: Town) -> Self:
         """Returns the history with an observation."""
-        new = ObservationFrame.of(view, town)
-        is_recorded = new.frame >= FRAMES_PER_TENTH and new.frame % FRAMES_PER_TENTH == 0
-        rows = rows_between(self.newest, new)
-        return replace(self, encoded=self.encoded.moved(rows, scene_of(new) if is_recorded else None), newest=new)
+        return replace(self, encoded=self.encoded.observed(observed_frame(view, town)))
 
     def said(self, speaker: Role, spans: Sequence[Span], frame: int) -> Self:
         """Returns the history with an utterance that was over at a frame."""
@@ -89,6 +85,7 @@ class History:
         dropped = (*self.encoded.utterances, record)[: -len(encoded.utterances)]
         return replace(
             self, encoded=encoded, events=self.events + len(spans), utterances=self.utterances + 1,
+            landmark=_last_landmark((record,)) or self.landmark,
             named_before=_last_landmark(dropped) or self.named_before,
         )  # fmt: skip
 
@@ -96,7 +93,8 @@ class History:
         """Returns the history with other acts for the participant's last utterance, which keeps its words."""
         last = next(each for each in reversed(self.encoded.utterances) if each.speaker is Role.PARTICIPANT)
         moves = tuple(replace(move, span=span.text, act=span.act) for move, span in zip(last.moves, spans, strict=True))
-        return replace(self, encoded=self.encoded.corrected(replace(last, moves=moves)))
+        encoded = self.encoded.corrected(replace(last, moves=moves))
+        return replace(self, encoded=encoded, landmark=_last_landmark(encoded.utterances) or self.named_before)
 
     def done(self, physical: Physical, frame: int) -> Self:
         """Returns the history with a physical action that was carried out at a frame."""

@@ -16,7 +16,7 @@ from dorothie_gym.baselines.acting.history import History
 from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.decoding import Predicted
 from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, Vectors, text_encoder
-from dorothie_gym.baselines.inputs import Examples
+from dorothie_gym.baselines.inputs import Examples, Inputs, Labels
 from dorothie_gym.baselines.model_card import ModelCard, sha256_of
 from dorothie_gym.baselines.model_zoo import build_model, find_row, retell
 from dorothie_gym.baselines.toto import TOTO, TOTOConfig
@@ -79,30 +79,50 @@ class TownModel:
         self._trained = trained
         self._graph = town_graph(town.name, town)
         self._model: TOTO | None = None
+        self._texts: tuple[str, ...] = ()
 
-    def answer(
-        self, history: History, task: Task, *, last: int = 1, allowed: Sequence[bool] | None = None
-    ) -> Predicted:
+    def answer(self, history: History, task: Task, *, last: int = 1) -> Predicted:
         """Returns the prediction at one of the last points of a history (B = 1).
 
         Args:
             history: the history, which contains the point.
             task: the task.
             last: place of the point among those of the task, counted from the end; 1 for the last.
-            allowed: (6,) navigation actions that may be predicted; None for all.
         """
+        with _one_thread(), torch.inference_mode():
+            model, inputs, labels = self._encoded(history, task, last)
+            return model.predict(inputs, labels.task)
+
+    def decisions(self, history: History, allowed: Sequence[bool]) -> Iterator[Predicted]:
+        """Yields the navigation decisions at the last NfD point of a history, the likeliest first (B = 1 each).
+
+        Args:
+            history: the history, which contains the point.
+            allowed: (6,) navigation actions that may be predicted; each is predicted once.
+        """
+        with _one_thread(), torch.inference_mode():
+            model, inputs, labels = self._encoded(history, Task.NFD, 1)
+        mask = torch.tensor([list(allowed)])
+        while bool(mask.any()):
+            with _one_thread(), torch.inference_mode():
+                predicted = model.predict(inputs, labels.task, mask)
+            yield predicted
+            mask[0, int(predicted.action)] = False
+
+    def _encoded(self, history: History, task: Task, last: int) -> tuple[TOTO, Inputs, Labels]:
+        """Returns the model with the texts of a history, and inputs and labels of one of its last points."""
         columns = history.encoded.columns(self._graph)
         table = points(columns, task)
-        with _one_thread(), torch.inference_mode():
-            model = self._ready(columns)
-            examples = Examples.gather(columns, [_only(table, len(table) - last)], model.spec)
-            mask = None if allowed is None else torch.tensor([list(allowed)])
-            inputs, labels = examples.take(torch.arange(1))
-            return model.predict(inputs, labels.task, mask)
+        model = self._ready(columns)
+        examples = Examples.gather(columns, [_only(table, len(table) - last)], model.spec)
+        return model, examples.inputs, examples.labels
 
     def _ready(self, columns: Columns) -> TOTO:
         """Returns the model with the texts of the history."""
         trained = self._trained
+        if self._model is not None and self._texts == columns.texts:
+            return self._model
+        self._texts = columns.texts
         material = _LiveMaterial(columns, trained.encoder, trained.pairs)
         if self._model is None:
             model = build_model(trained.row, trained.config, material, trained.description.spread)

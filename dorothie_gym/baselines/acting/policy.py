@@ -153,13 +153,11 @@ def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, w
     """
     asked = history.done(_UNDONE, history.frame + FRAMES_PER_TENTH)
     allowed = [not waits or action is not PhysicalAction.STOP for action in NAVIGATION_ACTIONS]
-    while any(allowed):
-        predicted = model.answer(asked, Task.NFD, allowed=allowed)
-        number = int(predicted.action)
-        deed = feasible_action(NAVIGATION_ACTIONS[number], float(predicted.angle), view, town)
+    for predicted in model.decisions(asked, allowed):
+        action = NAVIGATION_ACTIONS[int(predicted.action)]
+        deed = feasible_action(action, float(predicted.angle), view, town)
         if deed is not None:
             return deed
-        allowed[number] = False
     return FeasibleAction(physical=None)
 
 

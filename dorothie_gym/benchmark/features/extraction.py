@@ -93,10 +93,14 @@ def extract(session: Session, town: Town | None) -> SessionColumns:
 
 
 class TextPool:
-    """Numbers of distinct texts, in the order in which they first occur."""
+    """Numbers of distinct texts, in the order in which they first occur.
 
-    def __init__(self) -> None:
-        self.numbers: dict[str, int] = {}
+    Args:
+        texts: distinct texts that have the first numbers.
+    """
+
+    def __init__(self, texts: Sequence[str] = ()) -> None:
+        self.numbers: dict[str, int] = {text: number for number, text in enumerate(texts)}
 
     def number(self, text: str | None) -> int:
         """Returns the number of a text, a new one if the text is new; `NO_TEXT` for None."""

@@ -9,10 +9,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from dorothie_gym.baselines.acting.observation_frames import ObservationFrame, header_of
+from dorothie_gym.baselines.acting.observation_frames import header_of, observed_frame
 from dorothie_gym.benchmark.features import Columns
 from dorothie_gym.benchmark.features.building import join
 from dorothie_gym.benchmark.features.extraction import extract, town_graph
+from dorothie_gym.benchmark.features.incremental import ObservedFrame
 from dorothie_gym.dialogue import Span
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role
@@ -41,7 +42,7 @@ class WholeHistory:
 
     header: SessionHeader
     events: tuple[Event, ...] = ()
-    frames: tuple[ObservationFrame, ...] = ()
+    frames: tuple[ObservedFrame, ...] = ()
     utterances: int = 0
 
     @classmethod
@@ -49,7 +50,7 @@ class WholeHistory:
         return cls(header=header_of(observation, town))
 
     @property
-    def newest(self) -> ObservationFrame | None:
+    def newest(self) -> ObservedFrame | None:
         return self.frames[-1] if self.frames else None
 
     @property
@@ -57,7 +58,7 @@ class WholeHistory:
         return self.frames[-1].frame
 
     def seen(self, view: CoWizardView, town: Town) -> Self:
-        return replace(self, frames=(*self.frames, ObservationFrame.of(view, town)))
+        return replace(self, frames=(*self.frames, observed_frame(view, town)))
 
     def said(self, speaker: Role, spans: Sequence[Span], frame: int) -> Self:
         text = " ".join(span.text for span in spans)
@@ -105,7 +106,7 @@ def _action(physical: Physical, frame: int) -> Event:
     return Event(frame=frame, type=EventType.PHYSICAL_ACTION, source=Role.CO_WIZARD, flagged=flagged, data=data)
 
 
-def _trajectory(seen: Sequence[ObservationFrame]) -> Trajectory:
+def _trajectory(seen: Sequence[ObservedFrame]) -> Trajectory:
     """Returns rows at tenths of a second, interpolated over all observations at once."""
     frames = np.array([each.frame for each in seen])
     first = max(FRAMES_PER_TENTH, -(-int(frames[0]) // FRAMES_PER_TENTH) * FRAMES_PER_TENTH)
@@ -121,7 +122,7 @@ def _trajectory(seen: Sequence[ObservationFrame]) -> Trajectory:
     return rows
 
 
-def _scene(seen: Sequence[ObservationFrame]) -> Surroundings:
+def _scene(seen: Sequence[ObservedFrame]) -> Surroundings:
     """Returns the surroundings at the observations that have a row in the trajectory."""
     kept = [each for each in seen if each.frame >= FRAMES_PER_TENTH and each.frame % FRAMES_PER_TENTH == 0]
     frames = np.array([each.frame for each in kept], dtype=np.int64)
