@@ -89,7 +89,7 @@ def _load(path: Path) -> Town:
 
 
 @lru_cache(maxsize=16)
-def _read(path: Path, modified: int, size: int) -> Town:
+def _read(path: Path, _modified: int, _size: int) -> Town:
     """Reads each version of a file once per process; modification time and size distinguish versions."""
     return through_cache(path, _compile)
 

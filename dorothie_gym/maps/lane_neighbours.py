@@ -151,10 +151,10 @@ def leftmost(town: Town, lane_id: int) -> int:
 
 # --- Ground covered by lanes -----------------------------------------------------------------------------------------
 
-LEVEL = 2.0
+LANE_LEVEL = 2.0
 """Lanes with a larger difference of height are ignored [m]."""
 
-SAMPLE = 0.5
+LANE_SAMPLING = 0.5
 """Sampling distance of lanes and of tested lines [m]."""
 
 
@@ -164,7 +164,7 @@ class LaneEdges:
     def __init__(self, town: Town) -> None:
         rows = []
         for lane in town.lanes:
-            at = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / SAMPLE) + 1))
+            at = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / LANE_SAMPLING) + 1))
             rows.append(
                 np.column_stack(
                     [np.interp(at, lane.stations, column) for column in (*lane.points.T, lane.widths / 2)]
@@ -181,7 +181,7 @@ class LaneEdges:
     def is_clear(self, ends: Sequence[Array] | Array, height: float, margin: float) -> bool:
         """Returns whether a straight line between two positions keeps a margin [m] to all lanes at its height."""
         first, last = ends[0][:2], ends[1][:2]
-        count = max(2, math.ceil(float(np.hypot(*(last - first))) / SAMPLE) + 1)
+        count = max(2, math.ceil(float(np.hypot(*(last - first))) / LANE_SAMPLING) + 1)
         share = np.linspace(0.0, 1.0, count)[:, None]
         places = (1.0 - share) * first + share * last
         return bool(self.free(np.column_stack((places, np.full(len(places), height))), margin).all())
@@ -197,5 +197,5 @@ class LaneEdges:
         owners = np.repeat(np.arange(len(places)), counts)
         discs = self._discs[np.concatenate([np.asarray(discs, dtype=np.int64) for discs in near if discs])]
         gaps = np.hypot(*(discs[:, :2] - places[owners, :2]).T)
-        free[owners[(gaps < discs[:, 3] + margin) & (np.abs(discs[:, 2] - places[owners, 2]) < LEVEL)]] = False
+        free[owners[(gaps < discs[:, 3] + margin) & (np.abs(discs[:, 2] - places[owners, 2]) < LANE_LEVEL)]] = False
         return free

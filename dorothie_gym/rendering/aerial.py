@@ -106,7 +106,7 @@ def _value(weather: Mapping[str, float], parameter: WeatherParameter) -> float:
 # --- View ------------------------------------------------------------------------------------------------------------
 
 _WINDOW = 160.0  # [m] across the shorter side when the view follows the car
-_AROUND = 30.0  # [m] of country around the base map of that view
+_COUNTRY_AROUND = 30.0  # [m] of country around the base map of that view
 _PIN_TYPE = 13  # [px]
 _PIN_HEIGHT = 31  # [px] from the tip to the top
 _TOWNS_KEPT = 2
@@ -159,7 +159,7 @@ class AerialView:
                     street_names=names,
                     type_sizes=(18, 12),
                     label_spacing=360.0,
-                    margin=round(_AROUND * scale),
+                    margin=round(_COUNTRY_AROUND * scale),
                 )
             else:
                 margin = (20, 40, 20, 52)

@@ -22,7 +22,7 @@ NARROWEST_MEDIAN = 1.2
 
 _WIDEST_MEDIAN = 14.0  # [m]
 _TOUCH = 1.0  # [m] between the edges of lanes side by side, at most
-_SAME_LEVEL = 1.5  # [m]
+SAME_SURFACE = 1.5  # [m] difference of height of points on one surface, at most
 _THIN = 1.6  # [m] a narrower lane is still opening: the line beside it would form a wedge
 _INSIDE = 0.4  # [m] an edge this far inside another lane is no edge
 _SHORTEST_BORDER = 4.0  # [m] length of a line
@@ -151,7 +151,7 @@ def _beside(samples: TownSamples, outside: NDArray[np.int64], sign: int) -> NDAr
     candidate = outside[np.minimum(where, len(outside) - 1)]  # (m, 6)
     fits = np.isfinite(near) & (samples.lane[candidate] != samples.lane[outside][:, None])
     fits &= np.cos(samples.heading[candidate] - samples.heading[outside][:, None]) > 0.9
-    fits &= np.abs(samples.centre[candidate, 2] - samples.centre[outside, 2][:, None]) < _SAME_LEVEL
+    fits &= np.abs(samples.centre[candidate, 2] - samples.centre[outside, 2][:, None]) < SAME_SURFACE
     ahead, aside = _frame(samples, outside, samples.edge(-sign)[candidate] - own[:, None])
     fits &= (np.abs(aside) < _TOUCH) & (np.abs(ahead) < 1.5)
     found = np.full(len(samples.lane), -1, dtype=np.int64)
@@ -169,7 +169,7 @@ def _facing(samples: TownSamples, leftmost: NDArray[np.int64]) -> tuple[NDArray[
     near, where = cKDTree(edge).query(edge, k=40, distance_upper_bound=_WIDEST_MEDIAN + 1.0)
     candidate = leftmost[np.minimum(where, len(leftmost) - 1)]
     fits = np.isfinite(near) & (np.cos(samples.heading[candidate] - samples.heading[leftmost][:, None]) < -0.9)
-    fits &= np.abs(samples.centre[candidate, 2] - samples.centre[leftmost, 2][:, None]) < _SAME_LEVEL
+    fits &= np.abs(samples.centre[candidate, 2] - samples.centre[leftmost, 2][:, None]) < SAME_SURFACE
     ahead, aside = _frame(samples, leftmost, edge[np.minimum(where, len(leftmost) - 1)] - edge[:, None])
     fits &= (np.abs(ahead) < 1.3) & (aside < _TOUCH) & (aside > -_WIDEST_MEDIAN)
     some = fits.any(axis=1)
@@ -196,7 +196,7 @@ def _inside_others(samples: TownSamples, outside: NDArray[np.int64]) -> NDArray[
         candidate = outside[np.minimum(where, len(outside) - 1)]
         inside = np.isfinite(near) & (samples.lane[candidate] != samples.lane[outside][:, None])
         inside &= near < samples.half_width[candidate] - _INSIDE
-        inside &= np.abs(samples.centre[candidate, 2] - samples.centre[outside, 2][:, None]) < _SAME_LEVEL
+        inside &= np.abs(samples.centre[candidate, 2] - samples.centre[outside, 2][:, None]) < SAME_SURFACE
         hidden[row, outside] = inside.any(axis=1)
     return hidden
 

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     import pygame
 
 
-_FINE = 2  # supersampling factor
+_PANEL_FINE = 2  # supersampling factor
 _PAD = 20
 _HEADER = 92
-_GAP = 8
-_KMH = 3.6
+_BUBBLE_GAP = 8
+_KMH_PER_MS = 3.6
 _SPEAKERS: dict[Role, tuple[str, Colour, float]] = {
     # name, bubble colour, horizontal position: 0 left, 1 right, 0.5 centred
     Role.PARTICIPANT: ("Participant", palette.BUBBLE_PARTICIPANT, 0.0),
@@ -68,7 +68,7 @@ class Panel:
         clock = f"{seconds // 60:02d}:{seconds % 60:02d}"
         pen.text(clock, _PAD, 30, 27, palette.INK, bold=True)
         unit = pen.text("km/h", width - _PAD, 35, 14, palette.INK_SOFT, align=1.0)
-        pen.text(f"{abs(scene.car.speed) * _KMH:.0f}", unit - 7, 30, 27, palette.INK, bold=True, align=1.0)
+        pen.text(f"{abs(scene.car.speed) * _KMH_PER_MS:.0f}", unit - 7, 30, 27, palette.INK, bold=True, align=1.0)
         sky = weather_summary(scene.weather)
         line = f"{scene.caption}  ·  {sky}" if scene.caption else sky
         room = width - 2 * _PAD
@@ -126,7 +126,7 @@ class Panel:
                 break
             bottom -= bubble.height
             bubble.draw(pen, bottom)
-            bottom -= _GAP
+            bottom -= _BUBBLE_GAP
 
 
 class _Bubble:
@@ -161,53 +161,63 @@ class _Pen:
     def __init__(self, size: tuple[int, int]) -> None:
         import pygame
 
-        self.surface = pygame.Surface((size[0] * _FINE, size[1] * _FINE))
+        self.surface = pygame.Surface((size[0] * _PANEL_FINE, size[1] * _PANEL_FINE))
         self.surface.fill(palette.PANEL)
 
     def text(
         self, text: str, x: float, middle: float, size: int, colour: Colour, bold: bool = False, align: float = 0.0
     ) -> float:
         """Draws a line of text; returns its right end, or its left end if right-aligned (1.0) [px]."""
-        piece = words(text, size * _FINE, colour, bold)
-        left = x * _FINE - align * piece.get_width()
-        self.surface.blit(piece, (round(left), round(middle * _FINE - piece.get_height() / 2)))
-        return float((left + (1.0 - align) * piece.get_width()) / _FINE)
+        piece = words(text, size * _PANEL_FINE, colour, bold)
+        left = x * _PANEL_FINE - align * piece.get_width()
+        self.surface.blit(piece, (round(left), round(middle * _PANEL_FINE - piece.get_height() / 2)))
+        return float((left + (1.0 - align) * piece.get_width()) / _PANEL_FINE)
 
     def box(self, x: float, y: float, width: float, height: float, colour: Colour, radius: int) -> None:
         import pygame
 
-        rect = pygame.Rect(round(x * _FINE), round(y * _FINE), round(width * _FINE), round(height * _FINE))
-        pygame.draw.rect(self.surface, colour, rect, border_radius=radius * _FINE)
+        rect = pygame.Rect(
+            round(x * _PANEL_FINE), round(y * _PANEL_FINE), round(width * _PANEL_FINE), round(height * _PANEL_FINE)
+        )
+        pygame.draw.rect(self.surface, colour, rect, border_radius=radius * _PANEL_FINE)
 
     def line(self, left: float, y: float, right: float) -> None:
         import pygame
 
-        pygame.draw.rect(self.surface, palette.PANEL_EDGE, (left * _FINE, y * _FINE, (right - left) * _FINE, _FINE))
+        pygame.draw.rect(
+            self.surface,
+            palette.PANEL_EDGE,
+            (left * _PANEL_FINE, y * _PANEL_FINE, (right - left) * _PANEL_FINE, _PANEL_FINE),
+        )
 
     def strike(self, left: float, right: float, y: float, colour: Colour) -> None:
         import pygame
 
-        pygame.draw.rect(self.surface, colour, (left * _FINE, y * _FINE, (right - left) * _FINE, _FINE))
+        pygame.draw.rect(
+            self.surface, colour, (left * _PANEL_FINE, y * _PANEL_FINE, (right - left) * _PANEL_FINE, _PANEL_FINE)
+        )
 
     def tick_box(self, x: float, y: float, colour: Colour, state: str) -> None:
         """Draws the mark of a subgoal: a ring, filled with a tick once complete."""
         import pygame
 
-        centre = (x * _FINE, y * _FINE)
+        centre = (x * _PANEL_FINE, y * _PANEL_FINE)
         if state in ("none", "pending", "abandoned"):
-            pygame.draw.circle(self.surface, colour, centre, 8 * _FINE, 2 * _FINE)
+            pygame.draw.circle(self.surface, colour, centre, 8 * _PANEL_FINE, 2 * _PANEL_FINE)
             return
-        pygame.draw.circle(self.surface, colour, centre, 8 * _FINE)
+        pygame.draw.circle(self.surface, colour, centre, 8 * _PANEL_FINE)
         if state == "ongoing":
-            pygame.draw.circle(self.surface, palette.PAPER, centre, 3 * _FINE)
+            pygame.draw.circle(self.surface, palette.PAPER, centre, 3 * _PANEL_FINE)
             return
         tick = [(x - 3.8, y + 0.2), (x - 1.1, y + 2.9), (x + 4.0, y - 2.8)]
-        pygame.draw.lines(self.surface, palette.PAPER, False, [(a * _FINE, b * _FINE) for a, b in tick], 2 * _FINE)
+        pygame.draw.lines(
+            self.surface, palette.PAPER, False, [(a * _PANEL_FINE, b * _PANEL_FINE) for a, b in tick], 2 * _PANEL_FINE
+        )
 
 
 # --- Frames -----------------------------------------------------------------------------------------------------------
 
-_SMALLEST = (640, 400)
+_SMALLEST_FRAME = (640, 400)
 
 
 class SceneRenderer:
@@ -226,8 +236,8 @@ class SceneRenderer:
         Raises:
             ValueError: the size is too small for a map and a panel.
         """
-        if size[0] < _SMALLEST[0] or size[1] < _SMALLEST[1]:
-            raise ValueError(f"size: {size} is smaller than {_SMALLEST}")
+        if size[0] < _SMALLEST_FRAME[0] or size[1] < _SMALLEST_FRAME[1]:
+            raise ValueError(f"size: {size} is smaller than {_SMALLEST_FRAME}")
         self.size = size
         panel_width = min(400, round(0.4 * size[0]))
         self._aerial = AerialView((size[0] - panel_width, size[1]))

@@ -25,11 +25,11 @@ _LARGEST_HOLE = 160.0
 _CLOSING = 2.5  # [m]
 _MOUTH = 6.0  # [m] of the lanes before and behind a junction that belong to its asphalt
 _INSET = 0.1  # [m] by which lanes are narrowed: rasterization widens them
-_SMOOTHING = 5
+_OUTLINE_SMOOTHING = 5
 _RIM = 2.6  # [m]
 _BLOCK_SCALE = 1.0  # [px/m]: edges of blocks lie under roads, so 1 m is sufficient
 _HOLE_SCALE = 4.0
-_TREE_SPACING = 13.0  # [m]
+_PARK_TREE_SPACING = 13.0  # [m]
 _SLIVER = 500.0  # [m2]
 _SMALLEST_PARK = 1500.0  # [m2]
 
@@ -114,7 +114,7 @@ def _closed(town: Town, connectors: Sequence[int]) -> Iterator[Array]:
         if hole.mask.count() < _LARGEST_HOLE * _HOLE_SCALE**2 and not hole.outside:
             solid |= hole.array
     for piece in _pieces(solid):
-        yield simplified(smooth_outline(_outline(piece.mask, low, _HOLE_SCALE), _SMOOTHING), 0.03)
+        yield simplified(smooth_outline(_outline(piece.mask, low, _HOLE_SCALE), _OUTLINE_SMOOTHING), 0.03)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,7 @@ def landscape(town: Town, border: float) -> list[Shape]:
 def _trees(town: Town, piece: _Piece, rng: np.random.Generator, share: float, colour: Colour) -> Iterator[Shape]:
     """Yields trees on a jittered grid inside an area, away from its edge and from landmark sites."""
     size = np.array(piece.mask.get_size())
-    grid = np.stack(np.meshgrid(*(np.arange(0.0, n / piece.scale, _TREE_SPACING) for n in size)), axis=-1).reshape(
+    grid = np.stack(np.meshgrid(*(np.arange(0.0, n / piece.scale, _PARK_TREE_SPACING) for n in size)), axis=-1).reshape(
         -1, 2
     )
     centres = piece.low + grid + rng.uniform(-4.5, 4.5, grid.shape)

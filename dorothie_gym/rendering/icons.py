@@ -16,7 +16,7 @@ from dorothie_gym.rendering.text import font
 if TYPE_CHECKING:
     import pygame
 
-_FINE = 4  # supersampling factor
+ICON_SUPERSAMPLING = 4  # supersampling factor
 _LAMPS = (
     (LightColour.RED, palette.LIGHT_RED),
     (LightColour.YELLOW, palette.LIGHT_AMBER),
@@ -46,7 +46,7 @@ def sign_icon(kind: SignalKind, size: int, shown: LightColour | None = None) -> 
 def _light(size: int, shown: LightColour | None) -> pygame.Surface:
     import pygame
 
-    high, wide = size * _FINE, round(0.5 * size) * _FINE
+    high, wide = size * ICON_SUPERSAMPLING, round(0.5 * size) * ICON_SUPERSAMPLING
     fine = pygame.Surface((wide, high), pygame.SRCALPHA, 32)
     rim = max(1, round(0.045 * high))
     pygame.draw.rect(fine, palette.LIGHT_RIM, fine.get_rect(), border_radius=wide // 3)
@@ -61,7 +61,7 @@ def _light(size: int, shown: LightColour | None) -> pygame.Surface:
 def _stop(size: int) -> pygame.Surface:
     import pygame
 
-    side = size * _FINE
+    side = size * ICON_SUPERSAMPLING
     fine = pygame.Surface((side, side), pygame.SRCALPHA, 32)
     for radius, ink in ((0.5, palette.SIGN_WHITE), (0.44, palette.SIGN_RED)):
         pygame.draw.polygon(fine, ink, _regular(8, side / 2.0, radius * side / np.cos(np.pi / 8), np.pi / 8).tolist())
@@ -73,7 +73,7 @@ def _stop(size: int) -> pygame.Surface:
 def _yield(size: int) -> pygame.Surface:
     import pygame
 
-    side = size * _FINE
+    side = size * ICON_SUPERSAMPLING
     fine = pygame.Surface((side, side), pygame.SRCALPHA, 32)
     middle = np.array([side / 2.0, 0.36 * side])
     for radius, ink in ((0.6, palette.SIGN_WHITE), (0.53, palette.SIGN_RED), (0.28, palette.SIGN_WHITE)):
@@ -93,7 +93,7 @@ def pin_icon(text: str, radius: int, bearing: int) -> pygame.Surface:
     """
     import pygame
 
-    r = radius * _FINE
+    r = radius * ICON_SUPERSAMPLING
     side = round(4.2 * r)
     fine = pygame.Surface((side, side), pygame.SRCALPHA, 32)
     middle = np.array([side / 2.0, side / 2.0])
@@ -121,7 +121,9 @@ def _smooth(fine: pygame.Surface) -> pygame.Surface:
     import pygame
 
     width, height = fine.get_size()
-    return pygame.transform.smoothscale(fine.premul_alpha(), (width // _FINE, height // _FINE))
+    return pygame.transform.smoothscale(
+        fine.premul_alpha(), (width // ICON_SUPERSAMPLING, height // ICON_SUPERSAMPLING)
+    )
 
 
 def stamp(picture: pygame.Surface, icon: pygame.Surface, centre: Array) -> None:

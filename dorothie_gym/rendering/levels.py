@@ -13,7 +13,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering.shapes import TownSamples, right_of
 
-CLEARANCE = 3.0
+BRIDGE_CLEARANCE = 3.0
 """Smallest difference of height of a lane that passes over another [m]."""
 
 _NEAR = 6.0  # [m] within which samples of two lanes that cross are found
@@ -70,7 +70,7 @@ def _crossings(samples: TownSamples) -> tuple[NDArray[np.int64], NDArray[np.int6
     z = samples.centre[:, 2]
     pairs = np.where((z[pairs[:, 0]] <= z[pairs[:, 1]])[:, None], pairs, pairs[:, ::-1])
     gap = np.hypot(*(samples.centre[pairs[:, 0], :2] - samples.centre[pairs[:, 1], :2]).T)
-    over = (z[pairs[:, 1]] - z[pairs[:, 0]] > CLEARANCE) & (gap < samples.half_width[pairs].sum(axis=1))
+    over = (z[pairs[:, 1]] - z[pairs[:, 0]] > BRIDGE_CLEARANCE) & (gap < samples.half_width[pairs].sum(axis=1))
     return pairs[over, 0], pairs[over, 1]
 
 
@@ -83,7 +83,7 @@ def _raised(town: Town, samples: TownSamples, lower: NDArray[np.int64], upper: N
     found = []
     for height in np.unique(level[level > 0]).tolist():
         own = level[upper] == height
-        for lane, start, end in _merged(_grown(town, samples, upper[own], z[lower[own]] + CLEARANCE)):
+        for lane, start, end in _merged(_grown(town, samples, upper[own], z[lower[own]] + BRIDGE_CLEARANCE)):
             found.append(LevelStretch(height, lane, start, end))
     return found
 
@@ -179,7 +179,7 @@ class LevelLookup:
             return np.zeros(len(points), dtype=bool)
         found = self._tree.query(points[:, :2], k=min(4, len(self._centre)))
         distance, index = (np.reshape(row, (len(points), -1)) for row in found)
-        level = np.abs(self._centre[index, 2] - points[:, 2][:, None]) < CLEARANCE / 2.0
+        level = np.abs(self._centre[index, 2] - points[:, 2][:, None]) < BRIDGE_CLEARANCE / 2.0
         return np.asarray((level & (distance < self._half[index] + 0.8)).any(axis=1))
 
     def cross(self, points: Array, within: float) -> NDArray[np.bool_]:
@@ -189,7 +189,7 @@ class LevelLookup:
         near = self._tree.query_ball_point(points[:, :2], within)
         return np.array(
             [
-                bool((np.abs(self._centre[k, 2] - z) > CLEARANCE / 2.0).any())
+                bool((np.abs(self._centre[k, 2] - z) > BRIDGE_CLEARANCE / 2.0).any())
                 for k, z in zip(near, points[:, 2], strict=True)
             ]
         )

@@ -17,9 +17,9 @@ from dorothie_gym.rendering.levels import LevelLookup, stretches
 from dorothie_gym.rendering.markings import lane_arrows
 from dorothie_gym.rendering.medians import find_pockets, held, pocket_paint
 from dorothie_gym.rendering.shapes import Shape, TownSamples
-from dorothie_gym.rendering.surfaces import deck, streets
+from dorothie_gym.rendering.surfaces import BEYOND_BRIDGE, deck, streets
 
-_ASIDE = 1.5  # [m] from the edge of the lane
+_SIGN_ASIDE = 1.5  # [m] from the edge of the lane
 SHOWN = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
 """Kinds of signals that are drawn."""
 
@@ -68,7 +68,7 @@ def _posts(town: Town, borders: Borders, stops: Mapping[int, float], signal: Sig
             # the outermost lanes have their own light
             lane, sign = town.lanes[_leftmost(borders, own, number)], -1.0
         station = stops.get(lane.id, lane.length)
-        x, y = lane.position(station, sign * (lane.width_at(station) / 2.0 + _ASIDE)).tolist()
+        x, y = lane.position(station, sign * (lane.width_at(station) / 2.0 + _SIGN_ASIDE)).tolist()
         yield Post(signal.kind, (round(x, 2), round(y, 2)), signal.lanes)
 
 
@@ -82,8 +82,6 @@ def _leftmost(borders: Borders, lanes: frozenset[int], lane: int) -> int:
 
 
 # --- All layers ------------------------------------------------------------------------------------------------------
-
-_FURTHER = 6.0  # [m] of paint beyond a bridge, as far as its asphalt
 
 
 class MapLayers:
@@ -158,5 +156,5 @@ class MapLayers:
         for level in sorted({part.level for part in self.stretches if part.level > 0}):
             parts = [part for part in self.stretches if part.level == level]
             yield from deck(self.town, parts, self.borders.lines, LevelLookup(samples, parts))
-            above = LevelLookup(samples, parts, _FURTHER).hold(places)
+            above = LevelLookup(samples, parts, BEYOND_BRIDGE).hold(places)
             yield from (shape for shape, over in zip(paint, above.tolist(), strict=True) if over)

@@ -14,19 +14,18 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.borders import BorderKind
 from dorothie_gym.rendering.ground import town_bounds
-from dorothie_gym.rendering.icons import pin_icon, sign_icon, stamp
+from dorothie_gym.rendering.icons import ICON_SUPERSAMPLING, pin_icon, sign_icon, stamp
 from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.markings import one_way_arrow, one_way_places, turn_arrow
 from dorothie_gym.rendering.text import words
-from dorothie_gym.rendering.town_map import GROUND, MapPainter
+from dorothie_gym.rendering.town_map import BAR_LENGTHS, GROUND, MapPainter
 
 if TYPE_CHECKING:
     import pygame
 
 _ROWS = 4
-_FINE = 4
 _HIGH = 1.9  # [units] height of a swatch
-_WIDE = 3.2
+_WIDEST_SHEET = 3.2
 _METRES = 8.0  # width of a swatch for shapes in metres
 
 
@@ -66,23 +65,23 @@ class Legend:
         x = left
         for column in range(0, len(self.entries), _ROWS):
             rows = [(words(text, size, palette.INK), draw) for text, draw in self.entries[column : column + _ROWS]]
-            wide = max(text.get_width() for text, _ in rows) + (_WIDE + 0.9) * unit
+            wide = max(text.get_width() for text, _ in rows) + (_WIDEST_SHEET + 0.9) * unit
             if x + wide > right:
                 return
             for k, (text, draw) in enumerate(rows):
                 middle = top + (0.6 + 2.2 * k) * unit
-                stamp(surface, draw(), np.array([x + _WIDE * unit / 2.0, middle]))
-                surface.blit(text, (round(x + (_WIDE + 0.9) * unit), round(middle - text.get_height() / 2.0)))
+                stamp(surface, draw(), np.array([x + _WIDEST_SHEET * unit / 2.0, middle]))
+                surface.blit(text, (round(x + (_WIDEST_SHEET + 0.9) * unit), round(middle - text.get_height() / 2.0)))
             x += wide + 2.2 * unit
 
     def _swatch(self, *shapes: tuple[Array, palette.Colour], ground: palette.Colour = palette.ROAD) -> pygame.Surface:
         """Returns a swatch of map, `_METRES` wide, with its centre at (0, 0)."""
         import pygame
 
-        wide, high = round(_WIDE * self._unit), round(_HIGH * self._unit)
-        fine = pygame.Surface((wide * _FINE, high * _FINE), pygame.SRCALPHA, 32)
-        pygame.draw.rect(fine, ground, fine.get_rect(), border_radius=round(0.25 * self._unit * _FINE))
-        scale = wide * _FINE / _METRES
+        wide, high = round(_WIDEST_SHEET * self._unit), round(_HIGH * self._unit)
+        fine = pygame.Surface((wide * ICON_SUPERSAMPLING, high * ICON_SUPERSAMPLING), pygame.SRCALPHA, 32)
+        pygame.draw.rect(fine, ground, fine.get_rect(), border_radius=round(0.25 * self._unit * ICON_SUPERSAMPLING))
+        scale = wide * ICON_SUPERSAMPLING / _METRES
         for points, colour in shapes:
             pygame.draw.polygon(fine, colour, (points * scale + np.array(fine.get_size()) / 2.0).tolist())
         return pygame.transform.smoothscale(fine.premul_alpha(), (wide, high))
@@ -126,19 +125,18 @@ def _box(x0: float, x1: float, y0: float, y1: float) -> Array:
 
 _LARGEST = 4000  # [px] on the long side
 _FINEST = 12.0  # [px/m]
-_SMALLEST = 1400  # [px] on the long side
+_SMALLEST_SHEET = 1400  # [px] on the long side
 _NAME_HEIGHT = 7.0  # [m] font size on the broadest roads
 _NAME_SPACING = 120.0  # [m]
 _SMALLEST_TYPE = 0.0068  # of the long side: legible when the whole sheet is visible
 _LARGE_TYPE = 0.0105  # of the long side: prominent, on roads that are broad enough
-_BAR_LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000)
 
 
 def sheet_size(town: Town) -> tuple[int, int]:
     """Returns the size [px] of a legible sheet of a town: up to 4000 px on the long side."""
     x0, y0, x1, y1 = town_bounds(town, GROUND)
     extent = np.array([x1 - x0, y1 - y0])
-    long = float(np.clip(extent.max() * _FINEST, _SMALLEST, 0.96 * _LARGEST))
+    long = float(np.clip(extent.max() * _FINEST, _SMALLEST_SHEET, 0.96 * _LARGEST))
     width, height = extent * long / extent.max()
     # a narrow town needs room for title and legend
     width = max(width, 0.7 * height)
@@ -290,7 +288,7 @@ def _draw_scale(surface: pygame.Surface, scale: float, unit: float, right: float
     """Draws north arrow and scale bar; returns their left end [px]."""
     import pygame
 
-    metres = max((n for n in _BAR_LENGTHS if n * scale <= 22.0 * unit), default=_BAR_LENGTHS[0])
+    metres = max((n for n in BAR_LENGTHS if n * scale <= 22.0 * unit), default=BAR_LENGTHS[0])
     length = round(metres * scale)
     centre = right - 1.6 * unit
     for side, ink in ((-1.0, palette.INK), (1.0, palette.INK_SOFT)):

@@ -134,7 +134,7 @@ def one_way_places(town: Town, borders: Borders) -> Iterator[tuple[int, float]]:
 
 _PIECE = 8.0  # [m] of a solid line per polygon
 _DASH, _GAP = 3.0, 4.5  # [m]
-_BACK = 0.5  # [m] between a stop line and the end of its lane
+_STOP_LINE_BACK = 0.5  # [m] between a stop line and the end of its lane
 _BEFORE_CROSSING = 1.0  # [m] between a stop line and a crossing
 _LOOK_BACK = 14.0  # [m] at the end of a lane in which a crosswalk moves the stop line
 
@@ -217,7 +217,7 @@ def stop_stations(town: Town) -> dict[int, float]:
     for lane in town.lanes:
         if lane.in_junction or not any(e.junction_id >= 0 for e in town.exits(lane.id)):
             continue
-        station = lane.length - min(_BACK, lane.length / 4.0)
+        station = lane.length - min(_STOP_LINE_BACK, lane.length / 4.0)
         end = lane.points[-1, :2]
         near = np.flatnonzero(((end >= low) & (end <= high)).all(axis=1)).tolist()
         found[lane.id] = min([station, *(_before(lane, outlines[k]) for k in near)])
@@ -265,7 +265,7 @@ def approaches(town: Town, ruled: Mapping[int, SignalKind], stops: Mapping[int, 
     """Yields stop lines at lights and stop signs, and triangles at yield signs."""
     for k, kind in ruled.items():
         lane = town.lanes[k]
-        station = stops.get(k, lane.length - _BACK)
+        station = stops.get(k, lane.length - _STOP_LINE_BACK)
         height = lane.height_at(station)
         if kind is SignalKind.YIELD:
             for triangle in yield_triangles(lane, station):

@@ -18,7 +18,7 @@ from dorothie_gym.rendering.shapes import Shape, disc, longer, stroke
 SHORTEST_MEDIAN = 8.0
 """Longest median without plants [m]."""
 
-_KERB = 0.3  # [m]
+_MEDIAN_KERB = 0.3  # [m]
 _TREE_SPACING = 11.0  # [m]
 _TREE_ROOM = 2.2  # [m] width of median for a tree
 
@@ -35,7 +35,7 @@ def medians(lines: Iterable[Border], bridges: LevelLookup) -> Iterator[Shape]:
     for line, run in strips:
         # asphalt around the round ends
         yield from (Shape(piece, palette.ROAD) for piece in flat_strip(line, run))
-    for inset, colour in ((0.0, palette.MEDIAN_KERB), (_KERB, palette.MEDIAN)):
+    for inset, colour in ((0.0, palette.MEDIAN_KERB), (_MEDIAN_KERB, palette.MEDIAN)):
         for line, run in strips:
             yield from (Shape(quad, colour) for quad in _half_strip(line, run, inset))
     planted: list[Array] = []
@@ -96,7 +96,7 @@ def _median_trees(line: Border, run: NDArray[np.int64]) -> Iterator[tuple[Array,
     middle = line.shifted(-line.gap / 2.0)[run]
     s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))))
     for at in np.arange(_TREE_SPACING / 2.0, s[-1] - _TREE_SPACING / 2.0, _TREE_SPACING):
-        room = float(np.interp(at, s, line.gap[run])) - 2.0 * _KERB
+        room = float(np.interp(at, s, line.gap[run])) - 2.0 * _MEDIAN_KERB
         if room >= _TREE_ROOM:
             centre = np.array([np.interp(at, s, middle[:, 0]), np.interp(at, s, middle[:, 1])])
             yield centre, min(1.5, 0.4 * room)
@@ -104,14 +104,14 @@ def _median_trees(line: Border, run: NDArray[np.int64]) -> Iterator[tuple[Array,
 
 # --- Islands before turn lanes ---------------------------------------------------------------------------------------
 
-FACING = 9.0
+BACK_TO_BACK = 9.0
 """Largest distance between two turn lanes that open back to back [m]."""
 
 _TAPER = 8.0  # [m] over which the middle line crosses to the other side of the turn lane
 _SHARE = 0.3  # largest share of the turn lane for this
-_WIDE = 2.0  # [m] width at its beginning: a lane that widens from zero needs no taper
-_BACK = 3.0  # [m] of asphalt before the opening
-_AROUND = 0.7  # [m] of asphalt on both sides
+_WIDE_OPENING = 2.0  # [m] width at its beginning: a lane that widens from zero needs no taper
+_OPENING_BACK = 3.0  # [m] of asphalt before the opening
+_ISLAND_RIM = 0.7  # [m] of asphalt on both sides
 _OVERLAP = 0.2  # [m] of the lines of two adjoining islands
 _HATCH = 2.0  # [m] between bars
 _SLANT = 1.2  # [m]
@@ -144,7 +144,7 @@ def find_pockets(town: Town, borders: Borders) -> tuple[Pocket, ...]:
     for k, lane in enumerate(found):
         offset = starts[:, :2] - starts[k, :2]
         behind = -(offset @ np.array([np.cos(heading[k]), np.sin(heading[k])]))
-        other = (np.cos(heading - heading[k]) < -0.9) & (behind > 0.0) & (np.hypot(*offset.T) < FACING)
+        other = (np.cos(heading - heading[k]) < -0.9) & (behind > 0.0) & (np.hypot(*offset.T) < BACK_TO_BACK)
         back, aside = 0.0, 0.0
         if other.any():
             # the island lies midway between the two lanes, which are slightly offset
@@ -160,7 +160,7 @@ def _opens(town: Town, borders: Borders, lane: Lane) -> bool:
     if lane.in_junction or right is None or lane.id not in borders.divided or town.predecessors(lane.id):
         return False
     before = town.predecessors(right)
-    return bool(before) and not town.lanes[before[0]].in_junction and lane.width_at(0.0) > _WIDE
+    return bool(before) and not town.lanes[before[0]].in_junction and lane.width_at(0.0) > _WIDE_OPENING
 
 
 def pocket_places(town: Town, found: Sequence[Pocket]) -> Array:
@@ -173,8 +173,8 @@ def pocket_grounds(town: Town, found: Sequence[Pocket]) -> Iterator[Shape]:
     """Yields asphalt under the islands, without kerbs or gaps between the lanes around them."""
     for pocket in found:
         lane = town.lanes[pocket.lane]
-        half = lane.width_at(0.0) / 2.0 + _AROUND
-        corners = [(-max(_BACK, pocket.back + 0.2), -half), (-max(_BACK, pocket.back + 0.2), half)]
+        half = lane.width_at(0.0) / 2.0 + _ISLAND_RIM
+        corners = [(-max(_OPENING_BACK, pocket.back + 0.2), -half), (-max(_OPENING_BACK, pocket.back + 0.2), half)]
         yield Shape(_placed(lane, [*corners, (1.0, half), (1.0, -half)]), palette.ROAD)
 
 

@@ -10,15 +10,14 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.maps.model import NO_STREET, Array
-from dorothie_gym.rendering.borders import Border, BorderKind, Borders
+from dorothie_gym.rendering.borders import SAME_SURFACE, Border, BorderKind, Borders
 from dorothie_gym.rendering.medians import SHORTEST_MEDIAN
 from dorothie_gym.rendering.shapes import longer, polyline_length, polyline_stations, right_of
 
-_BROADEST = 45.0  # [m]
+_BROADEST_STREET = 45.0  # [m]
 _AHEAD = 1.5  # [m] largest longitudinal offset of points opposite each other
-_SAME_LEVEL = 1.5  # [m]
 _FEW = 6  # samples without a middle line, as where turn lanes begin back to back
-_CELL = 64  # nearest points to consider, which include those on the same kerb
+_NEAREST_POINTS = 64  # nearest points to consider, which include those on the same kerb
 _SMOOTHING = 9  # samples
 
 
@@ -69,7 +68,7 @@ class _Lines:
         if not len(self.place):
             return np.full(len(line.heading), np.inf), np.zeros(len(line.heading), dtype=np.int64)
         found = cKDTree(self.place[:, :2]).query(
-            line.points[:, :2], k=min(_CELL, len(self.place)), distance_upper_bound=_BROADEST
+            line.points[:, :2], k=min(_NEAREST_POINTS, len(self.place)), distance_upper_bound=_BROADEST_STREET
         )
         near, index = (np.reshape(row, (len(line.heading), -1)) for row in found)
         index = np.minimum(index, len(self.place) - 1)
@@ -78,7 +77,7 @@ class _Lines:
         ahead = offset[..., 0] * right[..., 1] - offset[..., 1] * right[..., 0]
         aside = -(offset[..., :2] * right).sum(axis=-1)
         turn = np.cos(self.heading[index] - line.heading[:, None])
-        fits = np.isfinite(near) & (np.abs(ahead) < _AHEAD) & (aside > 1.0) & (np.abs(offset[..., 2]) < _SAME_LEVEL)
+        fits = np.isfinite(near) & (np.abs(ahead) < _AHEAD) & (aside > 1.0) & (np.abs(offset[..., 2]) < SAME_SURFACE)
         fits &= (turn >= cosine[0]) & (turn <= cosine[1])
         width = np.where(fits, aside, np.inf)
         best = np.argmin(width, axis=1)
@@ -159,7 +158,7 @@ def _runs(line: Border, wanted: NDArray[np.bool_], width: Array) -> Iterator[Roa
 
 # --- Axes ------------------------------------------------------------------------------------------------------------
 
-_STEP = 5.0  # [px]
+_AXIS_STEP = 5.0  # [px]
 _WIDEST_JUNCTION = 50.0  # [m] that a label may span
 _STRAIGHT_ON = 0.3  # [rad]
 
@@ -239,7 +238,7 @@ def street_axes(borders: Borders, scale: float, origin: Array) -> list[Axis]:
 
 def _axis(street: int, pixels: Array, heading: Array, height: Array, room: Array, beside: bool = False) -> Axis | None:
     stations = polyline_stations(pixels)
-    count = int(stations[-1] // _STEP) + 1
+    count = int(stations[-1] // _AXIS_STEP) + 1
     if count < 4:
         return None
     s = np.linspace(0.0, stations[-1], count)
@@ -268,7 +267,7 @@ def across_junctions(axes: Sequence[Axis], scale: float) -> Iterator[Axis]:
 def _goes_on(a: Axis, b: Axis, scale: float) -> bool:
     between = b.line[0] - a.line[-1]
     gap = float(np.hypot(*between))
-    if not 2.0 * _STEP < gap < _WIDEST_JUNCTION * scale or abs(a.height[-1] - b.height[0]) > _SAME_LEVEL:
+    if not 2.0 * _AXIS_STEP < gap < _WIDEST_JUNCTION * scale or abs(a.height[-1] - b.height[0]) > SAME_SURFACE:
         return False
     way = np.arctan2(between[1], between[0])
     return bool(np.cos(np.array([a.heading[-1], b.heading[0]]) - way).min() > np.cos(_STRAIGHT_ON))

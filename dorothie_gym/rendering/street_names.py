@@ -35,7 +35,7 @@ class LabelClearance(enum.IntEnum):
 _NARROW = 0.4  # share of the width of a junction that counts on the third level
 _OTHER_ROAD = 1.5  # [m] between the heights of two crossing roads
 _ISLAND = 2.0  # [m] half the width of the hatching before a turn lane
-_CELL = 8  # nearest circles to consider
+_NEAREST_CIRCLES = 8  # nearest circles to consider
 
 
 class Obstacles:
@@ -99,7 +99,7 @@ class _Circles:
         """Returns the distance (n,) [px] to the nearest relevant circle."""
         if self._tree is None:
             return np.full(len(axis.line), np.inf)
-        found = self._tree.query(axis.line, k=min(_CELL, len(self._rows)))
+        found = self._tree.query(axis.line, k=min(_NEAREST_CIRCLES, len(self._rows)))
         distance, index = (np.reshape(row, (len(axis.line), -1)) for row in found)
         free = distance - self._rows[index, 2]
         if self._rows.shape[1] > 3:
@@ -141,7 +141,7 @@ _NAME_POINTS = 24
 _SHARES = (1.0, 0.85, 0.72, 0.6, 0.5, 0.42)  # of the largest font size
 _REPEATED = 0.8  # of the font size for repetitions with less room
 _TINY_FONT = 0.8  # of the smallest font size, instead of no label
-_ASIDE = 3.0  # [m] between the edge of the road and a label beside it: the pavement
+_LABEL_ASIDE = 3.0  # [m] between the edge of the road and a label beside it: the pavement
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -294,7 +294,9 @@ class LabelPlacer:
             (small, LabelClearance.FIXED_ALONE),
         ):
             more = font(size, bold=True).size(self.names[street])[0] * _LONGER / 2.0
-            axes = list(beside_axes(lines, street, self.scale, self.origin, _ASIDE * self.scale + _HALF * size, more))
+            axes = list(
+                beside_axes(lines, street, self.scale, self.origin, _LABEL_ASIDE * self.scale + _HALF * size, more)
+            )
             self._tell(axes)
             if self._set_on(axes, _Manner(size=size, level=level, forced=True), 0.0):
                 return True

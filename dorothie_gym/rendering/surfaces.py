@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from dorothie_gym.maps.model import Array, Lane, Site
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
-from dorothie_gym.rendering.borders import Border, BorderKind
+from dorothie_gym.rendering.borders import SAME_SURFACE, Border, BorderKind
 from dorothie_gym.rendering.ground import junction_areas
 from dorothie_gym.rendering.levels import LevelLookup, LevelStretch, cuttings
 from dorothie_gym.rendering.medians import Pocket, flat_strip, held, medians, pocket_grounds
@@ -33,7 +33,7 @@ from dorothie_gym.rendering.shapes import (
 )
 
 _LAID_BACK = 0.55  # [m] of slope per metre of depth
-_BROADEST = 3.0  # [m]
+_BROADEST_SLOPE = 3.0  # [m]
 _HACHURE = 2.4  # [m] between hachures
 _PORTAL = 0.9  # [m]
 _APRON = 4.0  # [m] of asphalt before a portal, where grass ends
@@ -49,7 +49,7 @@ def walls(lines: Iterable[Border], deep: LevelLookup, covered: LevelLookup) -> I
             continue
         beside = deep.hold(line.points) & ~covered.hold(line.points)
         depth = np.where(beside, -line.points[:, 2], 0.0)
-        top = line.shifted(-np.clip(_LAID_BACK * depth, 0.0, _BROADEST) - 0.3)
+        top = line.shifted(-np.clip(_LAID_BACK * depth, 0.0, _BROADEST_SLOPE) - 0.3)
         for run in _runs(beside):
             yield from _slope(line.points[run, :2], top[run])
 
@@ -158,12 +158,11 @@ _EDGE = 0.15  # [m]
 _WIDEST_WALK = 4.0  # [m] drawn at most: some maps mark whole squares as pavements
 _WIDEST_VERGE = 4.5  # [m]
 _CORNER = 6.0  # [m] between a junction and the pavements that continue around it
-_AROUND = 45  # [m] from the end of a pavement to the start of the next one
+_LONGEST_CORNER = 45  # [m] from the end of a pavement to the start of the next one
 _BESIDE = 0.1  # [m] between the edge of the road and a pavement
 _FROM_ARM = 16.0  # [m] from the end of an arm's pavement to the start of that of the ring
 _LARGEST_RING = 80.0  # [m] radius
 _LONGEST_ARC = 120.0  # [m] from arm to arm
-_SAME_LEVEL = 1.5  # [m]
 _JOINED = 4  # segments of an outline per polygon
 
 
@@ -211,7 +210,7 @@ def _corners(walks: Sequence[tuple[Array, float]], areas: Sequence[Array]) -> It
         near = near[np.argsort(where[near], kind="stable")]
         for k, after in zip(near.tolist(), np.roll(near, -1).tolist(), strict=True):
             count = int(where[after] - where[k]) % len(ring)
-            if 1 <= count <= _AROUND:
+            if 1 <= count <= _LONGEST_CORNER:
                 part = ring[np.arange(where[k], where[k] + count + 1) % len(ring)]
                 yield part, float((away + half)[[k, after]].mean())
 
@@ -228,7 +227,7 @@ def verges(town: Town, lines: Iterable[Border]) -> Iterator[Shape]:
         near, where = tree.query(line.points[:, :2])
         gap = near - half[where]
         outer = line.shifted(-np.clip(gap + 0.5, 0.0, _WIDEST_VERGE + 0.5))
-        beside = (gap < _WIDEST_VERGE) & (np.abs(places[where, 2] - line.points[:, 2]) < _SAME_LEVEL)
+        beside = (gap < _WIDEST_VERGE) & (np.abs(places[where, 2] - line.points[:, 2]) < SAME_SURFACE)
         for run in np.split(np.arange(len(gap)), np.flatnonzero(np.diff(beside.astype(int)) != 0) + 1):
             if beside[run[0]] and len(run) > 1:
                 for k in range(run[0], run[-1], 8):
@@ -244,14 +243,14 @@ def rim(outline: Array, margin: float, colour: Colour) -> Iterator[Shape]:
 
 # --- Streets and bridges ---------------------------------------------------------------------------------------------
 
-_KERB = 0.45  # [m]
+_ROAD_KERB = 0.45  # [m]
 _VERGE = 1.6  # [m] of fictional pavement beside the roads of a town without sidewalks
 _JOINT = 0.05  # [m]
 _BAY_DEPTH = 2.3  # [m]
 _BAY_LENGTH = 6.0  # [m] without its tapered ends
 _BAY_TAPER = 2.2  # [m]
 _BEFORE_PORTAL = 4.0  # [m] of asphalt between a median and the mouth of a tunnel
-_FURTHER = 6.0  # [m] of asphalt beyond a bridge: adjacent lanes begin theirs at different places
+BEYOND_BRIDGE = 6.0  # [m] of asphalt and paint beyond a bridge: adjacent lanes begin theirs at different places
 
 
 def streets(
@@ -281,7 +280,7 @@ def streets(
         yield from verges(town, lines)
     else:
         yield from _layer(town, pieces, areas, _VERGE, palette.SIDEWALK)
-    yield from _layer(town, pieces, areas, _KERB, palette.KERB)
+    yield from _layer(town, pieces, areas, _ROAD_KERB, palette.KERB)
     yield from _bays(town, samples)
     for outline in areas:
         yield Shape(outline, palette.ROAD)
@@ -294,7 +293,7 @@ def streets(
                 yield from (Shape(piece, palette.ROAD) for piece in strokes(middle[run], 1.0))
     yield from pocket_grounds(town, turn_lanes)
     # grass continues below the ends of bridges, which differ between adjacent lanes
-    shorter = [_longer(part, -_FURTHER) for part in parts if part.level > 0]
+    shorter = [_longer(part, -BEYOND_BRIDGE) for part in parts if part.level > 0]
     yield from medians(lines, LevelLookup(samples, [*shorter, *(_longer(part, _BEFORE_PORTAL) for part in tunnels)]))
     yield from portals(town, tunnels)
 
@@ -319,7 +318,7 @@ def deck(town: Town, parts: Sequence[LevelStretch], lines: Iterable[Border], pla
         (1.05, 0.0, palette.BRIDGE_EDGE),
         (0.75, 0.0, palette.BRIDGE_PARAPET),
         (0.25, 0.0, palette.KERB),
-        (0.05, _FURTHER, palette.ROAD),
+        (0.05, BEYOND_BRIDGE, palette.ROAD),
     )
     for margin, further, colour in layers:
         if colour == palette.KERB:
@@ -376,7 +375,7 @@ def _bays(town: Town, samples: TownSamples) -> Iterator[Shape]:
         near, where = tree.query(outline[2:-2])
         if (near < samples.half_width[where] + 0.2).any():
             continue
-        yield from (Shape(piece, palette.KERB) for piece in strokes(outline, 2.0 * _KERB))
+        yield from (Shape(piece, palette.KERB) for piece in strokes(outline, 2.0 * _ROAD_KERB))
         yield Shape(outline, palette.BAY)
 
 

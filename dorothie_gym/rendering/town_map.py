@@ -17,7 +17,7 @@ from dorothie_gym.rendering.ground import town_bounds
 from dorothie_gym.rendering.icons import lamp_colour, pin_icon, sign_icon, stamp
 from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.markings import ARROW_LENGTH, one_way_arrow, one_way_places, stop_bar
-from dorothie_gym.rendering.medians import FACING, pocket_places
+from dorothie_gym.rendering.medians import BACK_TO_BACK, pocket_places
 from dorothie_gym.rendering.shapes import Shape, longer, strokes
 from dorothie_gym.rendering.street_names import Label, LabelPlacer, covering
 from dorothie_gym.rendering.text import set_along, words
@@ -30,7 +30,7 @@ GROUND = 14.0
 """Margin of country around the outermost roads [m]."""
 
 _TILE = 1024  # [px] painted at once, so that large maps need little memory
-_BAR_LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000)
+BAR_LENGTHS = (10, 20, 50, 100, 200, 500, 1000, 2000)
 _SIGN = (4.2, 54)  # height of signs [m], and upper limit [px]
 _PIN = (2.9, 34)  # radius of pins [m], and upper limit [px]
 _NAME_GROUND = (0.25, 1.04)  # extra length and height of the plain road under a label, relative to the font size
@@ -216,7 +216,7 @@ class MapPainter:
         # two turn lanes back to back share one island
         islands = places[palette.HATCHING][:, 1]
         away = np.hypot(*(islands[:, None] - islands).transpose(2, 0, 1))
-        covered[palette.HATCHING] = ((away < FACING) & covered[palette.HATCHING]).any(axis=1)
+        covered[palette.HATCHING] = ((away < BACK_TO_BACK) & covered[palette.HATCHING]).any(axis=1)
         trees = {colour: cKDTree(at.mean(axis=1)) for colour, at in places.items() if len(at)}
         dashes = [shape for shape in plan.shapes if shape.colour == palette.LANE_LINE]
         ends = [[shape.points.min(axis=0), shape.points.max(axis=0)] for shape in dashes]
@@ -334,7 +334,7 @@ def draw_scale_bar(surface: pygame.Surface, scale: float, corner: tuple[int, int
     """Draws a scale bar for a `scale` [px/m] with its lower left corner at a pixel, and a north arrow."""
     import pygame
 
-    metres = max((n for n in _BAR_LENGTHS if n * scale <= longest), default=_BAR_LENGTHS[0])
+    metres = max((n for n in BAR_LENGTHS if n * scale <= longest), default=BAR_LENGTHS[0])
     length = round(metres * scale)
     x, y = corner
     text = words(f"{metres} m" if metres < 1000 else f"{metres // 1000} km", 13, palette.INK)

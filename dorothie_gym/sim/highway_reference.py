@@ -19,7 +19,7 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays
 POINTS_APART = 2.0
 """Distance of the points of a lane that is not straight [m]."""
 
-STRAIGHT = 0.02
+LARGEST_STRAIGHT_TURN = 0.02
 """A lane whose heading changes by less is taken as straight [rad]."""
 
 INTERSECTION = "intersection-v0"
@@ -56,7 +56,7 @@ def stock_road(network: TownNetwork, world: WorldArrays) -> Road:
 
 def stock_lane(lane: Lane) -> StraightLane | PolyLaneFixedWidth:
     """Returns a straight lane, or one through points 2 m apart."""
-    if float(np.ptp(lane.headings)) < STRAIGHT:
+    if float(np.ptp(lane.headings)) < LARGEST_STRAIGHT_TURN:
         return StraightLane(lane.points[0, :2], lane.points[-1, :2], speed_limit=lane.speed_limit)
     stations = np.linspace(0.0, lane.length, max(int(lane.length / POINTS_APART) + 1, 3))
     points = [tuple(lane.position(float(station))) for station in stations]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.maps import load_town
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.network.network import FARTHEST, TownNetwork
+from dorothie_gym.sim.network.network import LARGEST_COORDINATE, TownNetwork
 from dorothie_gym.sim.population import free_places, populate
 from dorothie_gym.sim.road import CompiledRoad
 from dorothie_gym.sim.state.codes import Kind, Walk
@@ -295,7 +295,7 @@ class TownEnv(AbstractEnv):
         return np.array((*vehicle.position, vehicle.heading, vehicle.speed))
 
     def define_spaces(self) -> None:
-        """Sets the spaces, with the finite bounds `FARTHEST`, which all values in a town keep."""
+        """Sets the spaces, with the finite bounds `LARGEST_COORDINATE`, which all values in a town keep."""
         super().define_spaces()
         use_faster_observations(self.observation_type)
         self.observation_space = finite(self.observation_space)
@@ -366,6 +366,9 @@ def finite(space: spaces.Space[object]) -> spaces.Space[object]:
     if isinstance(space, spaces.Tuple):
         return spaces.Tuple([finite(part) for part in space])
     if isinstance(space, spaces.Box) and space.dtype != np.uint8:
-        low, high = np.clip(space.low, -FARTHEST, FARTHEST), np.clip(space.high, -FARTHEST, FARTHEST)
+        low, high = (
+            np.clip(space.low, -LARGEST_COORDINATE, LARGEST_COORDINATE),
+            np.clip(space.high, -LARGEST_COORDINATE, LARGEST_COORDINATE),
+        )
         return spaces.Box(low, high, dtype=space.dtype.type)
     return space

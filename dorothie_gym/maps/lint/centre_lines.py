@@ -22,7 +22,7 @@ MAX_STEP = 0.05
 MAX_KINK = math.radians(5.0)
 """Largest sudden change of direction [rad]; a requirement of all towns."""
 
-_SLACK = 1e-9
+_ROUNDING = 1e-9
 """Tolerance for rounding [m or rad]."""
 
 
@@ -36,14 +36,14 @@ def continuity_faults(town: Town) -> Iterator[Fault]:
         lanes, position = (source.id, target.id), (float(x), float(y))
         pair = f"lane {target.id} begins"
         gap = math.hypot(u - x, v - y)
-        if gap > MAX_LINK_GAP + _SLACK:
+        if gap > MAX_LINK_GAP + _ROUNDING:
             message = f"{pair} {gap:.2f} m from the end of lane {source.id}"
             yield Fault(kind=FaultKind.GAP, lanes=lanes, position=position, message=message)
-        if abs(w - z) > MAX_STEP + _SLACK:
+        if abs(w - z) > MAX_STEP + _ROUNDING:
             message = f"{pair} {abs(w - z):.2f} m {'above' if w > z else 'below'} the end of lane {source.id}"
             yield Fault(kind=FaultKind.HEIGHT_STEP, lanes=lanes, position=position, message=message)
         turn = math.remainder(float(target.headings[0] - source.headings[-1]), math.tau)
-        if abs(turn) > MAX_KINK + _SLACK:
+        if abs(turn) > MAX_KINK + _ROUNDING:
             side = "right" if turn > 0 else "left"
             message = f"{pair} {math.degrees(abs(turn)):.1f} degrees to the {side} of the end of lane {source.id}"
             yield Fault(kind=FaultKind.KINK, lanes=lanes, position=position, message=message)

@@ -22,7 +22,7 @@ SHORTEST_OVERLAP = 2.0
 MIN_CLEARANCE = 4.0
 """Smallest headroom under a crossing lane [m]: the largest height of lorries in Europe."""
 
-JOINT = 5.0
+LINK_REACH = 5.0
 """Distance from their ends within which successive lanes are not compared [m]."""
 
 
@@ -95,10 +95,10 @@ def _fork_or_join(town: Town, lane: int, other: int) -> bool:
 
 
 def _at_ends(samples: LaneSamples, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Returns which samples lie less than `JOINT` from an end of their lane."""
+    """Returns which samples lie less than `LINK_REACH` from an end of their lane."""
     owner = samples.owner[rows]
     place = np.minimum(rows - samples.first[owner], samples.first[owner + 1] - 1 - rows)
-    at_ends: NDArray[np.bool_] = place * SAMPLE_SPACING < JOINT
+    at_ends: NDArray[np.bool_] = place * SAMPLE_SPACING < LINK_REACH
     return at_ends
 
 

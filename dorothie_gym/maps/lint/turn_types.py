@@ -16,7 +16,7 @@ WRONG_WAY = 10.0
 """Largest angle of a left turn to the right, or of a right turn to the left [degrees]: the branches of a fork that are
 both almost straight are called left and right."""
 
-STRAIGHT_BELOW = 50.0
+LARGEST_STRAIGHT = 50.0
 """Largest angle of a straight movement [degrees]; towns use 35 degrees, human judgement varies."""
 
 U_TURN_FROM = 120.0
@@ -59,7 +59,7 @@ def _turn(town: Town, link: LaneLink) -> Iterator[Fault]:
 def _fits(kind: LinkType, angle: float) -> bool:
     """Returns whether a type fits a turn by an angle [degrees], positive left."""
     if kind is LinkType.STRAIGHT:
-        return abs(angle) < STRAIGHT_BELOW
+        return abs(angle) < LARGEST_STRAIGHT
     if kind is LinkType.U_TURN:
         return abs(angle) >= U_TURN_FROM
     return (angle if kind is LinkType.LEFT else -angle) >= -WRONG_WAY

@@ -9,7 +9,7 @@ import numpy as np
 
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.opendrive.records import SIDEWALK, OpenDriveRecords, RoadRecord
+from dorothie_gym.maps.opendrive.records import SIDEWALK_TYPES, OpenDriveRecords, RoadRecord
 from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
 
 # Sampling distance in the file [m]: chords of a 5 m radius deviate by 1.6 mm.
@@ -21,7 +21,7 @@ _LONGEST_STEP, _LONGEST_CURVE_STEP, _SHORTEST_STEP = 20.0, 2.0, 0.25
 # Target for the distance between chord and arc [m]; together with the sampling error it stays below 1 cm.
 _CHORD_ERROR = 0.005
 # Curvature below which a lane counts as straight [1/m]: 20 m of it bend by 5 mm.
-_STRAIGHT = 1e-4
+_STRAIGHT_CURVATURE = 1e-4
 # Largest gap between linked lanes that is closed [m]; larger gaps are not rounding errors, remain as they are, and
 # are reported by `lint`. CARLA's maps need 2 mm.
 _LARGEST_STITCH = 0.05
@@ -163,7 +163,7 @@ def _lateral_places(
         for number in sorted((n for n in lanes if n * side > 0), key=abs):
             lane = lanes[number]
             width = lane.width.at(ds, pick) if lane.border is None else side * (lane.border.at(ds, pick) - edge)
-            if lane.drives or lane.type in SIDEWALK:
+            if lane.drives or lane.type in SIDEWALK_TYPES:
                 places[number] = (edge + 0.5 * side * width, width)
             edge = edge + side * width
     return places
@@ -180,7 +180,7 @@ def thin(line: Array) -> Array:
     bend = np.diff(_at(grid, station, line), n=2, axis=0) / h**2  # (count - 1, 4) second derivatives
     curvature = np.hypot(bend[:, 0], bend[:, 1])
     sharpest = np.max(np.column_stack((curvature, np.abs(bend[:, 2:]))), axis=1)
-    longest = np.where(curvature > _STRAIGHT, _LONGEST_CURVE_STEP, _LONGEST_STEP)
+    longest = np.where(curvature > _STRAIGHT_CURVATURE, _LONGEST_CURVE_STEP, _LONGEST_STEP)
     spacing = np.clip(np.sqrt(8.0 * _CHORD_ERROR / np.maximum(sharpest, 1e-9)), _SHORTEST_STEP, longest)
     spacing = np.concatenate((spacing[:1], np.minimum(spacing[:-1], spacing[1:]), spacing[-1:]))  # (count,) intervals
     points = np.concatenate(([0.0], np.cumsum(h / spacing)))  # how many points until here

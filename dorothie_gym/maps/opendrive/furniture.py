@@ -11,7 +11,13 @@ import numpy as np
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import NO_STREET, Array, Crosswalk, Lane, Sidewalk, Signal, SignalKind
 from dorothie_gym.maps.opendrive.centrelines import RoadSamples, thin
-from dorothie_gym.maps.opendrive.records import SIDEWALK, CrosswalkRecord, OpenDriveRecords, RoadRecord, SignalRecord
+from dorothie_gym.maps.opendrive.records import (
+    SIDEWALK_TYPES,
+    CrosswalkRecord,
+    OpenDriveRecords,
+    RoadRecord,
+    SignalRecord,
+)
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, runs_forward
 
 # Signal types in CARLA's maps: lights as in OpenDRIVE 1.4, annex, signs by their numbers in German law.
@@ -27,7 +33,7 @@ SIGNAL_TYPES = {
 _CONTROLS = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
 
 # Largest distance of a light or sign to its junction, across ends of lanes [m].
-_FARTHEST = 50.0
+_FARTHEST_LANE = 50.0
 
 # A signal nearer to the start of its lane, and farther than this from its end, is the far-side signal of a junction
 # behind it [m].
@@ -112,7 +118,7 @@ class _Ways:
     def _last_before_junction(self, lane: int) -> int:
         """Returns the last lane before the next junction, if it is near and the only continuation."""
         way, further = lane, 0.0
-        while further <= _FARTHEST:
+        while further <= _FARTHEST_LANE:
             onward = self._after[way]
             if any(self._lanes[k].in_junction for k in onward):
                 return way
@@ -173,10 +179,10 @@ def _outline(road: RoadRecord, crossing: CrosswalkRecord) -> np.ndarray[tuple[in
 # --- Sidewalks -------------------------------------------------------------------------------------------------------
 
 # Narrowest sidewalk [m].
-NARROWEST = 0.5
+NARROWEST_SIDEWALK = 0.5
 
 # Shortest sidewalk [m].
-SHORTEST = 1.0
+SHORTEST_SIDEWALK = 1.0
 
 # Largest jump of a middle line from one sample to the next [m].
 LARGEST_JUMP = 2.0
@@ -218,7 +224,7 @@ def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[A
     for k, section in enumerate(road.sections):
         begun = []
         for number, lane in sorted(section.lanes.items()):
-            if lane.type in SIDEWALK and (number > 0) == left:
+            if lane.type in SIDEWALK_TYPES and (number > 0) == left:
                 for line in _wide_parts(samples.line([(k, number)])):
                     before = next((j for j, other in enumerate(open_) if _gap(other[-1], line[0]) < TOUCHING), None)
                     begun.append(line if before is None else np.concatenate((open_.pop(before), line)))
@@ -229,10 +235,10 @@ def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[A
 
 def _wide_parts(line: Array) -> list[Array]:
     """Returns the parts of a middle line with sufficient width, split at jumps in the profiles."""
-    wide = line[:, 3] >= NARROWEST
+    wide = line[:, 3] >= NARROWEST_SIDEWALK
     step = np.hypot(*np.diff(line[:, :2], axis=0).T)
     edges = np.flatnonzero(np.diff(wide) | (step > LARGEST_JUMP)) + 1
-    return [part for part in np.split(line, edges) if part[0, 3] >= NARROWEST]
+    return [part for part in np.split(line, edges) if part[0, 3] >= NARROWEST_SIDEWALK]
 
 
 def _gap(a: Array, b: Array) -> float:
@@ -241,5 +247,5 @@ def _gap(a: Array, b: Array) -> float:
 
 def _finished(lines: list[Array]) -> Iterator[Array]:
     for line in lines:
-        if float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum()) >= SHORTEST:
+        if float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum()) >= SHORTEST_SIDEWALK:
             yield thin(line)

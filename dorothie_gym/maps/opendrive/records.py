@@ -9,7 +9,7 @@ import numpy as np
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.geometry import Cubics, ReferenceLine
 
-DRIVING = frozenset(
+DRIVING_TYPES = frozenset(
     ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "mwyEntry", "mwyExit")
 )
 """One-way lane types for all cars: "driving", and the lane types of ramps.
@@ -17,7 +17,7 @@ DRIVING = frozenset(
 Excluded are "bidirectional" (a central turn lane for both directions) and lanes for buses, taxis or parking.
 """
 
-SIDEWALK = frozenset(("sidewalk", "walking"))
+SIDEWALK_TYPES = frozenset(("sidewalk", "walking"))
 """Lane types of sidewalks; the second is the name in OpenDRIVE 1.8."""
 
 
@@ -49,7 +49,7 @@ class LaneRecord:
     @property
     def drives(self) -> bool:
         """Whether it is a lane for cars."""
-        return self.type in DRIVING
+        return self.type in DRIVING_TYPES
 
     @property
     def is_closed(self) -> bool:

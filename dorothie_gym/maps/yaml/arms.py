@@ -163,7 +163,7 @@ class Approach:
 
 SMALLEST_ANGLE, LARGEST_ANGLE = math.radians(12.0), math.radians(45.0)
 """Range of angles at which a ramp leaves and joins [rad]; at larger angles it meets a junction like any street."""
-_STRAIGHT_ON = math.radians(35.0)
+_STRAIGHT_ON_ANGLE = math.radians(35.0)
 
 
 def find_slips(crossing: Crossing, arms: Sequence[Arm]) -> Mapping[int, int]:
@@ -201,7 +201,7 @@ def _partner(crossing: Crossing, arms: Sequence[Arm], ramp: Arm, host: Arm) -> i
     else:
         ways = [(abs(turn_between(host, arm)), arm.index) for arm in others if arm.outgoing and host.incoming]
         verb, way = "joins", "that street does not go on straight"
-    if not ways or min(ways)[0] > _STRAIGHT_ON:
+    if not ways or min(ways)[0] > _STRAIGHT_ON_ANGLE:
         ramp.street.entry.fail(
             f"the ramp {verb} {host.street.name!r} at {crossing.name!r}, but {way} on this side; ramps leave and"
             " join on the right of a street that runs straight through the junction"

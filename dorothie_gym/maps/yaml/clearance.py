@@ -21,7 +21,7 @@ Indices: TypeAlias = NDArray[np.int64]
 
 HEADROOM = 4.5
 """Smallest difference of height of streets that pass above each other [m]."""
-_SPACING = 2.0
+_CLEARANCE_SPACING = 2.0
 """Sampling distance [m]."""
 _SLACK = 0.5
 """Permitted overlap of the edges of roads [m]: the error of a sample half a step aside is smaller."""
@@ -176,7 +176,7 @@ def _samples(
 
     for k, (segment, centreline) in enumerate(zip(segments, centrelines, strict=True)):
         section = segment.section
-        places, along = centreline.path.every(_SPACING, (section.right - section.left) / 2.0)
+        places, along = centreline.path.every(_CLEARANCE_SPACING, (section.right - section.left) / 2.0)
         half = (section.right + section.left) / 2.0
         add(places, along, centreline.heights.at(along), half=half, pavement=segment.street.sidewalk, owner=k)
     for k, crossing in enumerate(crossings, start=len(segments)):
@@ -184,7 +184,7 @@ def _samples(
         height = np.full(1, crossing.height)
         add(np.array([crossing.centre]), np.zeros(1), height, half=half, pavement=0.0, owner=k)
         for way in ways[crossing.id]:
-            places, along = way.path.every(_SPACING)
+            places, along = way.path.every(_CLEARANCE_SPACING)
             half = way.movement.target.street.width / 2.0
             add(places, along, np.full(len(places), crossing.height), half=half, pavement=0.0, owner=k)
     table = np.concatenate(rows)

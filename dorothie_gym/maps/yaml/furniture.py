@@ -229,7 +229,7 @@ def _greens(plan: LightsPlan, phase: GreenPlan, heads: Sequence[_Head]) -> tuple
 
 FARTHEST_SITE = 25.0
 """Largest distance of a landmark from its lane at the kerb [m]."""
-_SPACING = 1.0
+_SITE_SPACING = 1.0
 """Sampling distance on lanes [m]."""
 _STOP_ROOM = 1.0
 """Smallest distance of a waypoint from the ends of its lane [m]."""
@@ -243,7 +243,7 @@ def place_sites(places: Sequence[tuple[Point, YamlEntry]], lanes: Sequence[Lane]
     """
     points, owner = [], []
     for lane in lanes:
-        stations = np.linspace(0.0, lane.length, max(2, int(lane.length / _SPACING) + 2))
+        stations = np.linspace(0.0, lane.length, max(2, int(lane.length / _SITE_SPACING) + 2))
         points.append(np.column_stack([np.interp(stations, lane.stations, lane.points[:, k]) for k in (0, 1)]))
         owner.append(np.full(len(stations), lane.id))
     tree, owners = cKDTree(np.concatenate(points)), np.concatenate(owner)

@@ -105,7 +105,7 @@ class _Nodes:
 LaneIndex: TypeAlias = tuple[str, str, int]
 Route: TypeAlias = list[tuple[str, str, int | None]]
 
-FARTHEST = 1e9
+LARGEST_COORDINATE = 1e9
 """Coordinate beyond which, as for NaN, highway-env's scan replaces the index, whose bounds rounding invalidates [m]."""
 
 
@@ -184,7 +184,11 @@ class TownNetwork(RoadNetwork):
             The index with the least `distance_with_heading`; the first one in the graph's order of several.
         """
         x, y = float(position[0]), float(position[1])
-        if abs(x) < FARTHEST and abs(y) < FARTHEST and (heading is None or abs(heading) < FARTHEST):
+        if (
+            abs(x) < LARGEST_COORDINATE
+            and abs(y) < LARGEST_COORDINATE
+            and (heading is None or abs(heading) < LARGEST_COORDINATE)
+        ):
             return self._indexes[self._grid.closest(x, y, heading, height)]
         found: LaneIndex = super().get_closest_lane_index(position, heading)
         return found
