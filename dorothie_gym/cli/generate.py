@@ -93,7 +93,8 @@ def _facts(made: Generated, seed: int, wall: float) -> dict[str, Any]:
 
     folds: dict[str, int] = {}
     for row in made.rows:
-        folds[row["fold"]] = folds.get(row["fold"], 0) + 1
+        fold = str(row["fold"])
+        folds[fold] = folds.get(fold, 0) + 1
     return {
         "out": str(made.root),
         "sessions": len(made.rows),

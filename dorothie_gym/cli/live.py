@@ -15,8 +15,10 @@ from rich.table import Table
 from rich.text import Text
 
 from dorothie_gym.engine.session_engine import LiveSession, SessionEngine
-from dorothie_gym.ontology import GoalStatus, Role, parse_act
+from dorothie_gym.ontology import GoalStatus, Role
 from dorothie_gym.recording import Event, EventType
+from dorothie_gym.recording.events import move_record
+from dorothie_gym.recording.json_io import Fields
 from dorothie_gym.tasks import TaskState
 
 SPEAKERS: Mapping[Role, tuple[str, str]] = {
@@ -59,18 +61,19 @@ def script_lines(events: Iterable[Event], task: Callable[[int], str]) -> list[Sc
     for event in events:
         if event.type is not EventType.DIALOGUE_MOVE:
             if event.type is EventType.SUBGOAL:
-                text, style = _subgoal(event.data, task(event.data["subgoal"]))
+                text, style = _subgoal(event.data, task(Fields(event.data, "event").integer("subgoal")))
                 lines.append(ScriptLine(time=event.time, speaker=event.source, text=text, style=style))
             elif (describe := _DESCRIBED.get(event.type)) is not None:
                 text, style = describe(event.data)
                 lines.append(ScriptLine(time=event.time, speaker=event.source, text=text, style=style))
             continue
-        act = str(parse_act(event.data["move"], event.data["slots"])).removesuffix("()")
-        if event.data["utterance"] == last:  # a further act of the words that stand there already
+        move = move_record(event, -1)
+        act = str(move.act).removesuffix("()")
+        if move.utterance == last:  # a further act of the words that stand there already
             before = lines.pop()
             act = f"{before.acts} {act}"
-        last = event.data["utterance"]
-        lines.append(ScriptLine(time=event.time, speaker=event.source, text=event.data["text"], acts=act))
+        last = move.utterance
+        lines.append(ScriptLine(time=event.time, speaker=event.source, text=move.text, acts=act))
     return lines
 
 

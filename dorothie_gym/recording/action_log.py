@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import AGENT_ROLES, Role
@@ -28,7 +28,7 @@ class Decision:
     """
 
     frame: int
-    actions: Mapping[Role, Mapping[str, Any]]
+    actions: Mapping[Role, Mapping[str, object]]
 
 
 def encode_decision(decision: Decision) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Self
+from typing import Final, Self, TypedDict
 
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.files import write_atomically
@@ -337,7 +337,20 @@ MANIFEST_FILE: Final = "manifest.json"
 MANIFEST_VERSION: Final = "1.0"
 
 
-def manifest_row(session: Session, folder: Path, root: Path) -> dict[str, Any]:
+class ManifestRow(TypedDict):
+    """Session in a manifest: path within the corpus, fold, town, seed, counts, and SHA-256 of its content."""
+
+    path: str
+    fold: str | None
+    town: str
+    seed: int | None
+    complete: bool
+    events: int
+    frames: int
+    sha256: str
+
+
+def manifest_row(session: Session, folder: Path, root: Path) -> ManifestRow:
     """Returns the manifest row of a session: path within the corpus, fold, town, counts, hash of its content.
 
     Args:
@@ -358,7 +371,7 @@ def manifest_row(session: Session, folder: Path, root: Path) -> dict[str, Any]:
     }
 
 
-def write_manifest(root: Path, rows: Sequence[Mapping[str, object]]) -> Path:
+def write_manifest(root: Path, rows: Sequence[ManifestRow]) -> Path:
     """Writes the manifest of a corpus, rows sorted by path, with a hash of all rows.
 
     Returns:
@@ -367,7 +380,7 @@ def write_manifest(root: Path, rows: Sequence[Mapping[str, object]]) -> Path:
     Raises:
         OSError: it cannot be written.
     """
-    ordered = sorted(rows, key=lambda row: str(row["path"]))
+    ordered = sorted(rows, key=lambda row: row["path"])
     page = {"version": MANIFEST_VERSION, "sha256": _digest(ordered), "sessions": [dict(row) for row in ordered]}
     write_atomically(root / MANIFEST_FILE, to_page(page))
     return root / MANIFEST_FILE

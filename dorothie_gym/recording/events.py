@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 from dorothie_gym.errors import OntologyError, SessionError, short_repr
 from dorothie_gym.ontology import DialogueAct, ObjectClass, PhysicalAction, Role, parse_act, parse_physical_action
 from dorothie_gym.recording.file_names import MAX_FRAME
-from dorothie_gym.recording.json_io import Fields, canonical, from_line, to_line
+from dorothie_gym.recording.json_io import Fields, canonical, canonical_object, from_line, to_line
 from dorothie_gym.sim.config import FRAME_RATE
 
 
@@ -82,8 +82,8 @@ class Event:
     type: EventType
     source: Role
     flagged: bool = False
-    data: Mapping[str, Any] = field(default_factory=dict)
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    data: Mapping[str, object] = field(default_factory=dict)
+    extra: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def type_name(self) -> str:
@@ -294,20 +294,18 @@ def check_event(event: Event, where: str = "event") -> None:
 
 
 def _act(data: Fields) -> DialogueAct:
-    slots = data.mapping("slots")
-    for slot, values in slots.items():
+    slots: dict[str, Sequence[str]] = {}
+    for slot, values in data.mapping("slots").items():
         if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values):
             raise SessionError(
                 f"{data.where}: field 'slots.{slot}' is {short_repr(values)}; it must be a list of texts"
             )
-    return _parse(data.text("move"), slots, data.where)
-
-
-def _parse(move: str, slots: Mapping[str, Any], where: str) -> DialogueAct:
+        slots[slot] = values
+    move = data.text("move")
     try:
         return parse_act(move, slots)
     except OntologyError as error:
-        raise SessionError(f"{where}: fields 'move' and 'slots': {error}") from None
+        raise SessionError(f"{data.where}: fields 'move' and 'slots': {error}") from None
 
 
 # --- Encoding as one line of `events.jsonl` ---------------------------------------------------------------------------
@@ -330,7 +328,7 @@ def encode_event(event: Event, *, check: bool = True) -> str:
         SessionError: its data does not match its type or cannot be written; the message names the field.
     """
     where = f"event {event.type.value} at frame {event.frame}"
-    extra = canonical(event.extra, f"{where}: extra")
+    extra = canonical_object(event.extra, f"{where}: extra")
     values = {
         "frame": canonical(event.frame, f"{where}: frame"),
         "type": event.type_name,

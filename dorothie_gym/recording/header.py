@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, NotRequired, TypedDict
+from typing import Final, NotRequired, TypedDict
 
 from dorothie_gym import __version__
 from dorothie_gym.errors import SessionError, short_repr
+from dorothie_gym.files import JsonValue
 from dorothie_gym.ontology import OntologyError, parse_landmark, parse_street
-from dorothie_gym.recording.json_io import Fields, canonical
+from dorothie_gym.recording.json_io import Fields, canonical, canonical_object
 from dorothie_gym.recording.trajectory import NO_LANE
 
 FORMAT_VERSION: Final = "2.0"
@@ -120,15 +121,15 @@ class SessionHeader:
     subgoals: Sequence[SubgoalRow]
     story: str
     departure: tuple[int, float]
-    config: Mapping[str, Any] = field(default_factory=dict)
+    config: Mapping[str, object] = field(default_factory=dict)
     format_version: str = FORMAT_VERSION
     package_version: str = __version__
     source: str = NATIVE
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Checks the fields and turns sequences into tuples, so that a header equals the one read back."""
-        plain = Fields(canonical({name: getattr(self, name) for name in (*_NAMES, "extra")}, "header"), "header")
+        plain = Fields(canonical_object({name: getattr(self, name) for name in (*_NAMES, "extra")}, "header"), "header")
         parse_version(plain.text("format_version"), plain.where)
         for name in ("town", "storyboard", "story", "package_version", "source"):
             plain.text(name)
@@ -146,11 +147,11 @@ class SessionHeader:
         if clash:
             raise SessionError(f"{plain.where}: extra has {clash[0]!r}, which is a field of its own")
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, JsonValue]:
         """Returns the header in JSON types, fields in a fixed order."""
-        fields: dict[str, object] = {name: canonical(getattr(self, name), f"header.{name}") for name in _NAMES}
+        fields = {name: canonical(getattr(self, name), f"header.{name}") for name in _NAMES}
         lane, station = self.departure
-        extra = canonical(self.extra, "header.extra")
+        extra = canonical_object(self.extra, "header.extra")
         return {**fields, "departure": {"lane": lane, "station": station}, **extra}
 
     @classmethod

@@ -13,13 +13,14 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from dorothie_gym.errors import SessionError, short_repr
+from dorothie_gym.files import JsonValue
 from dorothie_gym.recording.file_names import MAX_TEXT_FILE
 
 MAX_DEPTH: Final = 40
 """Deepest nesting of a session's values."""
 
 
-def canonical(value: object, where: str, depth: int = MAX_DEPTH) -> Any:
+def canonical(value: object, where: str, depth: int = MAX_DEPTH) -> JsonValue:
     """Returns `value` in plain JSON types: mappings as dicts with sorted keys, tuples as lists, numpy as Python.
 
     Args:
@@ -46,7 +47,7 @@ def canonical(value: object, where: str, depth: int = MAX_DEPTH) -> Any:
     if depth == 0:
         raise SessionError(f"{where[:80]}... is nested more than {MAX_DEPTH} levels deep")
     if isinstance(value, Mapping):
-        return _canonical_mapping(value, where, depth - 1)
+        return canonical_object(value, where, depth - 1)
     if isinstance(value, list | tuple):
         return [canonical(item, f"{where}[{index}]", depth - 1) for index, item in enumerate(value)]
     raise SessionError(f"{where} is a {type(value).__name__}; a session holds JSON types only")
@@ -62,7 +63,8 @@ def _canonical_text(value: str, where: str) -> str:
     return str(value)  # a member of a StrEnum becomes its text
 
 
-def _canonical_mapping(value: Mapping[Any, object], where: str, depth: int) -> dict[str, Any]:
+def canonical_object(value: Mapping[str, object], where: str, depth: int = MAX_DEPTH - 1) -> dict[str, JsonValue]:
+    """Returns a mapping in plain JSON types; see `canonical`."""
     for key in value:
         if not isinstance(key, str):
             raise SessionError(f"{where} has the key {key!r}; keys must be texts")
@@ -79,7 +81,7 @@ def to_page(value: object) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
 
 
-def from_line(text: str, where: str) -> dict[str, Any]:
+def from_line(text: str, where: str) -> dict[str, JsonValue]:
     """Returns the JSON object of a text.
 
     Raises:
@@ -182,7 +184,7 @@ class Fields:
             raise self.error(name, "true or false")
         return value
 
-    def mapping(self, name: str) -> Mapping[str, Any]:
+    def mapping(self, name: str) -> Mapping[str, object]:
         """Returns an object."""
         value = self.anything(name)
         if not isinstance(value, Mapping):
@@ -222,7 +224,7 @@ class Fields:
         """Returns None if the field is missing or null, else the result of `read`."""
         return read(name) if self._values.get(name) is not None else None
 
-    def others(self, known: Collection[str]) -> dict[str, Any]:
+    def others(self, known: Collection[str]) -> dict[str, object]:
         """Returns the fields with other names."""
         return {name: value for name, value in self._values.items() if name not in known}
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +83,7 @@ class Session:
     header: SessionHeader
     events: tuple[Event, ...]
     trajectory: Trajectory
-    summary: Mapping[str, Any] | None = None
+    summary: Mapping[str, object] | None = None
     complete: bool = True
     name: str = ""
     scene: Surroundings = field(default_factory=Surroundings)
@@ -236,7 +235,7 @@ class SessionFile:
     """
 
     header: SessionHeader
-    outcome: Mapping[str, Any] | None = None
+    outcome: Mapping[str, object] | None = None
     events: int = 0
     frames: int = 0
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, Self, TypeAlias
+from functools import partial
+from typing import Final, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from dorothie_gym.ontology import WeatherParameter
 
 Rows: TypeAlias = NDArray[np.void]
 """Structured array."""
+
+ActorColumns: TypeAlias = Mapping[str, NDArray[np.generic] | Sequence[float | str]]
+"""Columns of `ACTOR_DTYPE` by name; kinds may be names."""
 
 
 class ActorKind(enum.IntEnum):
@@ -99,10 +103,6 @@ class SceneTable:
         )
 
 
-def _nothing(dtype: np.dtype[np.void]) -> Any:
-    return field(default_factory=lambda: SceneTable.empty(dtype))
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Surroundings:
     """Surroundings of the car; each table may be empty.
@@ -115,9 +115,9 @@ class Surroundings:
             another corpus (`road_id`, `lane_id`, `junction_id`).
     """
 
-    actors: SceneTable = _nothing(ACTOR_DTYPE)
-    lights: SceneTable = _nothing(LIGHT_DTYPE)
-    weather: SceneTable = _nothing(WEATHER_DTYPE)
+    actors: SceneTable = field(default_factory=partial(SceneTable.empty, ACTOR_DTYPE))
+    lights: SceneTable = field(default_factory=partial(SceneTable.empty, LIGHT_DTYPE))
+    weather: SceneTable = field(default_factory=partial(SceneTable.empty, WEATHER_DTYPE))
     columns: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
 
     def at_frames(self, frames: NDArray[np.int64]) -> Surroundings:
@@ -139,7 +139,7 @@ class Surroundings:
         )
 
 
-def actor_rows(actors: Rows | Mapping[str, Any]) -> Rows:
+def actor_rows(actors: Rows | ActorColumns) -> Rows:
     """Returns actors as rows of `ACTOR_DTYPE`.
 
     Args:
@@ -163,7 +163,7 @@ def actor_rows(actors: Rows | Mapping[str, Any]) -> Rows:
     return actors
 
 
-def _from_columns(columns: Mapping[str, Any]) -> Rows:
+def _from_columns(columns: ActorColumns) -> Rows:
     if set(columns) != set(_ACTOR_COLUMNS):
         raise SessionError(f"actors have the columns {', '.join(columns)}; they must be {', '.join(_ACTOR_COLUMNS)}")
     rows = np.empty(len(columns["key"]), dtype=ACTOR_DTYPE)
@@ -176,7 +176,7 @@ def _from_columns(columns: Mapping[str, Any]) -> Rows:
     return rows
 
 
-def _kind(kind: ActorKind | int | str) -> int:
+def _kind(kind: float | str) -> int:
     if isinstance(kind, str):
         if kind.upper() not in ActorKind.__members__:
             known = ", ".join(member.name.lower() for member in ActorKind)

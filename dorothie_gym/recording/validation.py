@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final, TypedDict
 
 import numpy as np
 
@@ -101,6 +101,16 @@ MAX_REPORTED_NAMES: Final = 100
 OTHERS: Final = "(others)"
 
 
+class ReportPage(TypedDict):
+    """Report of a reader in JSON types; fields as of `ReadReport`."""
+
+    layout: str
+    unknown: dict[str, int]
+    missing: dict[str, int]
+    repaired: dict[str, int]
+    facts: dict[str, object]
+
+
 @dataclass
 class ReadReport:
     """Findings of a reader.
@@ -117,7 +127,7 @@ class ReadReport:
     unknown: Counter[str] = field(default_factory=Counter)
     missing: Counter[str] = field(default_factory=Counter)
     repaired: Counter[str] = field(default_factory=Counter)
-    facts: dict[str, Any] = field(default_factory=dict)
+    facts: dict[str, object] = field(default_factory=dict)
 
     def keep(self, name: str, count: int = 1) -> None:
         """Counts an unknown name that was kept."""
@@ -132,7 +142,7 @@ class ReadReport:
         if count:
             _count(self.repaired, what, count)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> ReportPage:
         """Returns the report in JSON types."""
         return {
             "layout": self.layout,
@@ -147,10 +157,14 @@ class ReadReport:
         return report_lines(self.to_json())
 
 
-def report_lines(report: Mapping[str, Any]) -> list[str]:
+def report_lines(report: ReportPage) -> list[str]:
     """Returns a report, given in JSON types, as lines of text."""
-    kinds = (("kept, not understood", "unknown"), ("missing", "missing"), ("repaired", "repaired"))
-    lines = [f"{title}: {name}{_times(count)}" for title, kind in kinds for name, count in report[kind].items()]
+    kinds = (
+        ("kept, not understood", report["unknown"]),
+        ("missing", report["missing"]),
+        ("repaired", report["repaired"]),
+    )
+    lines = [f"{title}: {name}{_times(count)}" for title, names in kinds for name, count in names.items()]
     return lines + [f"{name.replace('_', ' ')}: {_in_words(value)}" for name, value in report["facts"].items()]
 
 
@@ -163,7 +177,7 @@ def _times(count: int) -> str:
     return "" if count == 1 else f" ({count} times)"
 
 
-def _in_words(value: Any) -> str:
+def _in_words(value: object) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {item}" for key, item in value.items()) or "none"
     return str(value)

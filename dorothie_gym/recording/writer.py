@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Self
+from typing import IO, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +29,9 @@ from dorothie_gym.recording.file_names import (
 )
 from dorothie_gym.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
 from dorothie_gym.recording.header import SessionHeader
-from dorothie_gym.recording.json_io import canonical
+from dorothie_gym.recording.json_io import canonical_object
 from dorothie_gym.recording.session import SessionFile, picture_name
-from dorothie_gym.recording.surroundings import Rows, actor_rows, light_rows, weather_rows
+from dorothie_gym.recording.surroundings import ActorColumns, Rows, actor_rows, light_rows, weather_rows
 from dorothie_gym.recording.trajectory import check_rising, checked_rows
 
 
@@ -112,7 +112,7 @@ class SessionWriter:
             self._decisions.flush()
         self._last_decision = frame
 
-    def add_actors(self, frame: int, actors: Rows | Mapping[str, Any]) -> None:
+    def add_actors(self, frame: int, actors: Rows | ActorColumns) -> None:
         """Appends the actors around the car at a frame, as rows of `ACTOR_DTYPE` or as a mapping of its columns.
 
         Raises:
@@ -156,7 +156,7 @@ class SessionWriter:
             SessionError: the outcome holds other types than JSON's, or the session is closed.
         """
         self._check_open("it cannot be finished")
-        outcome = canonical(outcome, "outcome")
+        outcome = canonical_object(outcome, "outcome")
         self.close()
         trajectory, scene = read_journal(self.folder / JOURNAL_FILE)
         write_frames(self.folder / FRAMES_FILE, trajectory, scene)

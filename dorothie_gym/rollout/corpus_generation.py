@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Final
 
 import numpy as np
 
@@ -13,13 +13,11 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.policies import ALL_SCRIPTED
 from dorothie_gym.recording import FOLDS, PAPER_FOLDS, Fold, SessionState, manifest_row, session_state, write_manifest
+from dorothie_gym.recording.corpus import ManifestRow
 from dorothie_gym.rollout.runner import PlayedSession, SessionJob, run_sessions
 
 PAPER_SESSIONS: Final = sum(PAPER_FOLDS.values())
 """Sessions of the paper's corpus."""
-
-ManifestRow: TypeAlias = Mapping[str, Any]
-"""Row of a session in the manifest of a corpus (`manifest_row`)."""
 
 _UNSEEN: Final = frozenset((Fold.VAL_UNSEEN, Fold.TEST_UNSEEN))
 

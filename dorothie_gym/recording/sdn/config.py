@@ -17,6 +17,8 @@ from dorothie_gym.recording.sdn.files import (
     SdnLayout,
     number_of,
     plain,
+    plain_object,
+    text_of,
     whole_of,
 )
 from dorothie_gym.recording.sdn.trajectory import SdnMap
@@ -48,8 +50,9 @@ def header_of(
         first_frame: frame (10 Hz) at which the session begins.
         report: receives missing and unknown fields.
     """
-    if isinstance(config.get(OURS), Mapping):
-        return SessionHeader.from_json(config[OURS], f"config.json, {OURS}")
+    ours = config.get(OURS)
+    if isinstance(ours, Mapping):
+        return SessionHeader.from_json(ours, f"config.json, {OURS}")
     environment = _environment(config)
     _note_fields(config, environment, DIALOG_FILE if layout is SdnLayout.HUB else CONFIG_FILE, report)
     given = environment.get("landmarks", config.get("landmarks"))
@@ -65,7 +68,7 @@ def header_of(
         subgoals=_subgoals(config, task, landmarks, report),
         story=_text(task.get("story")),
         departure=(-1, 0.0),
-        config={"sdn": {"first_frame": first_frame, "config": plain(config), "task": plain(task)}},
+        config={"sdn": {"first_frame": first_frame, "config": plain_object(config), "task": plain_object(task)}},
         source=f"sdn-{layout}",
     )
 
@@ -119,8 +122,9 @@ def _landmark(row: JsonObject, place: SdnMap, hidden: frozenset[str], report: Re
     location = _dig(row, "wp", "Transform", "Location")
     ids = _dig(row, "wp", "OpenDriveID") or row
     x, y = number_of(location.get("x")), number_of(location.get("y"))
-    if isinstance(row.get("location"), list) and len(row["location"]) >= 2:
-        x, y = number_of(row["location"][0]), number_of(row["location"][1])
+    point = row.get("location")
+    if isinstance(point, list) and len(point) >= 2:
+        x, y = number_of(point[0]), number_of(point[1])
     if x is None or y is None:
         report.miss("config.json: place of a landmark")
         x = y = 0.0
@@ -133,14 +137,14 @@ def _landmark(row: JsonObject, place: SdnMap, hidden: frozenset[str], report: Re
         y=y,
         street=found.street,
         hidden=row.get("is_hidden", row.get("hidden")) is True or name in hidden,
-        extra=plain(row),
+        extra=plain_object(row),
     )
 
 
 def _landmark_name(row: JsonObject, report: ReadReport) -> str:
     for field in ("name", "asset"):
         try:
-            return parse_landmark(row.get(field, "")).label
+            return parse_landmark(text_of(row.get(field))).label
         except OntologyError:
             continue
     report.keep(f"config.json: landmark {str(row.get('name', row.get('asset')))[:40]!r}")
@@ -188,7 +192,7 @@ def _subgoals(
                 trigger=bool(row.get("trigger")),
                 delete=bool(row.get("delete")),
                 change=_text(row.get("change")) or None,
-                extra=plain(fields.others(("description", "trigger", "delete", "change"))),
+                extra=plain_object(fields.others(("description", "trigger", "delete", "change"))),
             )
         )
     return subgoals

@@ -24,7 +24,17 @@ from dorothie_gym.ontology import (
     parse_role,
 )
 from dorothie_gym.recording.events import Event, EventType, check_event
-from dorothie_gym.recording.sdn.files import MORE, OURS, JsonObject, frame_of, more_of, number_of, plain, whole_of
+from dorothie_gym.recording.sdn.files import (
+    MORE,
+    OURS,
+    JsonObject,
+    frame_of,
+    more_of,
+    number_of,
+    plain,
+    plain_object,
+    whole_of,
+)
 from dorothie_gym.recording.sdn.moves import MoveReader, read_speech
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.recording.validation import ReadReport
@@ -101,7 +111,7 @@ class ActionReader:
             arguments = _guess_of(value)
         if arguments is None:
             self.report.keep(f"argument of {action.label}")
-            return {"action": action.label, "sdn": plain(dict(val))}
+            return {"action": action.label, "sdn": plain_object(val)}
         return {"action": action.label, **arguments}
 
     def _turn(self, val: JsonObject) -> float | None:
@@ -241,9 +251,9 @@ class LogReader:
                 raise OntologyError(f"type {row['type']!r} or from {row.get('from')!r} is unknown")
             data, flagged = self._read(kind, row, frame, source)
             data.update(self._rest(row, kind.value))
-            extra = row.get(MORE) if isinstance(row.get(MORE), Mapping) else {}
+            extra = more_of(row)
             time = self._time(frame)
-            event = Event(frame=time, type=kind, source=source, flagged=flagged, data=data, extra=plain(extra))
+            event = Event(frame=time, type=kind, source=source, flagged=flagged, data=data, extra=extra)
             check_event(event, "")
         except (OntologyError, SessionError) as error:
             return self._unknown(row, frame, str(error))
@@ -274,21 +284,24 @@ class LogReader:
         rest = {name: value for name, value in row.items() if name not in _FIELDS}
         for name in rest:
             self._report.keep(f"{self._name}: field {str(name)!r} of {kind}")
-        return {"sdn": plain(rest)} if rest else {}
+        return {"sdn": plain_object(rest)} if rest else {}
 
     def _ours(self, row: JsonObject, frame: int) -> Event:
         """Returns an event of this package that the layout cannot represent."""
-        ours = row[OURS]
+        ours, val = row[OURS], row.get("val")
         name = str(plain(row["type"])).strip()
         kind = _NATIVE.get(name.casefold(), EventType.OTHER)
-        extra = ours.get("extra") if isinstance(ours.get("extra"), Mapping) else {}
+        extra = ours.get("extra") if isinstance(ours, Mapping) else None
         event = Event(
             frame=self._time(frame),
             type=kind,
             source=role_of(row) or Role.AGENT,
             flagged=bool(row.get("flag")),
-            data=plain(row["val"]) if isinstance(row.get("val"), Mapping) else {},
-            extra={**({"type": name} if kind is EventType.OTHER else {}), **plain(extra)},
+            data=plain_object(val) if isinstance(val, Mapping) else {},
+            extra={
+                **({"type": name} if kind is EventType.OTHER else {}),
+                **(plain_object(extra) if isinstance(extra, Mapping) else {}),
+            },
         )
         check_event(event, f"{self._name}, frame {frame}")
         return event
@@ -301,7 +314,7 @@ class LogReader:
             frame=self._time(frame),
             type=EventType.OTHER,
             source=role_of(row) or Role.AGENT,
-            data=plain(rest),
+            data=plain_object(rest),
             extra={"type": FOREIGN + name},
         )
 
@@ -311,9 +324,10 @@ class LogReader:
 
 def role_of(row: JsonObject) -> Role | None:
     """Returns the role that is the source of a row; None for an unknown name."""
+    name = row.get("from")
     try:
-        return parse_role(row["from"].strip())
-    except (KeyError, AttributeError, OntologyError):
+        return parse_role(name.strip()) if isinstance(name, str) else None
+    except OntologyError:
         return None
 
 

@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.file_names import MAX_EVENTS, MAX_FRAME
@@ -70,7 +70,7 @@ def expected_files(layout: SdnLayout) -> tuple[str, ...]:
 
 # --- JSON and CSV ----------------------------------------------------------------------------------------------------
 
-JsonObject: TypeAlias = Mapping[str, Any]
+JsonObject: TypeAlias = Mapping[str, object]
 
 _SPACE: Final = re.compile(r"[ \t\n\r]*")
 
@@ -78,7 +78,7 @@ APOSTROPHE: Final = "\u2019"
 """Apostrophe in SDN's transcripts."""
 
 
-def read_json(path: Path, report: ReadReport) -> Any:
+def read_json(path: Path, report: ReadReport) -> object:
     """Returns the content of a JSON file; NaN and infinite numbers become null, which is reported.
 
     For a file with an object on each line, it returns the list of objects.
@@ -105,7 +105,7 @@ def read_json(path: Path, report: ReadReport) -> Any:
     return items
 
 
-def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[Any]:
+def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[object]:
     """Returns the items of a JSON list in a file, read one by one so that a huge list is rejected early.
 
     Raises:
@@ -115,7 +115,7 @@ def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[A
     place = _skip(text, 0)
     if text[place : place + 1] != "[":
         raise SessionError(f"{path}: a JSON list is expected" + ("" if text.strip() else ", the file is empty"))
-    items: list[Any] = []
+    items: list[object] = []
     place = _skip(text, place + 1)
     while text[place : place + 1] != "]":
         _check_count(len(items), path)
@@ -142,7 +142,7 @@ def read_rows(path: Path, report: ReadReport) -> list[JsonObject]:
     return objects(read_list(path, report), path.name, report)
 
 
-def objects(items: list[Any], name: str, report: ReadReport) -> list[JsonObject]:
+def objects(items: list[object], name: str, report: ReadReport) -> list[JsonObject]:
     """Returns the objects among the items; others are left out, which is reported."""
     rows = [item for item in items if isinstance(item, Mapping)]
     report.repair(f"{name}: items that are no objects were left out", len(items) - len(rows))
@@ -184,6 +184,11 @@ def frame_of(row: JsonObject) -> int | None:
     return frame if frame is not None and 0 <= frame < MAX_FRAME else None
 
 
+def text_of(value: object) -> str:
+    """Returns the text of a field; empty without one."""
+    return value if isinstance(value, str) else ""
+
+
 def transcript_of(value: object, report: ReadReport) -> str | None:
     """Returns a transcript with plain apostrophes; None without one."""
     if not isinstance(value, str):
@@ -193,7 +198,7 @@ def transcript_of(value: object, report: ReadReport) -> str | None:
     return str(plain(value.replace(APOSTROPHE, "'").strip()))
 
 
-def plain(value: object, depth: int = MAX_DEPTH - 8) -> Any:
+def plain(value: object, depth: int = MAX_DEPTH - 8) -> object:
     """Returns a JSON value that a session can hold: texts in UTF-8, finite numbers, bounded nesting."""
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode("utf-8")
@@ -202,14 +207,19 @@ def plain(value: object, depth: int = MAX_DEPTH - 8) -> Any:
     if isinstance(value, list | tuple):
         return [plain(item, depth - 1) for item in value] if depth else "..."
     if isinstance(value, Mapping):
-        return {str(plain(key)): plain(item, depth - 1) for key, item in value.items()} if depth else "..."
+        return plain_object(value, depth) if depth else "..."
     return value
 
 
-def more_of(values: JsonObject) -> dict[str, Any]:
+def plain_object(values: JsonObject, depth: int = MAX_DEPTH - 8) -> dict[str, object]:
+    """Returns a JSON object that a session can hold; see `plain`."""
+    return {str(plain(key)): plain(item, depth - 1) for key, item in values.items()}
+
+
+def more_of(values: JsonObject) -> dict[str, object]:
     """Returns the fields of events that this package's writer adds to those of the layout."""
     more = values.get(MORE)
-    return dict(plain(more)) if isinstance(more, Mapping) else {}
+    return plain_object(more) if isinstance(more, Mapping) else {}
 
 
 def _text(path: Path) -> str:
@@ -221,7 +231,7 @@ def _skip(text: str, place: int) -> int:
     return match.end() if match else place
 
 
-def _decode(text: str, place: int, path: Path, item: str, report: ReadReport) -> tuple[Any, int]:
+def _decode(text: str, place: int, path: Path, item: str, report: ReadReport) -> tuple[object, int]:
     bad: Counter[str] = Counter()
 
     def note(name: str) -> None:

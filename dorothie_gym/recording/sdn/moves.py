@@ -6,7 +6,7 @@ import bisect
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import DialogueAct, Role, parse_act, parse_move, parse_slot_value
@@ -210,9 +210,11 @@ def slots_of(types: object, values: object) -> dict[str, list[object]]:
     return {name: [value for value in found if isinstance(value, str)] for name, found in slots.items()}
 
 
-def _is_known(slot: Any, value: Any) -> bool:
+def _is_known(slot: object, value: object) -> bool:
+    if not isinstance(slot, str) or not isinstance(value, str):
+        return False
     try:
         parse_slot_value(slot_of(slot), value)
-    except (OntologyError, TypeError, AttributeError):
+    except OntologyError:
         return False
     return True

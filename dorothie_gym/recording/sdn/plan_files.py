@@ -32,6 +32,7 @@ from dorothie_gym.recording.sdn.files import (
     plain,
     read_csv,
     read_rows,
+    text_of,
     whole_of,
 )
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
@@ -75,8 +76,8 @@ class ViewReader:
         events = []
         for row in self._rows(PLAN_FILE):
             try:
-                landmark = parse_landmark(row.get("landmark", "")).label
-                status = parse_goal_status(row.get("status", "")).label
+                landmark = parse_landmark(text_of(row.get("landmark"))).label
+                status = parse_goal_status(text_of(row.get("status"))).label
             except OntologyError as error:
                 self._report.keep(f"{PLAN_FILE}: row left out ({error})")
                 continue
@@ -145,7 +146,7 @@ class ViewReader:
         if data is None:
             self._report.keep(f"{AD_WIZARD_FILE}: type {name[:40]!r}")
             kept = {"from": Role.AD_WIZARD.sdn_names[0], "values": plain(values)}
-            return self._event(row, EventType.OTHER, Role.AD_WIZARD, kept, {"type": f"sdn:{plain(name)[:80]}"})
+            return self._event(row, EventType.OTHER, Role.AD_WIZARD, kept, {"type": f"sdn:{str(plain(name))[:80]}"})
         return self._event(row, EventType.EXCEPTION, Role.AD_WIZARD, {"kind": kind.name.lower(), **data})
 
     def _rows(self, name: str) -> list[JsonObject]:
@@ -178,7 +179,7 @@ def _arguments(kind: ExceptionKind, values: list[str]) -> dict[str, object] | No
         try:
             prop = str(parse_prop(values[0]))
         except OntologyError:
-            prop = plain(values[0])
+            prop = str(plain(values[0]))
         given = dict(zip(_PROP, values[1:], strict=False))
         places = {name: number_of(value) for name, value in given.items() if name != "id"}
         return {"prop": prop, **{name: place for name, place in places.items() if place is not None}}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.catalogue import find_town
@@ -179,7 +179,7 @@ def _log_rows(path: Path, report: ReadReport) -> tuple[list[JsonObject], JsonObj
     if not isinstance(value, Mapping):
         raise SessionError(f"{path}: a JSON list of events is expected")
     rows: list[JsonObject] = []
-    around: dict[str, Any] = {}
+    around: dict[str, object] = {}
     for name, items in value.items():
         given = items if isinstance(items, list) else [items]
         found = objects(given, path.name, ReadReport())

@@ -6,7 +6,7 @@ import math
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,7 +151,9 @@ def read_places(path: Path, report: ReadReport) -> CarPoses:
     return _places(_numbers(path, lines, start + 1, names, report), names)
 
 
-def _numbers(path: Path, lines: list[list[str]], start: int, names: list[str], report: ReadReport) -> NDArray[Any]:
+def _numbers(
+    path: Path, lines: list[list[str]], start: int, names: list[str], report: ReadReport
+) -> NDArray[np.float64]:
     rows: list[list[float]] = []
     needed = [names.index(name) for name in _NEEDED]
     bad = 0

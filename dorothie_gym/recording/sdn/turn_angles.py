@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class SignVote:
         """Whether positive angles point to the left; True for a tie."""
         return self.left >= self.right
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Returns sign, agreement (share of the turns that vote for it, or null) and number of turns."""
         total = self.left + self.right
         return {
@@ -58,15 +58,12 @@ def vote(events: Sequence[Event], places: CarPoses, first_frame: int) -> SignVot
     """Returns the vote of a session's JTurns, with angles as in the file."""
     result = SignVote()
     for event in events:
-        if (
-            not _is_turn(event)
-            or event.data["angle"] is None
-            or not MIN_CLEAR_TURN <= abs(event.data["angle"]) <= MAX_CLEAR_TURN
-        ):
+        angle = _angle(event)
+        if angle is None or not MIN_CLEAR_TURN <= abs(angle) <= MAX_CLEAR_TURN:
             continue
         turned = _turn_after(places, event.frame // FRAMES_PER_TENTH + first_frame)
         if turned is not None and MIN_CLEAR_TURN <= abs(turned) <= MAX_CLEAR_TURN:
-            agrees = (event.data["angle"] > 0) == (turned > 0)
+            agrees = (angle > 0) == (turned > 0)
             result += SignVote(left=1) if agrees else SignVote(right=1)
     return result
 
@@ -90,7 +87,10 @@ def with_sign(events: Sequence[Event], sign: SignVote) -> list[Event]:
     """Returns the events with positive-left angles of JTurns."""
     if sign.positive_left:
         return list(events)
-    return [_turned(event, wrap_degrees(-event.data["angle"])) if _has_angle(event) else event for event in events]
+    return [
+        event if (angle := _angle(event)) is None or "road" in event.data else _turned(event, wrap_degrees(-angle))
+        for event in events
+    ]
 
 
 def with_roads(
@@ -132,9 +132,11 @@ def _is_turn(event: Event) -> bool:
     return event.type is EventType.PHYSICAL_ACTION and event.data["action"] == PhysicalAction.J_TURN.label
 
 
-def _has_angle(event: Event) -> bool:
-    return _is_turn(event) and event.data["angle"] is not None and "road" not in event.data
+def _angle(event: Event) -> float | None:
+    """Returns the angle of a JTurn; None without one."""
+    angle = event.data["angle"] if _is_turn(event) else None
+    return angle if isinstance(angle, int | float) else None
 
 
-def _turned(event: Event, angle: float | None, **more: Any) -> Event:
+def _turned(event: Event, angle: float | None, **more: object) -> Event:
     return replace(event, data={**event.data, "angle": angle, **more})

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Container, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from dorothie_gym.recording.sdn.files import (
     PLACES_FILE,
     PLAN_FILE,
     SCENE_FILE,
+    whole_of,
 )
 from dorothie_gym.recording.sdn.trajectory import CSV_COLUMNS, write_scene
 from dorothie_gym.recording.session import Session, new_session_folder
@@ -56,7 +57,7 @@ _BELIEFS: Final = {
 _PLAN_CLOSED: Final = ("Complete", "Abandoned")
 
 
-def log_rows(session: Session, first: int) -> list[dict[str, Any]]:
+def log_rows(session: Session, first: int) -> list[Mapping[str, object]]:
     """Returns the rows of `annotated_log.json`: every event, and a row for each frame of speech, in order of frames.
 
     Args:
@@ -64,10 +65,15 @@ def log_rows(session: Session, first: int) -> list[dict[str, Any]]:
         first: first frame (10 Hz) of the session.
     """
     rows = [_row(event, first) for event in session.events]
-    return sorted([*_speech(session, first), *rows], key=lambda row: int(row["frame"]))
+    return in_order([*_speech(session, first), *rows])
 
 
-def plan_rows(session: Session, first: int) -> Iterator[dict[str, Any]]:
+def in_order(rows: Iterable[Mapping[str, object]]) -> list[Mapping[str, object]]:
+    """Returns rows in order of their frames (stable)."""
+    return sorted(rows, key=lambda row: whole_of(row["frame"]) or 0)
+
+
+def plan_rows(session: Session, first: int) -> Iterator[dict[str, object]]:
     """Yields the rows of `plan.json`: `Ongoing` opens a goal, the next row of the landmark closes it."""
     opened: set[str] = set()
     since = first
@@ -112,8 +118,8 @@ def ad_wizard_lines(session: Session, first: int) -> Iterator[str]:
             yield ", ".join(str(value) for value in (f"{frame / TENTHS:.1f}", frame, *values))
 
 
-def _row(event: Event, first: int) -> dict[str, Any]:
-    row: dict[str, Any] = {
+def _row(event: Event, first: int) -> dict[str, object]:
+    row: dict[str, object] = {
         "frame": _frame(event, first),
         "type": event.type.value,
         "from": event.source.sdn_names[0],
@@ -132,31 +138,33 @@ def _row(event: Event, first: int) -> dict[str, Any]:
     else:
         extra = {name: value for name, value in event.extra.items() if name != "type"}
         return {**row, "type": event.type_name, "val": dict(data), OURS: {"extra": extra} if extra else {}}
-    if isinstance(data.get("sdn"), Mapping):
-        row |= {name: value for name, value in data["sdn"].items() if name not in row}
+    kept = data.get("sdn")
+    if isinstance(kept, Mapping):
+        row |= {name: value for name, value in kept.items() if name not in row}
     return {**row, MORE: dict(event.extra)} if event.extra else row
 
 
-def _said(data: Mapping[str, Any]) -> dict[str, object]:
+def _said(data: Mapping[str, object]) -> dict[str, object]:
     act = {name: data[name] for name in _ACT if name in data}
-    if isinstance(data.get("sdn_act"), Mapping):
-        act = {**data["sdn_act"], **act}
+    kept = data.get("sdn_act")
+    if isinstance(kept, Mapping):
+        act = {**kept, **act}
     act |= _more(data, _SAID)
     said = {"utterance_gt": data["text"], "utterance_filename": _file(data), "act": act}
     return said if data.get("recognised") is None else {**said, "utterance": data["recognised"]}
 
 
-def _file(data: Mapping[str, Any]) -> str:
+def _file(data: Mapping[str, object]) -> str:
     return str(data.get("audio") or f"utterance_{data['utterance']}.flac")
 
 
-def _physical(data: Mapping[str, Any]) -> dict[str, object]:
-    action = parse_physical_action(data["action"])
+def _physical(data: Mapping[str, object]) -> dict[str, object]:
+    action = parse_physical_action(str(data["action"]))
     kind, angle, up = action.argument, data.get("angle"), data.get("up")
     slot: tuple[str | None, object] = (None, None)
     if kind is ArgumentKind.ANGLE:
         slot = ("Angle", angle) if angle is not None or "road" not in data else ("RoadID", data["road"])
-    elif kind is ArgumentKind.SIDE and angle is not None:
+    elif kind is ArgumentKind.SIDE and isinstance(angle, int | float):
         slot = ("Direction", LEFT if angle > 0 else RIGHT)
     elif kind is ArgumentKind.SPEED_STEP and up is not None:
         slot = ("Speed", SPEED_STEP if up else -SPEED_STEP)
@@ -168,7 +176,7 @@ def _physical(data: Mapping[str, Any]) -> dict[str, object]:
     return {"act": action.label, "slot_type": slot[0], "slot_val": slot[1], **more}
 
 
-def _is_belief(data: Mapping[str, Any]) -> bool:
+def _is_belief(data: Mapping[str, object]) -> bool:
     """Returns whether the layout can represent a belief update."""
     try:
         action = parse_mental_action(str(data.get("action")))
@@ -177,7 +185,7 @@ def _is_belief(data: Mapping[str, Any]) -> bool:
     return all(name in data for name in action.arguments)
 
 
-def _belief(data: Mapping[str, Any]) -> dict[str, object]:
+def _belief(data: Mapping[str, object]) -> dict[str, object]:
     action = parse_mental_action(str(data["action"]))
     name, slot_type = _BELIEFS[action]
     known = ["action", "sdn", *action.arguments]
@@ -193,12 +201,12 @@ def _belief(data: Mapping[str, Any]) -> dict[str, object]:
     return {"act": name, "slot_type": slot_type, "slot_val": value, **_more(data, known)}
 
 
-def _more(data: Mapping[str, Any], known: Container[str]) -> dict[str, object]:
+def _more(data: Mapping[str, object], known: Container[str]) -> dict[str, object]:
     rest = {name: value for name, value in data.items() if name not in known}
     return {MORE: rest} if rest else {}
 
 
-def _speech(session: Session, first: int) -> Iterator[dict[str, Any]]:
+def _speech(session: Session, first: int) -> Iterator[dict[str, object]]:
     for utterance in session.utterances():
         data = session.events[utterance.moves[0].index].data
         start, end = round(utterance.start * TENTHS), round(utterance.end * TENTHS)
@@ -253,7 +261,7 @@ def write_sdn(session: Session, path: Path | str, *, maps: Path | str | None = N
     with new_session_folder(Path(path)) as folder:
         _write(folder / CONFIG_FILE, json.dumps(_config(session, town, first), ensure_ascii=False, indent=1))
         _write(folder / LOG_FILE, _lines(log_rows(session, first)))
-        _write(folder / PLAN_FILE, _lines(sorted(plan_rows(session, first), key=lambda row: int(row["frame"]))))
+        _write(folder / PLAN_FILE, _lines(in_order(plan_rows(session, first))))
         _write(folder / DETAILED_PLAN_FILE, _lines(detailed_plan_rows(session, first)))
         _write(folder / PLACES_FILE, "\n".join(_place_lines(session, town, first)))
         _write(folder / AD_WIZARD_FILE, "\n".join(ad_wizard_lines(session, first)))
@@ -272,7 +280,7 @@ def _write(path: Path, text: str) -> None:
     path.write_text(text.rstrip("\n") + "\n", encoding="utf-8", newline="\n")
 
 
-def _lines(rows: Iterable[Mapping[str, Any]]) -> str:
+def _lines(rows: Iterable[Mapping[str, object]]) -> str:
     """Returns a JSON list with one row per line."""
     lines = (json.dumps(canonical(row, EVENTS_FILE), ensure_ascii=False, allow_nan=False) for row in rows)
     return "[\n" + ",\n".join(lines) + "\n]"

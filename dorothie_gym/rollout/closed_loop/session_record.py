@@ -132,9 +132,10 @@ def when_met(session: Session, event: Event, kind: ExceptionKind) -> float:
     if kind not in (ExceptionKind.SPAWN_VEHICLES, ExceptionKind.SPAWN_PEDESTRIANS):
         return event.time
     corners = [event.data.get(name) for name in ("x0", "x1", "y0", "y1")]
-    if not all(isinstance(corner, int | float) for corner in corners):
-        return event.time  # other corpora do not tell where
-    x0, x1, y0, y1 = (float(corner) for corner in corners if corner is not None)
+    numbers = [float(corner) for corner in corners if isinstance(corner, int | float)]
+    if len(numbers) < len(corners):
+        return event.time  # other corpora do not record the square
+    x0, x1, y0, y1 = numbers
     rows = session.trajectory[session.trajectory["frame"] >= event.frame]
     aside = np.maximum(np.maximum(x0 - rows["x"], rows["x"] - x1), 0.0)
     along = np.maximum(np.maximum(y0 - rows["y"], rows["y"] - y1), 0.0)
@@ -173,15 +174,15 @@ def _on_road(session: Session, events: int) -> tuple[Place, ...]:
     props: list[Place] = []
     for event in session.events[:events]:
         kind, item = kind_of(event), event.data.get("item")
-        numbered = isinstance(item, int) and 0 <= item < len(props)
+        row = item if isinstance(item, int) and 0 <= item < len(props) else None
         lane, station = event.data.get("lane"), event.data.get("station")
-        if kind is ExceptionKind.DELETE_PROP and numbered:
-            del props[event.data["item"]]
+        if kind is ExceptionKind.DELETE_PROP and row is not None:
+            del props[row]
         elif isinstance(lane, int) and isinstance(station, int | float):
             if kind is ExceptionKind.PLACE_PROP:
                 props.append((lane, float(station)))
-            elif kind is ExceptionKind.MOVE_PROP and numbered:
-                props[event.data["item"]] = (lane, float(station))
+            elif kind is ExceptionKind.MOVE_PROP and row is not None:
+                props[row] = (lane, float(station))
     return tuple(props)
 
 
