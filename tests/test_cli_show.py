@@ -22,7 +22,8 @@ def event(type_: EventType, source: Role, **data: Any) -> Event:
 
 
 def said(utterance: int, text: str, move: str, **slots: list[str]) -> Event:
-    return event(EventType.DIALOGUE_MOVE, Role.CO_WIZARD, utterance=utterance, text=text, move=move, slots=slots)
+    data = {"utterance": utterance, "text": text, "span": text, "move": move, "slots": slots, "exchange": None}
+    return event(EventType.DIALOGUE_MOVE, Role.CO_WIZARD, **data, start=0.0, end=1.0)
 
 
 def texts(*events: Event) -> list[str]:
