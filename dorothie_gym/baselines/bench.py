@@ -12,8 +12,8 @@ import torch
 from torch import Tensor
 from torch.utils.flop_counter import FlopCounterMode
 
-from dorothie_gym.baselines.inputs import TASKS, Examples
-from dorothie_gym.baselines.published import PublishedTOTO, Senses, rebuild, train_step
+from dorothie_gym.baselines.model_io import TASKS, Examples
+from dorothie_gym.baselines.reference_impl import PublishedTOTO, Senses, rebuild, train_step
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
 from dorothie_gym.bench.timing import Progress, cores, cpu_seconds, in_turns, machine, quiet, rounded
 from dorothie_gym.benchmark.features import Columns, build, points

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, text_encoder, text_table
-from dorothie_gym.baselines.inputs import TASKS, Examples
+from dorothie_gym.baselines.model_io import TASKS, Examples
 from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, build, points
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording import Fold

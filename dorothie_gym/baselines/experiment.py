@@ -14,15 +14,13 @@ import numpy as np
 import torch
 
 from dorothie_gym._version import __version__
+from dorothie_gym.baselines.checkpoints import ModelCard, sha256_of
 from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION, Dataset
-from dorothie_gym.baselines.decoding import Predicted
-from dorothie_gym.baselines.inputs import TASKS
 from dorothie_gym.baselines.learning_curves import draw_loss_curves
-from dorothie_gym.baselines.model_card import ModelCard, sha256_of
+from dorothie_gym.baselines.model_io import TASKS, Predicted
 from dorothie_gym.baselines.model_zoo import ROWS, SIZES, ModelEntry, find_row, make_model, needs_pieces
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts
-from dorothie_gym.baselines.training import BEST_FILE, TrainingSummary, predict, train
-from dorothie_gym.baselines.training.trainer import Epoch, OnEpoch
+from dorothie_gym.baselines.trainer import BEST_FILE, Epoch, OnEpoch, TrainingSummary, predict, train
 from dorothie_gym.benchmark import (
     FLOORS,
     ActionPredictions,
@@ -137,7 +135,7 @@ def _describe(job: Experiment, model: TOTO, material: Dataset, result: Mapping[s
 def _run_policy(job: Experiment, about: dict[str, Any]) -> dict[str, Any]:
     """Trains and tests policies, or reads an earlier result."""
     # imported here: stable-baselines3 is slow to import
-    from dorothie_gym.baselines.policy_rows import run_policy
+    from dorothie_gym.baselines.teacher_forced_policies import run_policy
 
     kept = job.folder / RESULT_FILE
     if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from dorothie_gym.baselines.training.trainer import Epoch
+from dorothie_gym.baselines.trainer import Epoch
 from dorothie_gym.files import replacing
 from dorothie_gym.ontology import Role
 from dorothie_gym.rendering.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
@@ -53,10 +53,10 @@ def draw_loss_curves(epochs: Sequence[Epoch], title: str, path: Path) -> None:
 
 # --- The learning curve as a picture ---------------------------------------------------------------------------------
 
-SIZE = (7.0, 4.0)
+FIGURE_SIZE = (7.0, 4.0)
 """Of the picture [inches]."""
 
-DOTS = 150
+DOTS_PER_INCH = 150
 """Dots an inch."""
 
 
@@ -67,10 +67,10 @@ def sheet(path: Path) -> Iterator[Any]:
     Raises:
         OSError: the file cannot be written.
     """
-    with empty_figure(*SIZE) as figure:
+    with empty_figure(*FIGURE_SIZE) as figure:
         figure.set_layout_engine("constrained")
         yield figure
-        figure.savefig(path, format="png", dpi=DOTS)
+        figure.savefig(path, format="png", dpi=DOTS_PER_INCH)
 
 
 def draw_reward_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> None:

@@ -1,7 +1,6 @@
 """The three tasks on recordings: metrics, prediction files, trivial baselines and the results table."""
 
 from dorothie_gym.analysis.intervals import Estimate
-from dorothie_gym.benchmark.claims import ModelClaim, ModelFinding, ModelVerdict, above, findings
 from dorothie_gym.benchmark.labels import SPLITS, CorpusLabels, Split, TaskLabels, Unscored, labels_of
 from dorothie_gym.benchmark.metrics import (
     COLUMNS,
@@ -18,7 +17,16 @@ from dorothie_gym.benchmark.metrics import (
     metrics_of,
     title_of,
 )
-from dorothie_gym.benchmark.paper_results import PaperFigure, paper_figure, paper_figures
+from dorothie_gym.benchmark.paper_comparison import (
+    ModelClaim,
+    ModelFinding,
+    ModelVerdict,
+    PaperFigure,
+    above,
+    findings,
+    paper_figure,
+    paper_figures,
+)
 from dorothie_gym.benchmark.prediction_reader import read_about, read_predictions
 from dorothie_gym.benchmark.predictions import (
     ActionPredictions,

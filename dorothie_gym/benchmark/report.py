@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.analysis.intervals import Estimate
-from dorothie_gym.benchmark.claims import MARGIN, ModelClaim, ModelFinding
 from dorothie_gym.benchmark.labels import ALL, UNSEEN
 from dorothie_gym.benchmark.metrics import (
     COLUMNS,
@@ -24,7 +23,15 @@ from dorothie_gym.benchmark.metrics import (
     task_of,
     title_of,
 )
-from dorothie_gym.benchmark.paper_results import PaperFigure, paper_figure, paper_name, paper_source
+from dorothie_gym.benchmark.paper_comparison import (
+    SMALLEST_DIFFERENCE,
+    ModelClaim,
+    ModelFinding,
+    PaperFigure,
+    paper_figure,
+    paper_name,
+    paper_source,
+)
 from dorothie_gym.benchmark.scoring import class_labels
 from dorothie_gym.benchmark.table import ResultsTable
 from dorothie_gym.recording import Task
@@ -170,7 +177,7 @@ def claim_line(claim: ModelClaim) -> str:
     """Returns a claim in a line: figure, models, difference in points, verdict."""
     mean, half = claim.difference.mean, claim.difference.half_width
     amount = NONE if mean is None else f"{100 * mean:+.1f}" + ("" if half is None else f" ± {100 * half:.1f}")
-    wanted = "above 0" if claim.expected == "positive" else f"below {100 * MARGIN:.0f}"
+    wanted = "above 0" if claim.expected == "positive" else f"below {100 * SMALLEST_DIFFERENCE:.0f}"
     return f"{title_of(claim.metric)}, {claim.higher} minus {claim.lower}: {amount}, expected {wanted}: {claim.verdict}"
 
 

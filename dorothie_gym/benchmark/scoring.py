@@ -17,7 +17,7 @@ from dorothie_gym.errors import PredictionError
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, DialogueMove
 from dorothie_gym.recording import Task
 
-NEAREST: Final = 3
+NEARBY_POINTS: Final = 3
 """Number of nearby points that a message names."""
 
 
@@ -139,12 +139,12 @@ def _check_other(labels: CorpusLabels, truth: TaskLabels, given: TaskPredictions
     if session in labels.others or session in labels.unreadable:
         return
     if session not in labels.part_of:
-        some = ", ".join(sorted(labels.part_of)[:NEAREST])
+        some = ", ".join(sorted(labels.part_of)[:NEARBY_POINTS])
         raise PredictionError(
             f"{where}: {labels.root} has no such session; a session is named by its folder, like {some}"
         )
     events = truth.events[truth.sessions == session]
-    near = sorted(events[np.argsort(np.abs(events - event), kind="stable")[:NEAREST]].tolist())
+    near = sorted(events[np.argsort(np.abs(events - event), kind="stable")[:NEARBY_POINTS]].tolist())
     points = f"its nearest points are events {', '.join(map(str, near))}" if near else "it has no point of the task"
     raise PredictionError(
         f"{where}, event {event}: is no point of {given.task.value}; leave the row out, or correct the event's number, "

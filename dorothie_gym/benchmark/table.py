@@ -12,10 +12,20 @@ from numpy.typing import NDArray
 
 from dorothie_gym.analysis import Handled
 from dorothie_gym.analysis.intervals import Estimate
-from dorothie_gym.benchmark.claims import ACTIONS, FULL, MOVES, ModelFinding, above, findings
 from dorothie_gym.benchmark.labels import ALL, CorpusLabels, Split, labels_of
 from dorothie_gym.benchmark.metrics import COLUMNS, keys_of, per_class_accuracy
-from dorothie_gym.benchmark.paper_results import paper_figure, paper_figures, paper_name, paper_source
+from dorothie_gym.benchmark.paper_comparison import (
+    ACTION_METRICS,
+    FULL,
+    MOVE_METRICS,
+    ModelFinding,
+    above,
+    findings,
+    paper_figure,
+    paper_figures,
+    paper_name,
+    paper_source,
+)
 from dorothie_gym.benchmark.prediction_reader import read_predictions
 from dorothie_gym.benchmark.predictions import TaskPredictions
 from dorothie_gym.benchmark.scoring import RunScore, Scores, class_labels, score_runs
@@ -117,7 +127,9 @@ class ResultsTable:
         for part in self.parts:
             found += findings(estimate, part)
             found += [
-                above(estimate, part, FULL, floor, (*MOVES, *ACTIONS)) for floor in FLOORS if floor in self.models
+                above(estimate, part, FULL, floor, (*MOVE_METRICS, *ACTION_METRICS))
+                for floor in FLOORS
+                if floor in self.models
             ]
             own = [model for model in self.models if paper_name(model) is None and model not in FLOORS]
             found += [above(estimate, part, model, FULL) for model in own]

@@ -11,7 +11,6 @@ from rich.table import Table
 
 from dorothie_gym.analysis import Handled
 from dorothie_gym.analysis.intervals import Estimate
-from dorothie_gym.benchmark.claims import ModelFinding, ModelVerdict
 from dorothie_gym.benchmark.labels import ALL
 from dorothie_gym.benchmark.metrics import (
     COLUMNS,
@@ -25,7 +24,7 @@ from dorothie_gym.benchmark.metrics import (
     task_of,
     title_of,
 )
-from dorothie_gym.benchmark.paper_results import PaperFigure, paper_figure
+from dorothie_gym.benchmark.paper_comparison import ModelFinding, ModelVerdict, PaperFigure, paper_figure
 from dorothie_gym.benchmark.report import (
     NONE,
     claim_line,

@@ -15,7 +15,7 @@ from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, repor
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.experiment import Experiment
-    from dorothie_gym.baselines.training import Epoch
+    from dorothie_gym.baselines.trainer import Epoch
     from dorothie_gym.benchmark import ResultsTable
 
 RUNS = Path("runs")

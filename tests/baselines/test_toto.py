@@ -3,8 +3,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from dorothie_gym.baselines.decoding import Outputs, allowed_angle, decode
-from dorothie_gym.baselines.inputs import NFD
+from dorothie_gym.baselines.model_io import NFD, Outputs, allowed_angle, decode
 from dorothie_gym.baselines.model_zoo import ROWS
 from dorothie_gym.baselines.toto import (
     ABLATIONS,

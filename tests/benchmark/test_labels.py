@@ -7,7 +7,7 @@ import pytest
 
 from dorothie_gym.benchmark import ActPredictions, labels_of, score_task
 from dorothie_gym.benchmark.features import build, points
-from dorothie_gym.benchmark.features.extraction import HANDLINGS
+from dorothie_gym.benchmark.features.session_columns import HANDLINGS
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.recording import Event, EventType, Task, read_session

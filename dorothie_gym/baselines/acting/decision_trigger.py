@@ -16,13 +16,13 @@ from dorothie_gym.spaces import Motion
 BEFORE_JUNCTION: Final = 40.0
 """Distance to a junction without a planned turn at which a decision is triggered [m]."""
 
-AGAIN: Final = 10.0
+DECISION_REPEAT_TIME: Final = 10.0
 """Time after which a car that waits at a junction without a turn, or has stopped, decides again [s]."""
 
-NEAR: Final = 1.0
+PLACE_REACHED_DISTANCE: Final = 1.0
 """Distance at which a place counts as reached [m]."""
 
-REST: Final = 4.0
+ASSUMED_HAZARD_TIME: Final = 4.0
 """Assumed duration of the hazard for which the car has stopped [s]; a standing car shows no braking."""
 
 
@@ -72,7 +72,7 @@ class TriggerState:
             assert view.choice is not None
             watch = replace(watch, junction=view.choice.lane, waited=view.time)
         speaks = heard or at_junction
-        stands = view.motion is Motion.STOPPED and view.time - self.drove >= AGAIN
+        stands = view.motion is Motion.STOPPED and view.time - self.drove >= DECISION_REPEAT_TIME
         wanted = speaks or changed or stands or self.owed or (at_place and not self.at_place)
         drives = wanted and not view.manoeuvring
         drove = view.time if drives else self.drove
@@ -83,16 +83,18 @@ class TriggerState:
         assert view.choice is not None
         if view.motion is Motion.STOPPED or view.manoeuvring or view.manoeuvre is PhysicalAction.J_TURN:
             return False
-        waits = view.motion is Motion.WAITING and view.time - self.waited >= AGAIN
+        waits = view.motion is Motion.WAITING and view.time - self.waited >= DECISION_REPEAT_TIME
         return view.choice.lane != self.junction or waits
 
     def _hazard(self, view: CoWizardView) -> float:
         if view.hazard is not ObjectClass.UNLABELED:
             return min(self.hazard, view.time)
-        lasts = view.motion is Motion.STOPPED and view.time - self.drove < REST
+        lasts = view.motion is Motion.STOPPED and view.time - self.drove < ASSUMED_HAZARD_TIME
         return self.hazard if lasts else math.inf
 
 
 def _would_stop_at(place: float, speed: float) -> bool:
     """Returns whether a car at a speed [m/s] must begin to stop for a place at a distance ahead [m]."""
-    return -CoWizardConfig.passed < place < stopping_distance(speed) + DECISION_INTERVAL * speed + NEAR
+    return (
+        -CoWizardConfig.passed < place < stopping_distance(speed) + DECISION_INTERVAL * speed + PLACE_REACHED_DISTANCE
+    )

@@ -13,16 +13,14 @@ import numpy as np
 import torch
 
 from dorothie_gym.baselines.acting.history import History
+from dorothie_gym.baselines.checkpoints import ModelCard, restore, sha256_of
 from dorothie_gym.baselines.dataset import Dataset
-from dorothie_gym.baselines.decoding import Predicted
 from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, Vectors, text_encoder
-from dorothie_gym.baselines.inputs import Examples, Inputs, Labels
-from dorothie_gym.baselines.model_card import ModelCard, sha256_of
+from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
 from dorothie_gym.baselines.model_zoo import build_model, find_row, retell
 from dorothie_gym.baselines.toto import TOTO, TOTOConfig
-from dorothie_gym.baselines.training.checkpoints import restore
 from dorothie_gym.benchmark.features import Columns, PointTable, points
-from dorothie_gym.benchmark.features.extraction import town_graph
+from dorothie_gym.benchmark.features.session_columns import town_graph
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.maps import Town
 from dorothie_gym.recording import Task

@@ -1,9 +1,10 @@
-"""Input features of the Junction Reader: slot values named in texts, and the most recent events."""
+"""Input features of the Junction Reader: exits of junctions, named slot values, and the most recent events."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Final
 
@@ -14,7 +15,9 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from dorothie_gym.baselines.encoders.byte_pairs import words
-from dorothie_gym.baselines.inputs import Inputs
+from dorothie_gym.baselines.model_io import Inputs
+from dorothie_gym.benchmark.features import TownGraph
+from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, LENGTH, EdgeType
 from dorothie_gym.ontology import LABELS, DialogueMove, PhysicalAction
 
 _PARTS: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z]+")
@@ -59,7 +62,7 @@ def _spellings() -> tuple[tuple[str, str], ...]:
 
 # --- Recent moves and motion ------------------------------------------------------------------------------------------
 
-MOVES: Final = 3
+RECENT_MOVES: Final = 3
 """Number of last moves with features of their own."""
 
 DECAYS: Final = (1.0, 4.0, 15.0)
@@ -67,19 +70,19 @@ DECAYS: Final = (1.0, 4.0, 15.0)
 
 _WHO_AND_WHAT: Final = 2 * len(DialogueMove)
 
-SIZE: Final = MOVES * _WHO_AND_WHAT + len(LABELS) + len(PhysicalAction) + 3 * len(DECAYS)
+RECENT_SIZE: Final = RECENT_MOVES * _WHO_AND_WHAT + len(LABELS) + len(PhysicalAction) + 3 * len(DECAYS)
 """Numbers that `recent` gives."""
 
 
 def recent(inputs: Inputs) -> Tensor:
-    """Returns features of the most recent events before B points (B, SIZE), in 0..1; zeros for missing events.
+    """Returns features of the most recent events before B points (B, RECENT_SIZE), in 0..1; zeros for missing events.
 
     The last moves, each by whom and which; the slots of the last; the last physical action; how fresh the last move of
     each speaker and the last action are.
     """
     mask, actions = inputs["move_mask"], inputs["action_mask"]
     moves = inputs["move"] * 2 + inputs["move_speaker"]
-    parts = [_last_kind(moves, mask, back, _WHO_AND_WHAT) for back in range(1, MOVES + 1)]
+    parts = [_last_kind(moves, mask, back, _WHO_AND_WHAT) for back in range(1, RECENT_MOVES + 1)]
     newest = (mask.sum(1) - 1).clamp(min=0)[:, None, None].expand(-1, 1, len(LABELS))
     parts.append(inputs["move_slots"].gather(1, newest)[:, 0].float() * mask.any(1, keepdim=True))
     parts.append(_last_kind(inputs["action"], actions, 1, len(PhysicalAction)))
@@ -101,3 +104,81 @@ def _freshness(now: Tensor, times: Tensor, mask: Tensor) -> Tensor:
     """Returns exponential decays of the age of a sequence's newest element (B, 3), 1 for now; zeros for none."""
     age = (now[:, None] - times).clamp(min=0.0).masked_fill(~mask, torch.inf).amin(1)
     return torch.stack([torch.exp(-age / decay) for decay in DECAYS], dim=-1)
+
+
+# --- The ways on at the next junction, read off a town's lane graph --------------------------------------------------
+
+EXITS: Final = 5
+"""Ways on that are kept at most; a crossing has three."""
+
+_HOPS: Final = 24
+_START_YAW, _END_YAW = FEATURES.index("start_yaw"), FEATURES.index("end_yaw")
+
+LANE_END: Final = slice(FEATURES.index("end_x"), FEATURES.index("end_y") + 1)
+"""Columns of the place where a lane ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExitTable:
+    """For each lane of a town (L,) the ways on at the next place where there is a choice.
+
+    Attributes:
+        angle: (L, X) turn to each way [degrees, positive left], as the angle of a turn is counted.
+        lane: (L, X) lane that the car is on after the junction, -1 where there is none.
+        place: (L, X, 2) where that lane ends [m]: which way it leads.
+        there: (L, X) whether there is such a way.
+        distance: (L,) from the end of the lane to the junction along the lanes between [m].
+    """
+
+    angle: NDArray[np.float32]
+    lane: NDArray[np.int64]
+    place: NDArray[np.float32]
+    there: NDArray[np.bool_]
+    distance: NDArray[np.float32]
+
+
+def exit_table(graph: TownGraph) -> ExitTable:
+    """Returns the ways on from every lane: along the only successor until there are several."""
+    count = len(graph.lanes)
+    successors = _successors(graph)
+    angle, lane = np.zeros((count, EXITS), np.float32), np.full((count, EXITS), -1)
+    distance = np.zeros(count, np.float32)
+    for row in range(count):
+        ways, distance[row] = _ways(graph, successors, row)
+        ways = sorted(ways)[:EXITS]
+        for column, (turn, target) in enumerate(ways):
+            angle[row, column], lane[row, column] = turn, target
+    place = graph.lanes[np.maximum(lane, 0)][..., LANE_END] if count else np.zeros((0, EXITS, 2))
+    return ExitTable(angle, lane, place.astype(np.float32), lane >= 0, distance)
+
+
+def _successors(graph: TownGraph) -> list[list[int]]:
+    found: list[list[int]] = [[] for _ in graph.lanes]
+    onward = graph.edge_types == EDGE_TYPES.index(EdgeType.CONCAT)
+    for source, target in graph.edges.T[onward].tolist():
+        found[source].append(target)
+    return found
+
+
+def _ways(graph: TownGraph, successors: list[list[int]], lane: int) -> tuple[list[tuple[float, int]], float]:
+    """Turns and lanes at the next choice from a lane, and how far it is from its end [m]."""
+    gone = 0.0
+    for _ in range(_HOPS):
+        following = successors[lane]
+        if len(following) > 1:
+            return [_turn(graph, successors, lane, way) for way in following], gone
+        if not following:
+            return [], gone
+        lane = following[0]
+        gone += float(graph.lanes[lane, LENGTH])
+    return [], gone
+
+
+def _turn(graph: TownGraph, successors: list[list[int]], lane: int, way: int) -> tuple[float, int]:
+    """Returns the change of yaw from a lane's end to the exit of the junction, and the lane after it."""
+    for _ in range(_HOPS):
+        if graph.junction[way] == 0 or len(successors[way]) != 1:
+            break
+        way = successors[way][0]
+    turned = float(graph.lanes[lane, _END_YAW] - graph.lanes[way, _START_YAW])  # yaw is clockwise, angles are not
+    return (turned + 180.0) % 360.0 - 180.0, way

@@ -13,29 +13,46 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from dorothie_gym.baselines.decoding import TAKES_ANGLE, TAKES_SIDE, Predicted, allowed_angle, likeliest
 from dorothie_gym.baselines.encoders import PAD
-from dorothie_gym.baselines.inputs import NFD, TASKS, UFN, Inputs, Labels
-from dorothie_gym.baselines.junction_reader.exits import END, EXITS, exit_table
-from dorothie_gym.baselines.junction_reader.features import SIZE, mentions, recent, ways
+from dorothie_gym.baselines.junction_reader.features import (
+    EXITS,
+    LANE_END,
+    RECENT_SIZE,
+    exit_table,
+    mentions,
+    recent,
+    ways,
+)
+from dorothie_gym.baselines.model_io import (
+    NFD,
+    TAKES_ANGLE,
+    TAKES_SIDE,
+    TASKS,
+    UFN,
+    Inputs,
+    Labels,
+    Predicted,
+    allowed_angle,
+    likeliest,
+)
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.losses import angle_error
 from dorothie_gym.baselines.toto.model import TOTO, Tokens
 from dorothie_gym.baselines.toto.texts import FrozenTexts
-from dorothie_gym.baselines.toto.towns import METRES, Towns
+from dorothie_gym.baselines.toto.towns import POSITION_UNIT, Towns
 from dorothie_gym.benchmark.features import PARTICIPANT, Columns
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
 
-RECENT: Final = 3
+WORD_BY_WORD: Final = 3
 """Utterances that are read word by word: the current one, and the last two before."""
 
-NEAR_ENOUGH: Final = 15.0
+EXIT_TOLERANCE: Final = 15.0
 """An exit is the labelled one within this angle [degrees] (paper, section 5, Evaluation)."""
 
 SLOT_THRESHOLD: Final = 0.3
 """Probability from which a slot value is predicted: F1 is maximal at half its optimum (Lipton et al., 2014)."""
 
-_RECENTLY: Final = 30.0
+_MAX_WORD_AGE: Final = 30.0
 """Largest age of words; older ones count as this old [s]."""
 
 _SPANS: Final = 4
@@ -76,10 +93,10 @@ class JunctionReader(TOTO):
         self.move_text = nn.Linear(texts.width, width)
         self.piece = nn.Embedding(vocabulary, width, padding_idx=PAD)
         self.place = nn.Embedding(pieces.shape[1], width)
-        self.source = nn.Embedding(RECENT + 1, width)
+        self.source = nn.Embedding(WORD_BY_WORD + 1, width)
         self.exit = nn.Linear(2 + 3 + 3 + 3 + texts.width, width)
         self.state = nn.Linear(_STATE, width)
-        self.recent = nn.Linear(SIZE, width)
+        self.recent = nn.Linear(RECENT_SIZE, width)
         self.spans = nn.Embedding(_SPANS, width)
         self.acts = nn.ModuleList(nn.Linear(width, len(DialogueMove)) for _ in range(2))
         self.direct = nn.Linear(texts.width, len(DialogueMove) + len(LABELS))
@@ -131,7 +148,7 @@ class JunctionReader(TOTO):
             values = torch.cat([torch.from_numpy(getattr(table, name)) for table in tables])
             nowhere = torch.zeros(1, *values.shape[1:], dtype=values.dtype)  # the last row, of a lane not known: -1
             self.register_buffer(f"exit_{name}", torch.cat((values, nowhere)), persistent=False)
-        ends = torch.cat((towns.lanes[:, END], towns.lanes.new_zeros(1, 2))) * METRES
+        ends = torch.cat((towns.lanes[:, LANE_END], towns.lanes.new_zeros(1, 2))) * POSITION_UNIT
         self.register_buffer("lane_end", ends, persistent=False)
         streets = torch.cat((towns.street, towns.street.new_full((1,), -1)))
         self.register_buffer("lane_street", streets, persistent=False)
@@ -211,7 +228,7 @@ class JunctionReader(TOTO):
         apart = apart.masked_fill(~there, torch.inf)
         nearest, which = apart.min(1)
         takes_angle = torch.tensor(TAKES_ANGLE, device=scores.device)[labels.action.clamp(min=0)]
-        known = (nearest < NEAR_ENOUGH) & takes_angle & ~labels.angle.isnan() & (labels.task == NFD)
+        known = (nearest < EXIT_TOLERANCE) & takes_angle & ~labels.angle.isnan() & (labels.task == NFD)
         masked = scores.masked_fill(~there, -1e4)
         return torch.where(known, F.cross_entropy(masked, which, reduction="none"), 0.0)
 
@@ -236,7 +253,7 @@ class JunctionReader(TOTO):
         street = self._street_names(inputs, torch.where(there, self.exit_lane[row], -1))
         sides = torch.stack((angles >= 30, angles <= -30, angles.abs() < 30), dim=-1).float()  # (B, X, 3)
         numbers = torch.stack(
-            (turn.cos(), turn.sin(), seen.float(), along * seen, (nearer / METRES) * seen), dim=-1,
+            (turn.cos(), turn.sin(), seen.float(), along * seen, (nearer / POSITION_UNIT) * seen), dim=-1,
         )  # fmt: skip
         tokens = self.exit(torch.cat((numbers, sides, self._told_way(inputs, sides), street), dim=-1))
         return tokens, there, angles, distance
@@ -252,7 +269,7 @@ class JunctionReader(TOTO):
         place = (human * torch.arange(1, human.shape[1] + 1, device=human.device)).amax(1, keepdim=True) - 1  # (B, 1)
         row = place.clamp(min=0)
         text = torch.where(place >= 0, inputs["utterance_text"].gather(1, row), -1)[:, 0]
-        age = (inputs["time"] - inputs["utterance_time"].gather(1, row)[:, 0]).clamp(0.0, _RECENTLY) / _RECENTLY
+        age = (inputs["time"] - inputs["utterance_time"].gather(1, row)[:, 0]).clamp(0.0, _MAX_WORD_AGE) / _MAX_WORD_AGE
         ways = self.ways[text]  # (B, 3)
         fits = torch.einsum("bxw,bw->bx", sides, ways)
         any_way = ways.amax(1)[:, None].expand(fits.shape)
@@ -291,7 +308,7 @@ class JunctionReader(TOTO):
         """Returns tokens of the pieces of the current utterance and of the last two (B, P, d)."""
         _, taken = self._understood(inputs)
         found = []
-        for back in range(RECENT):
+        for back in range(WORD_BY_WORD):
             text = (
                 inputs["current_text"]
                 if back == 0
@@ -302,7 +319,7 @@ class JunctionReader(TOTO):
             place = torch.arange(pieces.shape[1], device=pieces.device)
             source = torch.full_like(pieces, back)
             if back == 0:
-                source = torch.where(place[None] < taken[:, None], RECENT, source)
+                source = torch.where(place[None] < taken[:, None], WORD_BY_WORD, source)
             tokens = self.piece(pieces) + self.place.weight + self.source(source)
             found.append((tokens, mask, inputs["time"][:, None].expand(mask.shape)))
         return found
@@ -330,7 +347,7 @@ class JunctionReader(TOTO):
     def _state(self, inputs: Inputs, there: Tensor, distance: Tensor) -> Tensor:
         """Returns the state of the car in numbers of about 1 (B, 9)."""
         speed = _newest(inputs["window_speed"], inputs["window_mask"])
-        ahead = inputs["values"][..., 0].masked_fill(~inputs["objects_mask"], METRES).amin(1)
+        ahead = inputs["values"][..., 0].masked_fill(~inputs["objects_mask"], POSITION_UNIT).amin(1)
         place, known = self._wanted_place(inputs)
         far = (place - _newest_pose(inputs)[:, :2]).norm(dim=-1)
         return torch.stack(

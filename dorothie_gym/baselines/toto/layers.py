@@ -9,10 +9,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-TICK: Final = 0.5
+TIME_STEP: Final = 0.5
 """One step of the time encoding [s]: the sines of the fastest channel turn once in about 3 s."""
 
-_LONGEST: Final = 10_000.0
+_PERIOD_RATIO: Final = 10_000.0
 """Ratio of the slowest to the fastest channel (Vaswani et al., 2017, section 3.5)."""
 
 _LOWEST: Final = torch.iinfo(torch.int64).min
@@ -26,7 +26,9 @@ def time_encoding(seconds: Tensor, width: int) -> Tensor:
         width: even.
     """
     exponents = torch.arange(width // 2, device=seconds.device, dtype=torch.float32) * (2.0 / width)
-    angles = (seconds.float() / TICK).unsqueeze(-1) * torch.exp(exponents * -math.log(_LONGEST))  # (..., width/2)
+    angles = (seconds.float() / TIME_STEP).unsqueeze(-1) * torch.exp(
+        exponents * -math.log(_PERIOD_RATIO)
+    )  # (..., width/2)
     return torch.cat((angles.sin(), angles.cos()), dim=-1)
 
 

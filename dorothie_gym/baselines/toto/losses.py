@@ -9,13 +9,12 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from dorothie_gym.baselines.decoding import Outputs
-from dorothie_gym.baselines.inputs import NFD, RFN, Labels
+from dorothie_gym.baselines.model_io import NFD, RFN, Labels, Outputs
 from dorothie_gym.baselines.toto.config import LossWeights, TOTOConfig
 from dorothie_gym.ontology import VECTOR_SLOTS
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
 
-_TINY: Final = 1e-6
+_ROOT_OFFSET: Final = 1e-6
 """Under a root, so that its slope stays finite at 0."""
 
 
@@ -61,7 +60,7 @@ def angle_error(direction: Tensor, degrees: Tensor) -> Tensor:
     known = ~degrees.isnan()
     radians = torch.deg2rad(torch.where(known, degrees, 0.0))
     target = torch.stack((radians.cos(), radians.sin()), dim=-1)
-    chord = ((direction - target).square().sum(-1) + _TINY).sqrt()
+    chord = ((direction - target).square().sum(-1) + _ROOT_OFFSET).sqrt()
     return torch.where(known, chord, 0.0) * (180.0 / math.pi)
 
 
@@ -73,7 +72,7 @@ def _belief(outputs: Outputs, labels: Labels) -> Tensor:
     error = torch.stack((error[:, 0], error[:, 1], turned, error[:, 3], error[:, 4]), dim=-1)
     count = known.sum(-1)
     mean = (error.square() * known).sum(-1) / count.clamp(min=1)
-    return torch.where(count > 0, (mean + _TINY).sqrt(), 0.0)
+    return torch.where(count > 0, (mean + _ROOT_OFFSET).sqrt(), 0.0)
 
 
 def slot_types(slots: Tensor) -> Tensor:

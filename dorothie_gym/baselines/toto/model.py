@@ -12,14 +12,13 @@ from typing import Final, TypeAlias
 import torch
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.decoding import Outputs, Predicted, decode
-from dorothie_gym.baselines.inputs import Inputs, Labels
+from dorothie_gym.baselines.model_io import Inputs, Labels, Outputs, Predicted, decode
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.layers import Block, GraphAttention, segment_softmax, time_encoding
 from dorothie_gym.baselines.toto.losses import point_losses
 from dorothie_gym.baselines.toto.texts import Texts
-from dorothie_gym.baselines.toto.towns import DEGREES, METRES, Towns
-from dorothie_gym.baselines.training.trainer import Model
+from dorothie_gym.baselines.toto.towns import ANGLE_UNIT, POSITION_UNIT, Towns
+from dorothie_gym.baselines.trainer import Model
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, LANE_ID, LENGTH
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
@@ -40,8 +39,8 @@ YAW: Final = FEATURES.index("start_yaw")
 """Column of a lane's heading at its start."""
 
 _UPS: Final = 3
-_BELIEF_UNITS: Final = (1.0, 1.0, DEGREES, METRES, METRES)
-_OBJECT_UNITS: Final = (30.0, DEGREES, 30.0, 30.0, DEGREES, 10.0, 5.0, 5.0)
+_BELIEF_UNITS: Final = (1.0, 1.0, ANGLE_UNIT, POSITION_UNIT, POSITION_UNIT)
+_OBJECT_UNITS: Final = (30.0, ANGLE_UNIT, 30.0, 30.0, ANGLE_UNIT, 10.0, 5.0, 5.0)
 """Divisors of the columns of `OBJECT_VALUES`, which scale each to about 1."""
 
 
@@ -203,7 +202,7 @@ class TOTO(Model):
         whole = self.map_token(pooled).index_select(0, town).unsqueeze(1)  # (B, 1, d)
 
         row = towns.lane_rows(town, inputs["landmark_lane"])  # (B, K)
-        place = inputs["landmark_place"] / METRES
+        place = inputs["landmark_place"] / POSITION_UNIT
         lane = [self._of_lane(row, column) for column in (YAW, LENGTH, LANE_ID)]
         known = torch.stack((*lane, row >= 0, inputs["landmark_street"] >= 0), dim=-1)  # (B, K, 5)
         name = self.texts(inputs["landmark_text"])
@@ -245,7 +244,7 @@ class TOTO(Model):
     def _actions(self, inputs: Inputs) -> Tokens:
         """Returns tokens of physical actions and their arguments."""
         action = self.action(inputs["action"] * _UPS + inputs["action_up"] + 1)  # (B, A, d - 1)
-        tokens = torch.cat((action, inputs["action_angle"].unsqueeze(-1) / DEGREES), dim=-1)
+        tokens = torch.cat((action, inputs["action_angle"].unsqueeze(-1) / ANGLE_UNIT), dim=-1)
         return tokens, inputs["action_mask"], inputs["action_time"]
 
     def _transcript(self, inputs: Inputs) -> list[Tokens]:
@@ -270,7 +269,9 @@ class TOTO(Model):
         if Channel.TRAJECTORY in self.config.channels:
             row = self.towns.lane_rows(inputs["town"], inputs["window_lane"])  # (B, W)
             x, y, yaw = inputs["window_pose"].unbind(-1)
-            numbers = torch.stack((x / METRES, y / METRES, yaw / DEGREES, self._of_lane(row, LANE_ID)), dim=-1)
+            numbers = torch.stack(
+                (x / POSITION_UNIT, y / POSITION_UNIT, yaw / ANGLE_UNIT, self._of_lane(row, LANE_ID)), dim=-1
+            )
             tokens = self.window(torch.cat((numbers, self._ids(row)), dim=-1))
         else:
             tokens = self.window(torch.ones(*mask.shape, 1, device=mask.device))

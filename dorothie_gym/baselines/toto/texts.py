@@ -12,7 +12,7 @@ from torch.nn import functional as F
 from dorothie_gym.baselines.encoders import PAD
 from dorothie_gym.baselines.toto.layers import Block
 
-_TINY: Final = 1e-6
+_SMALLEST_SPREAD: Final = 1e-6
 
 
 class Texts(nn.Module, ABC):
@@ -97,7 +97,7 @@ class TrainedTexts(Texts):
 
 def spread_of(table: Tensor) -> float:
     """Returns how large the numbers of vectors (n, width) are: the root of their mean square."""
-    return float(table.square().mean().sqrt().clamp(min=_TINY))
+    return float(table.square().mean().sqrt().clamp(min=_SMALLEST_SPREAD))
 
 
 class SmallBert(nn.Module):

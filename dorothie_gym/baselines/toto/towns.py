@@ -9,18 +9,18 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.inputs import tensor
+from dorothie_gym.baselines.model_io import tensor
 from dorothie_gym.benchmark.features import TownGraph
 from dorothie_gym.maps.lane_graph import FEATURES
 
-METRES: Final = 100.0
+POSITION_UNIT: Final = 100.0
 """Unit of places in a model [m]: towns are some hundred metres wide."""
 
-DEGREES: Final = 180.0
+ANGLE_UNIT: Final = 180.0
 """Unit of angles in a model [degrees]."""
 
-_LENGTHS: Final = 50.0
-_LANE_IDS: Final = 4.0
+_LENGTH_UNIT: Final = 50.0
+_LANE_ID_UNIT: Final = 4.0
 
 
 class Towns(nn.Module):
@@ -94,6 +94,6 @@ class Towns(nn.Module):
 
 def _scale() -> np.ndarray:
     """Returns the divisors of the columns of lanes (14,)."""
-    units = {"length": _LENGTHS, "lane_id": _LANE_IDS}
+    units = {"length": _LENGTH_UNIT, "lane_id": _LANE_ID_UNIT}
     angles = ("pitch", "yaw", "roll")
-    return np.array([units.get(name, DEGREES if name.endswith(angles) else METRES) for name in FEATURES])
+    return np.array([units.get(name, ANGLE_UNIT if name.endswith(angles) else POSITION_UNIT) for name in FEATURES])

@@ -1,7 +1,6 @@
 """Model inputs: a corpus as columns, its points, and batches of the data visible at points."""
 
 from dorothie_gym.benchmark.features.batch import HISTORY, Batch, BatchSpec, HistorySizes, gather
-from dorothie_gym.benchmark.features.building import build, columns_of
 from dorothie_gym.benchmark.features.columns import (
     CO_WIZARD,
     NO_TEXT,
@@ -19,6 +18,7 @@ from dorothie_gym.benchmark.features.columns import (
     TownGraph,
     UtteranceRows,
 )
+from dorothie_gym.benchmark.features.corpus_columns import build, columns_of
 from dorothie_gym.benchmark.features.point_table import PointTable, points
 from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, ObjectKind
 from dorothie_gym.recording.trajectory import TENTHS

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.benchmark.features.batch import HistorySizes
-from dorothie_gym.benchmark.features.building import join
 from dorothie_gym.benchmark.features.columns import Columns, TownGraph
-from dorothie_gym.benchmark.features.extraction import (
+from dorothie_gym.benchmark.features.corpus_columns import join
+from dorothie_gym.benchmark.features.session_columns import (
     SessionColumns,
     TextPool,
     action_columns,

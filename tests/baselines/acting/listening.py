@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dorothie_gym.baselines.acting.action_effects import HistoryTracker
-from dorothie_gym.baselines.acting.history import History
-from dorothie_gym.baselines.acting.utterance_spans import spans_of
+from dorothie_gym.baselines.acting.history import History, HistoryTracker
+from dorothie_gym.baselines.acting.policy import spans_of
 from dorothie_gym.benchmark.features import HistorySizes
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv

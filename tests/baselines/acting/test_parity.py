@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from dorothie_gym.benchmark.features import Columns, HistorySizes, columns_of, gather, points
-from dorothie_gym.benchmark.features.extraction import town_graph
 from dorothie_gym.benchmark.features.incremental import trajectory_at_tenths
+from dorothie_gym.benchmark.features.session_columns import town_graph
 from dorothie_gym.dialogue import Span
 from dorothie_gym.ontology import DialogueAct, DialogueMove, PhysicalAction, Role
 from dorothie_gym.recording import OBJECT_VALUES, Task

@@ -1,6 +1,6 @@
 """Words of several acts are parted where the rules that guess acts from words agree."""
 
-from dorothie_gym.baselines.acting.utterance_spans import spans_of
+from dorothie_gym.baselines.acting.policy import spans_of
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName
 
 OKAY = DialogueAct.of(DialogueMove.ACKNOWLEDGE)

@@ -11,9 +11,9 @@ import numpy as np
 
 from dorothie_gym.baselines.acting.observation_frames import header_of, observed_frame
 from dorothie_gym.benchmark.features import Columns
-from dorothie_gym.benchmark.features.building import join
-from dorothie_gym.benchmark.features.extraction import extract, town_graph
+from dorothie_gym.benchmark.features.corpus_columns import join
 from dorothie_gym.benchmark.features.incremental import ObservedFrame
+from dorothie_gym.benchmark.features.session_columns import extract, town_graph
 from dorothie_gym.dialogue import Span
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role

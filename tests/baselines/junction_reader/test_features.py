@@ -3,11 +3,11 @@
 import pytest
 import torch
 
-from dorothie_gym.baselines.junction_reader.features import DECAYS, MOVES, SIZE, recent
+from dorothie_gym.baselines.junction_reader.features import DECAYS, RECENT_MOVES, RECENT_SIZE, recent
 from dorothie_gym.ontology import LABELS, DialogueMove, PhysicalAction
 
 KINDS = 2 * len(DialogueMove)
-AT_SLOTS = MOVES * KINDS
+AT_SLOTS = RECENT_MOVES * KINDS
 AT_ACTIONS = AT_SLOTS + len(LABELS)
 AT_AGES = AT_ACTIONS + len(PhysicalAction)
 
@@ -30,7 +30,7 @@ def inputs(moves, actions, now=10.0, room=4):
 
 
 def test_before_anything_happened_there_is_nothing():
-    assert recent(inputs([], [])).tolist() == [[0.0] * SIZE]
+    assert recent(inputs([], [])).tolist() == [[0.0] * RECENT_SIZE]
 
 
 def test_the_last_moves_are_told_newest_first_by_whom_and_which():

@@ -1,13 +1,17 @@
-"""Findings of the paper and comparisons of models, tested by paired differences over seeds."""
+"""Results and findings of the paper, and comparisons of models by paired differences over seeds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
+from importlib.resources import files
 from typing import Any, Final, Literal, TypeAlias
 
 from dorothie_gym.analysis.intervals import Estimate
+from dorothie_gym.benchmark.labels import SEEN, UNSEEN
 from dorothie_gym.benchmark.metrics import COLUMNS
 
 FULL: Final = "TOTO"
@@ -20,10 +24,10 @@ OTHER_ABLATIONS: Final = (
 )  # fmt: skip
 """The other ablations of TOTO."""
 
-MOVES: Final = ("ufn_move_accuracy", "rfn_move_accuracy")
-ACTIONS: Final = ("nfd_action_accuracy", "nfd_joint_accuracy")
+MOVE_METRICS: Final = ("ufn_move_accuracy", "rfn_move_accuracy")
+ACTION_METRICS: Final = ("nfd_action_accuracy", "nfd_joint_accuracy")
 
-MARGIN: Final = 0.05
+SMALLEST_DIFFERENCE: Final = 0.05
 """Smallest difference that matters; about the largest width of the intervals in the paper (share)."""
 
 Estimates: TypeAlias = Callable[[str, str, str], Estimate]
@@ -47,7 +51,7 @@ class ModelClaim:
         metric: key of the metric.
         higher, lower: names of the models.
         difference: first model minus second, paired over seeds.
-        expected: "positive", or "hardly any" for a difference below `MARGIN`.
+        expected: "positive", or "hardly any" for a difference below `SMALLEST_DIFFERENCE`.
     """
 
     metric: str
@@ -61,7 +65,8 @@ class ModelClaim:
         """Outcome by the 95 % interval of the difference.
 
         "positive" holds if the interval lies above 0, and fails if it lies below. "hardly any" holds if the interval
-        lies below `MARGIN`, and fails if it lies above 0. Otherwise, or with fewer than two seeds, it is undecided.
+        lies below `SMALLEST_DIFFERENCE`, and fails if it lies above 0. Otherwise, or with fewer than two seeds, it is
+        undecided.
         """
         mean, half = self.difference.mean, self.difference.half_width
         if mean is None:
@@ -72,7 +77,7 @@ class ModelClaim:
         if self.expected == "positive":
             holds, fails = low > 0.0, high < 0.0
         else:
-            holds, fails = high < MARGIN, low > 0.0
+            holds, fails = high < SMALLEST_DIFFERENCE, low > 0.0
         return ModelVerdict.HOLDS if holds else ModelVerdict.FAILS if fails else ModelVerdict.UNDECIDED
 
     def to_json(self) -> dict[str, Any]:
@@ -141,7 +146,7 @@ def findings(estimate: Estimates, part: str) -> tuple[ModelFinding, ...]:
             statement="Action history matters most: removing it lowers move and action accuracy more than removing "
             "any other input",
             part=part,
-            claims=tuple(c for metric in (*MOVES, *ACTIONS) for c in most(metric)),
+            claims=tuple(c for metric in (*MOVE_METRICS, *ACTION_METRICS) for c in most(metric)),
             note="In the published features, the history of a UfN point contains the point's own label, which is "
             "removed together with the history; here it is never included.",
         ),
@@ -153,7 +158,7 @@ def findings(estimate: Estimates, part: str) -> tuple[ModelFinding, ...]:
         ModelFinding(
             statement="Fine-tuned BERT leads on moves and trails on NfD joint",
             part=part,
-            claims=(*(claim(metric, TUNED, FULL) for metric in MOVES), claim("nfd_joint_accuracy", FULL, TUNED)),
+            claims=(*(claim(metric, TUNED, FULL) for metric in MOVE_METRICS), claim("nfd_joint_accuracy", FULL, TUNED)),
         ),
         ModelFinding(
             statement="Map knowledge hardly helps",
@@ -190,3 +195,56 @@ def _lowest(estimate: Estimates, part: str, metric: str, models: Sequence[str]) 
     means = {model: estimate(model, part, metric).mean for model in models}
     known = {model: mean for model, mean in means.items() if mean is not None}
     return min(known, key=known.__getitem__) if known else None
+
+
+# --- Results of the paper, shown beside those of this package --------------------------------------------------------
+
+_FILE: Final = "data/paper_results.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperFigure:
+    """Result of the paper and half the width of its interval, as shares in [0, 1]."""
+
+    mean: float
+    half_width: float
+
+
+@cache
+def paper_figures() -> Mapping[str, Mapping[str, Mapping[str, PaperFigure]]]:
+    """Returns the paper's figures: model -> "seen" or "unseen" -> key of a column of the table -> figure."""
+    page = json.loads(files("dorothie_gym.benchmark").joinpath(_FILE).read_text(encoding="utf-8"))
+    assert page["columns"] == list(COLUMNS)
+    return {
+        model: {
+            part: {
+                key: PaperFigure(mean=mean / 100.0, half_width=half / 100.0)
+                for key, (mean, half) in zip(page["columns"], folds[part], strict=True)
+            }
+            for part in (SEEN, UNSEEN)
+        }
+        for model, folds in page["models"].items()
+    }
+
+
+def paper_source() -> str:
+    """Returns the source of the results of the paper."""
+    page = json.loads(files("dorothie_gym.benchmark").joinpath(_FILE).read_text(encoding="utf-8"))
+    return str(page["source"])
+
+
+def paper_figure(model: str, part: str, key: str) -> PaperFigure | None:
+    """Returns the result of the paper for a model, or None.
+
+    Args:
+        model: name of the model, in any case.
+        part: part of the corpus.
+        key: one of our metrics, `ufn_slot_f1_paper` or `ufn_slot_f1`.
+    """
+    return paper_figures().get(paper_name(model) or "", {}).get(part, {}).get(key.removesuffix("_paper"))
+
+
+def paper_name(model: str) -> str | None:
+    """Returns the spelling of a model's name in the paper, ignoring case; None if the paper has no such model."""
+    names = {name.casefold(): name for name in paper_figures()}
+    return names.get(model.casefold())

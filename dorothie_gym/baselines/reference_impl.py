@@ -24,7 +24,7 @@ from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
 from dorothie_gym.recording import Session, Task
 from dorothie_gym.recording.points import DecisionPoint, InferencePoint, Point, PointView, history_angle
 
-WIDTH: Final = 770
+TOKEN_WIDTH: Final = 770
 LANES, ROADS, JUNCTIONS = 486, 259, 34
 """Sizes that the published model is tied to; towns beyond them are cut off."""
 
@@ -129,7 +129,7 @@ def rebuild(session: Session, view: PointView, graph: TownGraph, senses: Senses)
         street_lanes=[[lane for lane in lanes if lane < LANES] for lanes in members],
         actions=torch.tensor([action.action.value - 1 for action in actions], dtype=torch.int64),
         angles=torch.tensor([history_angle(action) / 180.0 for action in actions]),
-        dialogue=_stacked(dialogue, WIDTH),
+        dialogue=_stacked(dialogue, TOKEN_WIDTH),
         moves=torch.tensor([int(move.act.move) for move in moves], dtype=torch.int64),
         move_bits=torch.tensor(bits).view(-1, 2 + len(VECTOR_SLOTS) + len(LABELS)),
         trajectory=torch.tensor(window).view(-1, 4),
@@ -149,20 +149,20 @@ class PublishedTOTO(nn.Module):
         self.road = nn.Embedding(ROADS, IDS // 2)
         self.junction = nn.Embedding(JUNCTIONS, IDS // 2)
         self.graph = GraphAttention(len(FEATURES) + IDS, _LANE, 8, len(EDGE_TYPES))
-        self.map = nn.Linear(LANES * _LANE, WIDTH)
-        self.landmark = nn.Linear(7 + IDS + WORDS, WIDTH)
-        self.street = nn.Linear(_LANE + WORDS, WIDTH)
-        self.action = nn.Embedding(len(PhysicalAction), WIDTH - 1)
-        self.move = nn.Embedding(len(DialogueMove) + 1, WIDTH - 2 - len(VECTOR_SLOTS) - len(LABELS))
-        self.window = nn.Linear(4 + IDS + IMAGE, WIDTH)
-        self.sound = nn.Linear(SOUND, WIDTH)
-        self.detector = nn.Linear(QUERIES * QUERY, WIDTH)
-        layer = nn.TransformerEncoderLayer(WIDTH, 11, WIDTH, 0.1)
+        self.map = nn.Linear(LANES * _LANE, TOKEN_WIDTH)
+        self.landmark = nn.Linear(7 + IDS + WORDS, TOKEN_WIDTH)
+        self.street = nn.Linear(_LANE + WORDS, TOKEN_WIDTH)
+        self.action = nn.Embedding(len(PhysicalAction), TOKEN_WIDTH - 1)
+        self.move = nn.Embedding(len(DialogueMove) + 1, TOKEN_WIDTH - 2 - len(VECTOR_SLOTS) - len(LABELS))
+        self.window = nn.Linear(4 + IDS + IMAGE, TOKEN_WIDTH)
+        self.sound = nn.Linear(SOUND, TOKEN_WIDTH)
+        self.detector = nn.Linear(QUERIES * QUERY, TOKEN_WIDTH)
+        layer = nn.TransformerEncoderLayer(TOKEN_WIDTH, 11, TOKEN_WIDTH, 0.1)
         self.encoder = nn.TransformerEncoder(layer, 2, enable_nested_tensor=False)
-        self.action_head = nn.Linear(WIDTH, len(NAVIGATION_ACTIONS))
-        self.angle_head = nn.Linear(WIDTH, 1)
+        self.action_head = nn.Linear(TOKEN_WIDTH, len(NAVIGATION_ACTIONS))
+        self.angle_head = nn.Linear(TOKEN_WIDTH, 1)
         spoken = len(DialogueMove) + 1 + len(VECTOR_SLOTS) + len(LABELS)
-        self.act_heads = nn.ModuleList(nn.Linear(WIDTH, spoken) for _ in range(2))
+        self.act_heads = nn.ModuleList(nn.Linear(TOKEN_WIDTH, spoken) for _ in range(2))
 
     def forward(self, given: Features) -> Tensor:
         """Returns the last token after the encoder (770,)."""

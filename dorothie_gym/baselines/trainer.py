@@ -13,9 +13,8 @@ from typing import Any, Final, Protocol
 import torch
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.decoding import Predicted
-from dorothie_gym.baselines.inputs import Examples, Inputs, Labels
-from dorothie_gym.baselines.training import checkpoints
+from dorothie_gym.baselines import checkpoints
+from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
 from dorothie_gym.benchmark.features import BatchSpec
 from dorothie_gym.errors import CheckpointError
 

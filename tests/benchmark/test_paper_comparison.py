@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from dorothie_gym.benchmark import COLUMNS, Estimate, ModelVerdict, above, findings, paper_figures
-from dorothie_gym.benchmark.claims import FULL, NO_HISTORY, NO_MAP, OTHER_ABLATIONS, TUNED
+from dorothie_gym.benchmark.paper_comparison import FULL, NO_HISTORY, NO_MAP, OTHER_ABLATIONS, TUNED
 
 NOISE = (-0.01, 0.0, 0.01)
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from torch import nn
 
+from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION
-from dorothie_gym.baselines.decoding import allowed_angle
-from dorothie_gym.baselines.training import checkpoints
+from dorothie_gym.baselines.model_io import allowed_angle
 from dorothie_gym.benchmark import ActionPredictions, ActPredictions, TaskPredictions
 from dorothie_gym.envs.nfd_v0 import NfDEnv
 from dorothie_gym.envs.rfn_v0 import RfNEnv
@@ -29,16 +29,16 @@ from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation
 
 ENVS: Final[dict[Task, type[TeacherForcedEnv]]] = {Task.UFN: UfNEnv, Task.RFN: RfNEnv, Task.NFD: NfDEnv}
 
-WIDTH: Final = 64
+LAYER_WIDTH: Final = 64
 """Width of each of the two layers of a policy: stable-baselines3's default."""
 
 PASSES: Final = 3
 """Passes of PPO over the points."""
 
-_STEPS: Final = 512
-_EPOCHS, _PATIENCE, _MAX_EPOCHS = 10, 5, 40
-_BATCH: Final = 64
-_RATE: Final = 1e-3
+_ROLLOUT_STEPS: Final = 512
+_MIN_EPOCHS, _PATIENCE, _MAX_EPOCHS = 10, 5, 40
+_BATCH_SIZE: Final = 64
+_LEARNING_RATE: Final = 1e-3
 
 
 class FlatTask(gym.ObservationWrapper[NDArray[np.float32], Any, Any]):
@@ -127,8 +127,9 @@ def run_policy(
         env = make_task(corpus, task, TRAIN)
         test = demonstrate(make_task(corpus, task, TEST), counts[TEST])
         learner = PPO(
-            "MlpPolicy", env, seed=seed, gamma=0.0, gae_lambda=0.0, n_steps=_STEPS, batch_size=_BATCH, n_epochs=4,
-            ent_coef=0.01, device="cpu", policy_kwargs={"net_arch": [WIDTH, WIDTH]},
+            "MlpPolicy", env, seed=seed, gamma=0.0, gae_lambda=0.0, n_steps=_ROLLOUT_STEPS,
+            batch_size=_BATCH_SIZE, n_epochs=4, ent_coef=0.01, device="cpu",
+            policy_kwargs={"net_arch": [LAYER_WIDTH, LAYER_WIDTH]},
         )  # fmt: skip  # what is predicted never changes what comes next: the reward of the point is all there is
         shown = demonstrate(env, counts[TRAIN])
         if kind == "ppo":
@@ -144,13 +145,13 @@ def run_policy(
 
 def _clone(policy: Any, shown: TaskDemonstrations, validation: TaskDemonstrations, seed: int) -> int:
     """Maximises the likelihood of the labels; keeps the best epoch on the validation fold. Returns the epochs."""
-    optimiser = torch.optim.AdamW(policy.parameters(), lr=_RATE, weight_decay=1e-2)
+    optimiser = torch.optim.AdamW(policy.parameters(), lr=_LEARNING_RATE, weight_decay=1e-2)
     generator = torch.Generator().manual_seed(seed)
     lowest, best, weights = float("inf"), 0, {}
     epoch = 0
-    while epoch < _MAX_EPOCHS and (epoch < _EPOCHS or epoch - best < _PATIENCE):
+    while epoch < _MAX_EPOCHS and (epoch < _MIN_EPOCHS or epoch - best < _PATIENCE):
         epoch += 1
-        for rows in torch.split(torch.randperm(len(shown.labels), generator=generator), _BATCH):
+        for rows in torch.split(torch.randperm(len(shown.labels), generator=generator), _BATCH_SIZE):
             optimiser.zero_grad()
             loss = _surprise(policy, shown, rows)
             loss.backward()  # type: ignore[no-untyped-call]

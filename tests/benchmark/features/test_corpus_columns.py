@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.benchmark.features import build, building
-from dorothie_gym.benchmark.features.store import INDEX_FILE, features_folder, keep, read_columns
+from dorothie_gym.benchmark.features import build
+from dorothie_gym.benchmark.features import corpus_columns as building
+from dorothie_gym.benchmark.features.corpus_columns import INDEX_FILE, features_folder, keep, read_columns
 from dorothie_gym.errors import FeatureStoreError, SessionError
 from tests.benchmark.features.test_layouts import assert_same
 from tests.recording.builders import write

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dorothie_gym.baselines.acting.action_effects import HistoryTracker, carried_out
-from dorothie_gym.baselines.acting.history import History
+from dorothie_gym.baselines.acting.history import History, HistoryTracker, carried_out
 from dorothie_gym.benchmark.features import HistorySizes
 from dorothie_gym.dialogue import Span
 from dorothie_gym.ontology import DialogueAct, DialogueMove, PhysicalAction, Role
