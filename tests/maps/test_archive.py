@@ -42,21 +42,21 @@ def _document(**changes: object) -> bytes:
     return _npz(document=np.frombuffer(text, np.uint8), floats=floats)
 
 
-def test_an_archive_holds_all_that_a_town_is_made_of() -> None:
+def test_an_archive_holds_all_parts_of_a_town() -> None:
     assert set(inspect.signature(Town).parameters) == {"name", *PARTS}
 
 
-def test_a_town_with_everything_comes_back_to_the_last_bit() -> None:
+def test_a_town_with_all_parts_is_restored_bit_for_bit() -> None:
     assert town_bits(unpack(PACKED, "key")) == town_bits(town_with_everything())
 
 
-def test_an_empty_town_comes_back() -> None:
+def test_an_empty_town_is_restored() -> None:
     empty = Town(name="", lanes=[], links=[], junctions=[])
     assert town_bits(unpack(pack(empty, "key"), "key")) == town_bits(empty)
 
 
 @pytest.mark.parametrize("name", [*town_names(), "Town02", "Town05"])
-def test_real_towns_come_back_to_the_last_bit(name: str) -> None:
+def test_real_towns_are_restored_bit_for_bit(name: str) -> None:
     town = load_town(name if name in town_names() else shared_map(name))
     again = unpack(pack(town, "key"), "key")
     assert town_bits(again) == town_bits(town)
@@ -88,7 +88,7 @@ def test_any_missing_or_added_end_is_noticed() -> None:
 
 
 @given(st.binary(max_size=300))
-def test_no_bytes_do_worse_than_an_archive_error(noise: bytes) -> None:
+def test_damaged_bytes_raise_only_archive_errors(noise: bytes) -> None:
     for data in (noise, _sealed(noise)):
         with pytest.raises(TownArchiveError):
             unpack(data, "key")
@@ -125,7 +125,7 @@ def test_objects_that_would_have_to_be_unpickled_are_refused() -> None:
         _document(crosswalks={"id": [0], "outline": {"shapes": [[50, 2]]}}),
     ],
 )
-def test_what_holds_no_town_is_refused_even_with_a_right_checksum(data: bytes) -> None:
+def test_content_without_a_town_is_refused_even_with_a_correct_checksum(data: bytes) -> None:
     with pytest.raises(TownArchiveError):
         unpack(data, "key")
 

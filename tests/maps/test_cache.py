@@ -135,7 +135,7 @@ def test_the_compiler_s_digest_follows_its_sources(tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.parametrize("at", [0, 10, 0.1, 0.5, 0.9, -70, -64, -1])
-def test_a_damaged_entry_is_compiled_anew_and_replaced(path: Path, folder: Path, at: float) -> None:
+def test_a_damaged_entry_is_compiled_again_and_replaced(path: Path, folder: Path, at: float) -> None:
     good = town_bits(through_cache(path, Reader()))
     entry, reader = _entry(folder), Reader()
     data = entry.read_bytes()
@@ -148,7 +148,7 @@ def test_a_damaged_entry_is_compiled_anew_and_replaced(path: Path, folder: Path,
 
 
 @pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.99])
-def test_a_truncated_entry_is_compiled_anew_and_replaced(
+def test_a_truncated_entry_is_compiled_again_and_replaced(
     path: Path, folder: Path, share: float, caplog: pytest.LogCaptureFixture
 ) -> None:
     through_cache(path, Reader())
@@ -172,7 +172,7 @@ def test_the_entry_of_another_town_under_a_wrong_name_is_not_trusted(path: Path,
     assert through_cache(path, Reader()).name == "loop"
 
 
-def test_a_folder_in_place_of_an_entry_does_no_harm(path: Path, folder: Path) -> None:
+def test_a_folder_in_place_of_an_entry_is_ignored(path: Path, folder: Path) -> None:
     through_cache(path, Reader())
     entry = _entry(folder)
     entry.unlink()

@@ -73,7 +73,7 @@ def test_the_whole_town_is_what_the_steps_make() -> None:
     assert yaml.safe_load(WHOLE[1]) == grown(len(STEPS))
 
 
-def test_the_steps_bring_what_they_promise(tmp_path: Path) -> None:
+def test_the_steps_have_their_described_effects(tmp_path: Path) -> None:
     town = compiled(tmp_path, WHOLE[1])
     assert {"park", "Viaduct", "Ferry Street"} <= {street.name for street in town.streets}
     assert {SignalKind.TRAFFIC_LIGHT, SignalKind.YIELD} <= {signal.kind for signal in town.signals}
@@ -124,7 +124,7 @@ DEFAULTS = streets.StreetDefaults()
         ("Of lights and their phases", "seconds", signs.SECONDS, "required"),
     ],
 )
-def test_the_tables_tell_ranges_and_defaults(heading: str, key: str, limits: tuple[float, float], default: str) -> None:
+def test_the_tables_list_ranges_and_defaults(heading: str, key: str, limits: tuple[float, float], default: str) -> None:
     _, range_, told = rows(heading)[key]
     assert re.match(rf"{limits[0]:g} to {limits[1]:.0f}\b", range_)
     assert told.startswith(default)

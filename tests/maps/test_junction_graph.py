@@ -85,7 +85,7 @@ def test_paths_list_their_roads_and_street(name: str) -> None:
         assert (length > 0.0) == bool(ids)
 
 
-def test_of_two_ways_between_junctions_the_shorter_counts() -> None:
+def test_the_shorter_of_two_paths_between_junctions_counts() -> None:
     lanes = [
         lane(0, [(-10, 0), (0, 0)], road=10, junction=5),
         lane(1, [(0, 0), (50, 40), (100, 0)], road=1),

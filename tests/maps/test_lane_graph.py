@@ -116,7 +116,7 @@ def test_u_turn_leads_to_the_lane_beside_where_a_turn_lane_cuts_the_others() -> 
     assert turns == {0: 4, 1: 3, 2: 3, 3: 2, 4: 0}
 
 
-def test_edge_is_written_once_where_a_lane_goes_on_in_the_one_it_could_turn_round_to() -> None:
+def test_edge_is_written_once_where_successor_and_u_turn_lead_to_the_same_lane() -> None:
     lanes = [straight(0, -1, (0, 100), 2), straight(1, 1, (100, 0), -2)]
     town = Town(name="end", lanes=lanes, links=[LaneLink(0, 1, LinkType.U_TURN)], junctions=())
     graph = town.to_graph()

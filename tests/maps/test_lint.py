@@ -62,7 +62,7 @@ def test_a_town_without_lanes_has_no_faults() -> None:
 
 
 class TestReach:
-    def test_a_connector_that_nothing_leads_into_is_unreachable(self) -> None:
+    def test_a_connector_without_predecessors_is_unreachable(self) -> None:
         way = a_connector(RIGHT)
         town = brookside()
         faults = check_town(rebuilt(town, links=[link for link in town.links if link.target != way.target]))
@@ -70,7 +70,7 @@ class TestReach:
         assert fault.lanes == (way.target,) and "reached" in fault.message
         assert near(fault, town.lanes[way.target].points[0], within=town.lanes[way.target].length)
 
-    def test_a_lane_that_goes_on_nowhere_is_a_dead_end_and_what_leads_there_has_no_way_back(self) -> None:
+    def test_a_lane_without_successors_is_a_dead_end_and_lanes_before_it_have_no_return(self) -> None:
         town, street = brookside(), a_street()
         links = [link for link in town.links if link.source != street.id]
         found = {fault.kind: fault for fault in check_town(rebuilt(town, links=links))}
@@ -80,13 +80,13 @@ class TestReach:
         no_return = [f.lanes for f in check_town(rebuilt(town, links=links)) if f.kind is FaultKind.NO_RETURN]
         assert sorted(sum(no_return, ())) == sorted(town.predecessors(street.id))
 
-    def test_a_lane_that_runs_out_beside_another_is_no_dead_end(self) -> None:
+    def test_a_lane_that_ends_beside_another_is_no_dead_end(self) -> None:
         town = ring()
         assert (
             check_town(rebuilt(town, links=[link for link in town.links if (link.source, link.target) != (0, 2)])) == ()
         )
 
-    def test_a_part_that_hangs_together_is_one_fault(self) -> None:
+    def test_connected_lanes_are_one_fault(self) -> None:
         first, second = ring(), ring()
         away = [replace(row, id=row.id + 4, road_id=row.road_id + 4, points=row.points + 500.0) for row in second.lanes]
         links = [*first.links, *(LaneLink(k.source + 4, k.target + 4, k.type) for k in second.links)]
@@ -142,7 +142,7 @@ class TestCentreLines:
         (fault,) = only(check_town(with_lane(brookside(), replace(street, points=points))), FaultKind.KINK)
         assert fault.lanes == (street.id,) and near(fault, points[middle], within=spacing + 0.1)
 
-    def test_arcs_are_no_kinks_however_coarse_their_steps_within_reason(self) -> None:
+    def test_coarsely_sampled_arcs_are_no_kinks(self) -> None:
         assert check_town(paperclip(4.0, step=12.0)) == ()
         assert check_town(paperclip(10.0, step=6.0)) == ()
 
@@ -190,13 +190,13 @@ class TestPromises:
         ("was", "called"),
         [(LEFT, RIGHT), (RIGHT, LEFT), (LEFT, STRAIGHT), (RIGHT, STRAIGHT), (LEFT, U_TURN), (STRAIGHT, U_TURN)],
     )
-    def test_a_turn_called_what_it_is_not(self, was: LinkType, called: LinkType) -> None:
+    def test_turn_type_that_contradicts_the_geometry(self, was: LinkType, called: LinkType) -> None:
         way = a_connector(was)
         (fault,) = only(check_town(retyped(brookside(), way, called)), FaultKind.TURN_TYPE)
         assert fault.lanes == (way.source, way.target) and f"called {called}" in fault.message
         assert near(fault, brookside().lanes[way.target].points[0])
 
-    def test_a_lane_that_merely_goes_on_is_no_turn(self) -> None:
+    def test_a_continuing_lane_is_no_turn(self) -> None:
         town = ring()
         (fault,) = only(check_town(retyped(town, LaneLink(0, 2, STRAIGHT), LEFT)), FaultKind.TURN_TYPE)
         assert fault.lanes == (0, 2)
@@ -208,13 +208,13 @@ class TestPromises:
             (LaneLink(0, 3, LinkType.LANE_CHANGE_RIGHT), "degrees to it"),
         ],
     )
-    def test_a_lane_change_to_where_no_lane_runs(self, link: LaneLink, words: str) -> None:
+    def test_lane_change_to_a_lane_that_is_not_parallel(self, link: LaneLink, words: str) -> None:
         town = ring()
         (fault,) = only(check_town(rebuilt(town, links=[*town.links, link])), FaultKind.LANE_CHANGE)
         assert fault.lanes == (link.source, link.target) and words in fault.message
 
     @pytest.mark.parametrize(("gap", "faulty"), [(0.8, False), (4.0, True)])
-    def test_a_lane_change_across_what_lies_between(self, gap: float, faulty: bool) -> None:
+    def test_lane_change_across_another_lane(self, gap: float, faulty: bool) -> None:
         town = ring()
         inner = [
             replace(row, points=row.points * np.array([1 - gap / 56.5, 1 - gap / 56.5, 1.0])) for row in town.lanes
@@ -233,7 +233,7 @@ class TestPromises:
         assert fault.position == (3.0, 4.0) and "99 rules no lane" in fault.message
 
     @pytest.mark.parametrize("kind", [SignalKind.SPEED, SignalKind.OTHER])
-    def test_signs_that_rule_no_lane_by_themselves(self, kind: SignalKind) -> None:
+    def test_signs_without_lanes_of_their_own(self, kind: SignalKind) -> None:
         sign = Signal(id=99, kind=kind, position=(3.0, 4.0, 2.0), heading=0.0)
         assert check_town(rebuilt(ring(), signals=[sign])) == ()
 

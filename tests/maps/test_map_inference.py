@@ -46,7 +46,7 @@ def _crossing() -> tuple[list[Lane], list[LaneLink]]:
     return lanes, [LaneLink(a, b, LinkType.STRAIGHT) for a, b in ways]
 
 
-def test_a_street_goes_on_straight_across_a_junction() -> None:
+def test_a_street_continues_straight_across_a_junction() -> None:
     lanes, streets = name_streets(*_crossing())
     assert [lane.street for lane in lanes] == [0, 0, 1, 1, 0, 1, NO_STREET]
     assert [street.lanes for street in streets] == [(0, 1, 4), (2, 3, 5)]
@@ -146,7 +146,7 @@ def _ring(length: float) -> tuple[list[Lane], list[LaneLink]]:
     return lanes, [LaneLink(a, b, LinkType.STRAIGHT) for a, b in links]
 
 
-def test_no_site_lies_where_one_cannot_come_back_from() -> None:
+def test_no_site_lies_on_a_lane_without_return() -> None:
     lanes, links = _ring(100.0)
     sites = lay_sites(lanes, links, 40)
     assert {site.lane for site in sites} == {0, 1}

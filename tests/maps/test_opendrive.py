@@ -82,7 +82,7 @@ def test_linked_lanes_meet_without_gap_or_kink(town: Town) -> None:
 
 
 @every_town
-def test_links_go_on_before_they_change_lanes_and_come_once(town: Town) -> None:
+def test_successor_links_come_before_lane_changes_and_once(town: Town) -> None:
     pairs = [(link.source, link.target) for link in town.links]
     assert len(set(pairs)) == len(pairs)
     changes = [link.type.is_lane_change for link in town.links]

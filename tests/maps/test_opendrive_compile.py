@@ -68,7 +68,7 @@ def test_curves_are_sampled_to_a_centimetre(tmp_path: Path, radius: float) -> No
     assert np.diff(lane_.stations).max() <= 2.0
 
 
-def test_sections_that_go_on_one_to_one_are_one_lane(tmp_path: Path) -> None:
+def test_sections_that_continue_one_to_one_are_one_lane(tmp_path: Path) -> None:
     rows = (
         section(0.0, lane(-1, more=linked(after=-1)))
         + section(30.0, lane(-1, more=linked(-1, -2)))
@@ -77,7 +77,7 @@ def test_sections_that_go_on_one_to_one_are_one_lane(tmp_path: Path) -> None:
     assert len(_town(tmp_path, road(sections=rows)).lanes) == 1
 
 
-def test_roads_that_go_on_one_to_one_stay_two_lanes(tmp_path: Path) -> None:
+def test_roads_that_continue_one_to_one_stay_two_lanes(tmp_path: Path) -> None:
     first = road(1, link=_next("successor", 2, "start"), sections=section(0.0, lane(-1, more=linked(after=-1))))
     plan = geometry("<line/>", 50.0, x=100.0)
     back = section(0.0, lane(-1, more=linked(before=-1)))

@@ -167,13 +167,13 @@ def _small(text: str, tmp_path: Path, encoding: str = "utf-8") -> int:
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "iso-8859-1"])
-def test_a_map_may_be_encoded_in_any_way_that_it_says(tmp_path: Path, encoding: str) -> None:
+def test_a_map_may_declare_any_encoding(tmp_path: Path, encoding: str) -> None:
     declared = encoding.removesuffix("-sig")
     text = opendrive(road(1)).replace('version="1.0"', f'version="1.0" encoding="{declared}"')
     assert _small(text.replace('name=""', 'name="Königsstraße"'), tmp_path, encoding) == 1
 
 
-def test_a_map_may_have_a_namespace_and_what_no_reader_knows(tmp_path: Path) -> None:
+def test_a_map_may_have_a_namespace_and_unknown_elements(tmp_path: Path) -> None:
     header = '<header revMajor="1" revMinor="6"><geoReference><![CDATA[+proj=tmerc <&>]]></geoReference></header>'
     extras = '<userData code="x"><vectorScene program="RoadRunner"/></userData><!-- note --><?tool of another?>'
     text = opendrive(header, extras, road(1, more=extras, plan=geometry(extras + "<line/>", 100.0)), extras)
@@ -186,7 +186,7 @@ def test_a_namespace_does_not_change_the_message_of_a_fault(tmp_path: Path) -> N
     assert _error(tmp_path, text).element.startswith("road 3")
 
 
-def test_the_road_of_no_junction_may_say_so_or_not(tmp_path: Path) -> None:
+def test_the_junction_attribute_of_a_road_is_optional(tmp_path: Path) -> None:
     assert _small(opendrive(road(1)), tmp_path) == 1
     assert _small(opendrive(road(1).replace('junction="-1"', "")), tmp_path) == 1
     assert _small(opendrive(road(1).replace('junction="-1"', 'junction=""')), tmp_path) == 1

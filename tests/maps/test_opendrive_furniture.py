@@ -97,7 +97,7 @@ def test_a_reference_on_a_connector_rules_the_lane_before_it(tmp_path: Path, s: 
     assert town.signals[0].position[0] == pytest.approx(143.0)
 
 
-def test_a_reference_to_no_signal_does_no_harm(tmp_path: Path) -> None:
+def test_a_reference_to_a_missing_signal_is_ignored(tmp_path: Path) -> None:
     assert _read(tmp_path, *_street(connector=_signal(70, 3.0, tag="signalReference"))).signals == ()
 
 
@@ -211,7 +211,7 @@ def test_sidewalks_run_along_both_sides_of_their_street(tmp_path: Path) -> None:
     assert left.street == right.street == town.lanes[0].street == 0
 
 
-def test_sidewalks_go_on_through_lane_sections_and_end_where_they_are_too_narrow(tmp_path: Path) -> None:
+def test_sidewalks_continue_through_lane_sections_and_end_where_they_are_too_narrow(tmp_path: Path) -> None:
     rows = section(0.0, lane(-1), _walk(-2))
     rows += section(30.0, lane(-1), lane(-2, kind="none", width='a="0" b="0" c="0" d="0"'), _walk(-3))
     rows += section(60.0, lane(-1), _walk(-2, 0.2))

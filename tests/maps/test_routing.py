@@ -102,7 +102,7 @@ def test_lane_changes_do_not_jump_over_what_blocks_a_lane(block: Place, possible
         check_drivable(town, route, (1, 30.0), (0, 76.0))
 
 
-def test_a_roadblock_is_driven_round_on_the_lane_beside() -> None:
+def test_routes_pass_a_roadblock_on_the_lane_beside() -> None:
     town = two_lanes(300.0)
     route = Router(town).route((1, 30.0), (1, 280.0), [(1, 150.0)])
     assert route is not None
@@ -196,7 +196,7 @@ def test_reachable_cells_are_those_that_have_a_route(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_goal_just_behind_the_start_means_a_way_round(name: str) -> None:
+def test_goal_just_behind_the_start_needs_a_detour(name: str) -> None:
     town = network(name).town
     site = town.sites[0]
     lane = town.lanes[site.lane]

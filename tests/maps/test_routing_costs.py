@@ -52,7 +52,7 @@ def test_distances_to_a_goal_are_the_costs_of_routes_there(name: str) -> None:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_no_way_along_lanes_is_cheaper_than_the_route(seed: int) -> None:
+def test_no_other_path_is_cheaper_than_the_route(seed: int) -> None:
     """Every way through a small town is looked at and priced by hand; its lanes are far apart, so only turns matter."""
     rng = np.random.default_rng(seed)
     crossings = [(200.0 * (k % 3), 200.0 * (k // 3)) for k in range(9)]
@@ -121,7 +121,7 @@ def fork(detour: float, turn: LinkType, limit: float = 40.0) -> tuple[Town, Rout
     return town, Router(town)
 
 
-def test_turns_are_the_dearer_the_harder_they_are() -> None:
+def test_harder_turns_cost_more() -> None:
     costs = [TURN_COST[kind] for kind in (LinkType.STRAIGHT, LinkType.RIGHT, LinkType.LEFT, LinkType.U_TURN)]
     assert costs == sorted(set(costs))
     assert costs[0] == 0.0
@@ -160,7 +160,7 @@ def test_a_highway_is_taken_though_it_is_longer() -> None:
         assert route.length == pytest.approx(90.0 + town.lanes[lane].length + 50.0)
 
 
-def test_a_lane_change_costs_its_worth_in_detour() -> None:
+def test_cost_of_a_lane_change_equals_its_detour() -> None:
     town = two_lanes(200.0)
     route = Router(town).route((1, 10.0), (0, 190.0))
     assert route is not None
@@ -169,7 +169,7 @@ def test_a_lane_change_costs_its_worth_in_detour() -> None:
     assert route.cost == pytest.approx(180.0 + CHANGE_COST, abs=1.0)
 
 
-def test_a_hurried_lane_change_is_dearer_than_a_calm_one() -> None:
+def test_a_short_lane_change_costs_more_than_a_long_one() -> None:
     town = two_lanes(200.0)
     hurried, calm = (Router(town).route((1, 150.0), (0, goal)) for goal in (168.0, 190.0))
     assert hurried is not None and calm is not None

@@ -134,7 +134,7 @@ def test_road_that_can_only_turn_left_is_an_approach_like_others() -> None:
 
 
 @pytest.mark.parametrize("order", [*itertools.permutations((0, 30, 150, 180))])
-def test_those_share_a_phase_that_face_each_other_best(order: tuple[int, ...]) -> None:
+def test_best_aligned_approaches_share_a_phase(order: tuple[int, ...]) -> None:
     crossing = crossing_of(order)
     groups = arms_at_green(crossing, the_programme(crossing))
     assert tuple(sorted((order.index(0), order.index(180)))) in groups
@@ -209,7 +209,7 @@ def test_light_for_both_directions_of_a_road_belongs_to_the_junction_it_stands_a
 
 
 @pytest.mark.parametrize("lit", [(1,), (0, 2)])
-def test_lights_that_have_none_to_take_turns_with_still_cycle(lit: tuple[int, ...]) -> None:
+def test_lights_with_a_single_phase_still_cycle(lit: tuple[int, ...]) -> None:
     crossing = meeting(*(Arm(90.0 * k, LIGHT if k in lit else None) for k in range(4)))
     programme = the_programme(crossing)
     assert greens(programme) == [THROUGH_GREEN]

@@ -58,7 +58,7 @@ def test_every_lane_leads_on_and_lanes_beside_each_other_can_be_changed(town: To
             assert {link.type, back.type} == {LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT}
 
 
-def test_links_that_go_on_come_before_lane_changes(town: Town) -> None:
+def test_successor_links_come_before_lane_changes(town: Town) -> None:
     kinds = [link.type.is_lane_change for link in town.links]
     assert kinds == sorted(kinds) and len(set(town.links)) == len(town.links)
 
@@ -119,7 +119,7 @@ def test_two_lanes_turn_side_by_side_where_nothing_else_is_possible(towns: dict[
     assert not ways(town, "Mid", "Queen Street", RIGHT)  # against the one-way street
 
 
-def test_lanes_that_have_nowhere_else_to_go_merge(tmp_path: Path) -> None:
+def test_lanes_without_another_successor_merge(tmp_path: Path) -> None:
     narrow = PAIR.replace(
         "West: {through: [nw, sw], one_way: true, lanes: 2}", "West: {through: [nw, sw], one_way: true}"
     )
@@ -219,7 +219,7 @@ def test_a_written_programme_is_kept_with_yellow_and_clearance_between(towns: di
     ]
 
 
-def test_a_light_with_nothing_written_has_a_programme_all_the_same(tmp_path: Path) -> None:
+def test_a_light_without_phases_gets_a_generated_programme(tmp_path: Path) -> None:
     text = AVENUES[: AVENUES.index("lights:")] + "lights: [cross, {at: north, offset: 12}]\n"
     town = compiled(tmp_path, text)
     assert [programme.junction_id for programme in town.programmes] == [0, 3]

@@ -48,7 +48,7 @@ def test_a_file_that_is_no_town_is_refused(tmp_path: Path, text: str | bytes, li
     check(written(tmp_path, text), line, fragments)
 
 
-def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+def test_paths_that_are_no_files_are_refused(tmp_path: Path) -> None:
     check(tmp_path, None, "cannot be read: it is a directory; name a town file (.yaml)")
     check(tmp_path / "missing.yaml", None, "cannot be read (No such file or directory); check the path")
 

@@ -46,7 +46,7 @@ def test_a_roundabout_is_not_faster_than_the_town(tmp_path: Path, top: str, expe
     assert junction.roundabout is not None and (junction.roundabout.lanes, junction.roundabout.speed) == (1, expected)
 
 
-def test_a_street_takes_what_it_does_not_say_from_the_town(tmp_path: Path) -> None:
+def test_a_street_takes_missing_properties_from_the_town(tmp_path: Path) -> None:
     top = "speed: 45\nwidth: 3\nsidewalk: 0\n"
     plain, own = (
         only_street(tmp_path, text, top=top)
@@ -56,7 +56,7 @@ def test_a_street_takes_what_it_does_not_say_from_the_town(tmp_path: Path) -> No
     assert (own.speed, own.width, own.sidewalk) == (30.0, 4.0, 1.0)
 
 
-def test_a_street_that_says_nothing_has_a_lane_each_way_and_pavements(tmp_path: Path) -> None:
+def test_a_street_without_properties_has_a_lane_each_way_and_pavements(tmp_path: Path) -> None:
     road = only_street(tmp_path, "[a, b]")
     assert (road.forward, road.backward, road.median, road.turn_lanes, road.ramp) == (1, 1, 0.0, (), False)
     assert (road.speed, road.width, road.radius, road.sidewalk) == (40.0, 3.5, None, 2.0)
@@ -150,7 +150,7 @@ def test_a_file_without_a_name_is_called_after_itself(tmp_path: Path) -> None:
     assert read_plan(written(tmp_path, TWO + "streets: {Road: [a, b]}")).name == "midtown"
 
 
-def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path: Path) -> None:
+def test_byte_order_mark_and_windows_line_ends_are_accepted(tmp_path: Path) -> None:
     text = MIDTOWN.replace("\n", "\r\n").encode("utf-8-sig")
     assert read_plan(written(tmp_path, text)).sites[-1][1].line == 32
 

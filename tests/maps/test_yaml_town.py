@@ -179,7 +179,7 @@ def test_crosswalks_lie_across_every_arm_of_the_street(village: Town) -> None:
     assert 0.0 < outline[:, 0].min() < outline[:, 0].max() < village.lanes[0].points[0, 0]
 
 
-def test_brookside_is_what_was_promised(brookside: Town) -> None:
+def test_brookside_has_its_documented_figures(brookside: Town) -> None:
     assert brookside.name == "brookside"
     assert 60 <= len(brookside.lanes) <= 100
     assert 2.5 <= brookside.kilometres <= 3.5

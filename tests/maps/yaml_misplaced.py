@@ -81,7 +81,7 @@ MISPLACED = {
         FORD,
         "Ford Lane: {through: [cross, gate], one_way: true, lanes: 3}",
         14,
-        "street 'South Road': it leads to 'gate' and no way goes on|make it two-way",
+        "street 'South Road': it leads to 'gate' and no street continues|make it two-way",
     ),
     "unreachable street": (
         FORD,

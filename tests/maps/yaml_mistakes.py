@@ -172,7 +172,7 @@ WRONG_FILES = {
     "dead end": (
         TWO + "streets: {Road: [a, b]}",
         1,
-        "junction 'a': street 'Road' ends here and nothing goes on|lead another",
+        "junction 'a': street 'Road' ends here and no street continues|lead another",
     ),
     "nowhere to go on": (
         ROAD.replace("Road: [a, b]", "Road: {through: [a, b], one_way: true}"),

@@ -89,7 +89,7 @@ def test_car_is_in_the_middle_of_the_following_view(renderer: SceneRenderer, sce
     assert count(frame[390:410, 430:450], palette.CAR) > 40
 
 
-def test_everybody_is_shown(renderer: SceneRenderer, scene: Scene) -> None:
+def test_all_road_users_are_shown(renderer: SceneRenderer, scene: Scene) -> None:
     close = dataclasses.replace(
         scene,
         others=[
@@ -188,6 +188,6 @@ def test_window_shows_frames_and_is_closed_by_its_user(
         (lambda town: SceneRenderer((100, 100)), "size"),
     ],
 )
-def test_what_cannot_be_drawn_is_refused(town: Town, make: object, message: str) -> None:
+def test_invalid_scenes_are_refused(town: Town, make: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make(town)  # type: ignore[operator]

@@ -67,7 +67,7 @@ def _beside(lane: Lane, point: np.ndarray, heading: float) -> tuple[float, float
     return abs(aside), float(turn)
 
 
-def test_names_can_be_read_without_turning_the_head_over(sheet: MapPainter) -> None:
+def test_names_are_never_upside_down(sheet: MapPainter) -> None:
     for label in sheet.labels:
         across = label.path[-1] - label.path[0]
         assert across[0] > -0.03 * abs(across[1]), f"{label.text} is upside down"

@@ -306,7 +306,7 @@ def test_a_lane_that_grows_from_nothing_has_no_island() -> None:
     assert 2 not in [pocket.lane for pocket in MapLayers(town_of(*wide, links=town.links)).pockets]
 
 
-def test_the_pavement_goes_on_around_a_roundabout() -> None:
+def test_the_pavement_continues_around_a_roundabout() -> None:
     """Only the arms have pavements in a map; ring and arms are of one paved square for those who walk."""
     angles = np.radians([[60.0, -60.0], [-120.0, -240.0]])
     arcs = [np.linspace(a, b, 40) for a, b in angles]

@@ -34,7 +34,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> tuple[Session, dict[int, S
     return Session.load(folder), scenes
 
 
-def test_playback_shows_what_was_to_be_seen(seen: tuple[Session, dict[int, Scene]]) -> None:
+def test_playback_shows_what_was_visible(seen: tuple[Session, dict[int, Scene]]) -> None:
     session, scenes = seen
     playback = Playback(session, TOWN)
     for frame in (15, 600, 1800):
@@ -59,7 +59,7 @@ def test_others_move_between_decisions(seen: tuple[Session, dict[int, Scene]]) -
 
 
 @pytest.mark.parametrize("rate", [0.5, 10.0, 30.0])
-def test_so_many_scenes_are_shown_a_second(seen: tuple[Session, dict[int, Scene]], rate: float) -> None:
+def test_playback_keeps_its_frame_rate(seen: tuple[Session, dict[int, Scene]], rate: float) -> None:
     playback = Playback(seen[0], TOWN)
     count = playback.count(rate)
     assert count == pytest.approx(60 * rate, abs=1)

@@ -164,7 +164,7 @@ def test_picture_is_written_and_is_the_same_each_time(tmp_path: Path) -> None:
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_picture_in_a_missing_folder_says_so(tmp_path: Path) -> None:
+def test_missing_folder_of_a_picture_is_reported(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="does not exist; make it first"):
         town_picture(two_way_street(), tmp_path / "missing" / "a.png")
 

@@ -86,7 +86,7 @@ def test_vehicles_are_highway_envs_and_show_what_the_arrays_hold(brookside: Town
         assert vehicle.on_road
 
 
-def test_views_follow_the_world_as_it_goes_on(brookside: TownNetwork) -> None:
+def test_views_follow_the_world_during_steps(brookside: TownNetwork) -> None:
     holder, _, bodies = crowd(brookside)
     vehicle = max(bodies.vehicles(), key=lambda each: each.speed)
     before, place = vehicle.position.copy(), vehicle.position
@@ -95,7 +95,7 @@ def test_views_follow_the_world_as_it_goes_on(brookside: TownNetwork) -> None:
     assert (place == vehicle.position).all()  # as highway-env's own, which move their array in place
 
 
-def test_views_are_made_once_and_move_over_to_bigger_arrays(brookside: TownNetwork) -> None:
+def test_views_are_cached_and_follow_grown_arrays(brookside: TownNetwork) -> None:
     holder, _, bodies = crowd(brookside)
     vehicles = bodies.vehicles()
     assert all(one is other for one, other in zip(vehicles, bodies.vehicles(), strict=True))
@@ -119,7 +119,7 @@ def test_a_row_that_becomes_a_cyclist_is_shown_as_one() -> None:
     assert bodies.vehicles() == []
 
 
-def test_what_highway_env_writes_is_written_to_the_arrays() -> None:
+def test_attributes_written_by_highway_env_reach_the_arrays() -> None:
     network = TownNetwork(straight_town())
     view = on(network, 1, 20.0)
     view.position = (30.0, 8.5)
@@ -139,7 +139,7 @@ def test_what_highway_env_writes_is_written_to_the_arrays() -> None:
     assert view.action == {"acceleration": 1.5, "steering": pytest.approx(0.2)}
 
 
-def test_a_route_that_is_written_is_driven() -> None:
+def test_assigned_route_is_driven() -> None:
     network = TownNetwork(t_junction_town())
     for connector in (WEST_EAST, WEST_SOUTH):
         view = on(network, WEST_IN, 60.0)
@@ -153,10 +153,10 @@ def test_a_route_that_is_written_is_driven() -> None:
                 break
         assert view.lane_id == connector
     view.route = [("no", "where", 0)]
-    assert view.route[0] == network.index_of(WEST_SOUTH) and len(view.route) > 1  # it goes on as the lots fall
+    assert view.route[0] == network.index_of(WEST_SOUTH) and len(view.route) > 1  # the rest is drawn at random
 
 
-def test_a_lane_that_is_steered_for_is_followed() -> None:
+def test_assigned_target_lane_is_followed() -> None:
     network = TownNetwork(t_junction_town())
     view = on(network, WEST_IN, 60.0)
     view.route = [network.index_of(WEST_IN), network.index_of(WEST_EAST), network.index_of(EAST_OUT)]
@@ -177,7 +177,7 @@ def test_features_of_vehicles_are_those_of_highway_env(brookside: TownNetwork) -
             assert list(told.values()) == pytest.approx(list(expected.values()), rel=1e-14, abs=1e-14)
 
 
-def test_a_vehicle_by_itself_drives_as_highway_envs() -> None:
+def test_single_vehicle_drives_as_highway_envs() -> None:
     network = TownNetwork(straight_town(lanes=1, roads=3))
     view = on(network, 0, 10.0)
     view.position += np.array([0.0, 0.7])
@@ -215,7 +215,7 @@ def test_a_copy_has_a_world_of_its_own(brookside: TownNetwork) -> None:
     assert len(twin.road.vehicles) == len(road.vehicles)
 
 
-def test_the_last_states_are_kept_until_it_is_towed() -> None:
+def test_history_is_kept_until_a_respawn() -> None:
     view = on(TownNetwork(straight_town()), 0, 20.0)
     view.road.record_history = True
     for _ in range(3):
@@ -228,7 +228,7 @@ def test_the_last_states_are_kept_until_it_is_towed() -> None:
     assert len(view.history) == 1
 
 
-def test_pedestrians_are_objects_that_walk(brookside: TownNetwork) -> None:
+def test_pedestrians_are_moving_objects_of_highway_env(brookside: TownNetwork) -> None:
     holder, road, bodies = crowd(brookside)
     people = bodies.pedestrians()
     assert len(people) == 6
@@ -266,7 +266,7 @@ def test_props_stand_where_they_were_put(kind: PropKind) -> None:
     assert prop.crashed
 
 
-def test_people_can_be_added_while_others_look(brookside: TownNetwork) -> None:
+def test_pedestrians_can_be_added_while_views_exist(brookside: TownNetwork) -> None:
     holder, _, bodies = crowd(brookside)
     walk = int(np.argmax(town_arrays(brookside).walks.length))
     row = add_pedestrian(town_arrays(brookside), holder.arrays, walk, 3.0, pace=1.2)

@@ -87,7 +87,7 @@ def test_vehicles_on_a_bridge_do_not_touch_those_below():
     assert not world.vehicles.crashed.any()
 
 
-def test_crashed_vehicle_is_towed_away_and_comes_back_elsewhere():
+def test_crashed_vehicle_respawns_elsewhere():
     network = TownNetwork(straight_town())
     town, world = kernel_world(network, [Pose(0, 50.0, speed=5.0), Pose(0, 54.0)])
     step(town, world, 1, DT)
@@ -98,7 +98,7 @@ def test_crashed_vehicle_is_towed_away_and_comes_back_elsewhere():
     assert (np.abs(world.vehicles.x - before) > 5.0).all()
 
 
-def test_vehicle_that_is_put_into_a_prop_crashes():
+def test_vehicle_placed_inside_a_prop_crashes():
     network = TownNetwork(straight_town())
     town = town_arrays(network)
     world = empty_world(town, vehicles=1, pedestrians=0)

@@ -112,7 +112,7 @@ def test_guest_that_touches_a_pedestrian_has_crashed(brookside: TownNetwork) -> 
     assert walker.key == key and math.dist(walker.position, road.vehicles[0].position) < 12.0
 
 
-def test_a_prop_that_was_run_into_is_marked() -> None:
+def test_a_hit_prop_is_marked() -> None:
     network = TownNetwork(straight_town(lanes=1, roads=3))
     road = empty_road(network)
     for station in (60.0, 150.0):
@@ -151,7 +151,7 @@ def test_lists_hold_the_present_bodies(brookside: TownNetwork) -> None:
     assert (arrays.nodes.lane >= 0).sum() <= 6
 
 
-def test_guests_find_room_where_there_is_none(brookside: TownNetwork) -> None:
+def test_guests_make_the_arrays_grow(brookside: TownNetwork) -> None:
     road = empty_road(brookside, vehicles=2)
     populate(brookside, road.town_arrays, road.arrays, seed=1, vehicles=2, pedestrians=0)
     road.show()
@@ -167,7 +167,7 @@ def test_guests_find_room_where_there_is_none(brookside: TownNetwork) -> None:
     assert (road.arrays.vehicles.kind == Kind.EGO).sum() == 1
 
 
-def test_a_copy_goes_on_in_the_same_way_and_by_itself(brookside: TownNetwork) -> None:
+def test_a_copy_evolves_equally_and_independently(brookside: TownNetwork) -> None:
     road = empty_road(brookside, vehicles=8, pedestrians=5)
     populate(brookside, road.town_arrays, road.arrays, seed=4, vehicles=7, pedestrians=5)
     road.show()
@@ -184,7 +184,7 @@ def test_a_copy_goes_on_in_the_same_way_and_by_itself(brookside: TownNetwork) ->
 
 
 @pytest.mark.parametrize("level", [0, 1])
-def test_guests_keep_to_the_level_on_which_they_are(level: int) -> None:
+def test_guests_stay_on_their_level(level: int) -> None:
     decks = [lane(number, [(0, 0, 6.0 * number), (300, 0, 6.0 * number)], road=number) for number in (0, 1)]
     network = TownNetwork(town(decks))
     road = empty_road(network)

@@ -113,7 +113,7 @@ def test_ten_seconds_are_the_same_bytes_in_another_process(digests, what):
     assert digests["one"][what] == digests["other"][what]
 
 
-def test_one_long_call_is_many_short_ones():
+def test_one_long_call_equals_many_short_ones():
     town, world = crowd()
     other = world.copy()
     step(town, world, 450, DT)
@@ -122,7 +122,7 @@ def test_one_long_call_is_many_short_ones():
     assert world.tobytes() == other.tobytes()
 
 
-def test_worlds_do_not_know_of_one_another():
+def test_worlds_are_independent():
     town, world = crowd(seed=1)
     alone = world.copy()
     _, other = crowd(seed=2)

@@ -1,4 +1,4 @@
-"""The kernel against stock highway-env, on the same states."""
+"""Compiled traffic against highway-env on the same states."""
 
 import itertools
 
@@ -15,7 +15,7 @@ from tests.sim.network.towns import curve_town, find_town, straight_town
 from tests.sim.state.states import DT, Pose, kernel_world, stock_road
 
 NEIGHBOURS_WIDTH = 0.9
-"""Off the middle of a lane by more than that stock counts a vehicle as on the lane beside, too [m]."""
+"""Offset from which on highway-env counts a vehicle as on the lane beside, too [m]."""
 
 
 def random_poses(rng, network, count, *, changing=0.3):
@@ -39,7 +39,7 @@ def random_poses(rng, network, count, *, changing=0.3):
     return poses
 
 
-def test_accelerations_and_steering_equal_stock_on_300_random_states():
+def test_accelerations_and_steering_equal_highway_envs_on_300_random_states():
     network = TownNetwork(straight_town(lanes=3, roads=3, length=100.0))
     rng = np.random.default_rng(11)
     states = followers = changers = 0
@@ -48,7 +48,7 @@ def test_accelerations_and_steering_equal_stock_on_300_random_states():
         town, world = kernel_world(network, poses)
         road = stock_road(network, poses)
         for i, stock in enumerate(road.vehicles):
-            # the road stops here; stock does not know
+            # the road ends here, which highway-env ignores
             if network.town.lanes[poses[i].lane].id >= 6 and poses[i].station > 40.0:
                 continue
             drive(town, world, i)
@@ -63,7 +63,7 @@ def test_accelerations_and_steering_equal_stock_on_300_random_states():
 
 
 def expected_acceleration(stock, road):
-    """Stock's acceleration, but with the distance to the one in front taken along the lanes, not along one's own."""
+    """Acceleration by highway-env, but with the distance to the vehicle in front measured along the lanes."""
     found = []
     for index in {stock.lane_index, stock.target_lane_index}:
         (front, gap), _ = road.neighbours(stock, index)
@@ -72,7 +72,7 @@ def expected_acceleration(stock, road):
     return float(np.clip(min(found), -stock.ACC_MAX, stock.ACC_MAX))
 
 
-def test_lane_changes_are_those_of_stocks_mobil():
+def test_lane_changes_equal_highway_envs_mobil():
     network = TownNetwork(straight_town(lanes=3, roads=3, length=100.0))
     rng = np.random.default_rng(12)
     changes = 0
@@ -90,7 +90,7 @@ def test_lane_changes_are_those_of_stocks_mobil():
 
 
 @pytest.mark.parametrize("name", ["curve", "brookside", "t-junction"])
-def test_steering_equals_stock_on_bends(name):
+def test_steering_equals_highway_envs_on_bends(name):
     network = TownNetwork(find_town(name))
     rng = np.random.default_rng(5)
     for pose in itertools.islice((p for _ in range(30) for p in random_poses(rng, network, 10)), 300):
@@ -106,7 +106,7 @@ def test_steering_equals_stock_on_bends(name):
     ("town", "speed", "lateral"),
     [(straight_town(), 3.0, 0.0), (straight_town(), 9.0, 1.2), (curve_town(), 4.0, -0.8), (curve_town(), 8.0, 0.0)],
 )
-def test_lone_vehicle_drives_as_stock_for_90_substeps(town, speed, lateral):
+def test_single_vehicle_drives_as_highway_envs_for_90_substeps(town, speed, lateral):
     network = TownNetwork(town)
     poses = [Pose(lane=0, station=6.0, lateral=lateral, turned=0.05, speed=speed, desired=8.0)]
     arrays, world = kernel_world(network, poses)
@@ -126,7 +126,7 @@ def test_lone_vehicle_drives_as_stock_for_90_substeps(town, speed, lateral):
 
 
 @pytest.mark.parametrize("steering", [0.0, 0.02, -0.4, 1.0])
-def test_car_under_outside_control_moves_as_stocks_bicycle(steering):
+def test_externally_controlled_car_moves_as_highway_envs_bicycle(steering):
     network = TownNetwork(straight_town())
     pose = Pose(1, 50.0, turned=0.1, speed=6.0)
     arrays, world = kernel_world(network, [pose])

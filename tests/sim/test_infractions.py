@@ -65,7 +65,7 @@ def test_car_that_obeys_its_light_breaks_no_rule(first: str) -> None:
 
 
 @pytest.mark.parametrize("obeys", [True, False])
-def test_stop_sign_asks_for_a_stand(obeys: bool) -> None:
+def test_stop_sign_requires_a_stand(obeys: bool) -> None:
     town = crossing({"s": SignalKind.STOP})
     world = world_in(town, way_in("s"), 60.0) if obeys else too_late_for_the_line(town)
     world.planner.command(PhysicalAction.J_TURN, 0, float(world.car.speed))
@@ -174,7 +174,7 @@ def test_road_ends_half_a_metre_outside_of_its_lanes(beside: float, off: bool) -
         assert breach.key is None
 
 
-def test_leaving_the_road_is_reported_once_and_anew_after_a_return() -> None:
+def test_leaving_the_road_is_reported_once_per_departure() -> None:
     town = straight_street()
     world = world_in(town, 0, 30.0)
     for _ in range(2):
@@ -209,7 +209,7 @@ def test_across_the_road_is_not_against_the_traffic(degrees: int, against: bool)
     assert kinds(found) == ([Infraction.WRONG_WAY] if against else [])
 
 
-def test_in_a_junction_no_way_is_wrong() -> None:
+def test_no_direction_is_wrong_in_a_junction() -> None:
     town = crossing()
     connector = town.lanes[across("s", "n")]
     x, y = connector.position(connector.length / 2)
@@ -334,7 +334,7 @@ def test_being_run_into_from_behind_is_not_the_cars_fault() -> None:
     assert world.collisions == 0
 
 
-def test_a_crash_of_others_beside_the_car_is_not_the_cars() -> None:
+def test_crash_between_others_is_not_reported() -> None:
     world = world_at("brookside", long_lane(network("brookside").town), 40.0)
     world.planner.command(PhysicalAction.STOP, 0, 0.0)
     one, other = park(world, 60.0), park(world, 80.0)

@@ -90,7 +90,7 @@ def test_car_waits_at_red_and_goes_on_green(way: str) -> None:
     assert world.planner.lane in (way_out("w"), way_out("n"), way_out("e"))
 
 
-def test_car_asked_for_its_way_at_a_red_light_waits_for_green() -> None:
+def test_car_with_a_turn_command_at_a_red_light_waits_for_green() -> None:
     world = world_in(lit_crossing("ew"), station=90.0)
     run(world, 12.0)
     assert world.planner.waits_at_end

@@ -52,7 +52,7 @@ def test_one_row_is_the_observer_alone(env: TownEnv) -> None:
     np.testing.assert_array_equal(alone, Kinematics(env, normalize=False).observe()[:1])
 
 
-def test_there_is_nothing_to_see_without_a_road() -> None:
+def test_observation_without_a_road_is_zero() -> None:
     env = TownEnv({"vehicles": 0})
     env.road = None
     assert not env.observation_type.observe().any()

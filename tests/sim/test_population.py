@@ -30,7 +30,7 @@ def crowd(network, *, vehicles, pedestrians, props):
     return arrays, world
 
 
-def test_world_that_has_grown_goes_on_as_one_that_had_the_room_from_the_start():
+def test_grown_world_evolves_as_one_with_room_from_the_start():
     network = TownNetwork(find_town("brookside"))
     arrays, small = crowd(network, vehicles=20, pedestrians=15, props=1)
     _, large = crowd(network, vehicles=27, pedestrians=22, props=4)
@@ -51,7 +51,7 @@ def test_world_does_not_shrink():
         grown(arrays, world, vehicles=1, pedestrians=0, props=16)
 
 
-def test_vehicle_that_is_taken_away_leaves_the_road_to_others():
+def test_removed_vehicle_no_longer_blocks_the_road():
     arrays, world = kernel_world(TownNetwork(straight_town(lanes=1)), [Pose(0, 20.0), Pose(0, 45.0, desired=0.01)])
     step(arrays, world, 300, DT)
     assert world.vehicles[0].x < 45.0
@@ -63,7 +63,7 @@ def test_vehicle_that_is_taken_away_leaves_the_road_to_others():
     assert world.vehicles[1].key > key
 
 
-def test_pedestrian_that_is_taken_away_is_gone():
+def test_removed_pedestrian_is_absent():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=0, pedestrians=2)
@@ -76,7 +76,7 @@ def test_pedestrian_that_is_taken_away_is_gone():
     assert add_pedestrian(arrays, world, 0, 10.0, pace=1.2) == 0
 
 
-def test_prop_that_is_moved_keeps_its_key_and_is_in_the_way_elsewhere():
+def test_moved_prop_keeps_its_key_and_blocks_the_new_place():
     network = TownNetwork(straight_town(lanes=2))
     arrays, world = kernel_world(network, [Pose(0, 20.0)])
     number = add_prop(network, arrays, world, PropKind.STREET_BARRIER, 2, 20.0)
@@ -87,7 +87,7 @@ def test_prop_that_is_moved_keeps_its_key_and_is_in_the_way_elsewhere():
     assert 3 in prop.lane and np.flatnonzero(world.heads >= 0).tolist() == [0, *sorted(k for k in prop.lane if k >= 0)]
 
 
-def test_what_a_body_draws_is_a_matter_of_its_key_not_of_the_room():
+def test_random_numbers_of_a_body_depend_on_its_key_not_on_array_sizes():
     arrays = town_arrays(TownNetwork(straight_town()))
     numbers = []
     for room in (1, 5):

@@ -32,7 +32,7 @@ def drive(env: TownEnv, seed: int, steps: int) -> list[tuple[float, bool, bool]]
     return results
 
 
-def test_it_is_highway_envs_environment_in_a_town() -> None:
+def test_town_env_is_an_environment_of_highway_env() -> None:
     env = gym.make("dorothie_gym/Town-v0", config={"vehicles": 6}).unwrapped
     assert isinstance(env, AbstractEnv)
     assert isinstance(env.road.network, TownNetwork)
@@ -49,11 +49,11 @@ def test_progress_on_the_road_is_rewarded() -> None:
     assert results[-1][0] > 0.9 * env.vehicle.speed / env.config["reward_speed"] > 0.3
 
 
-def test_time_runs_out() -> None:
+def test_episode_truncates_after_its_duration() -> None:
     assert [row[2] for row in drive(TownEnv({"vehicles": 0, "duration": 3.0}), seed=1, steps=9)] == [False, False, True]
 
 
-def test_a_crash_ends_it_and_costs() -> None:
+def test_crash_terminates_and_is_penalised() -> None:
     env = TownEnv({"vehicles": 0})
     env.reset(seed=1)
     env.vehicle.crashed = True
@@ -196,7 +196,7 @@ def test_continuous_actions_work() -> None:
     assert env.vehicle.speed > 1.0
 
 
-def test_it_is_drawn() -> None:
+def test_rendering_shows_the_town() -> None:
     env = TownEnv(render_mode="rgb_array")
     env.reset(seed=3)
     picture = env.render()
@@ -269,14 +269,14 @@ def test_touching_a_pedestrian_is_an_observed_crash() -> None:
         assert info["crashed"] and info["rewards"]["collision"] == -1.0
 
 
-def test_gymnasiums_checker_has_nothing_to_say() -> None:
+def test_gymnasiums_checker_passes_without_warnings() -> None:
     env = gym.make("dorothie_gym/Town-v0", disable_env_checker=True).unwrapped
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env, skip_render_check=True)
 
 
-def test_stable_baselines_checker_has_nothing_to_say() -> None:
+def test_stable_baselines_checker_passes_without_warnings() -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -285,7 +285,7 @@ def test_stable_baselines_checker_has_nothing_to_say() -> None:
         checker.check_env(TownEnv(), warn=True)
 
 
-def test_simplified_and_changed_copies_go_on_by_themselves() -> None:
+def test_simplified_and_changed_copies_are_independent() -> None:
     env = TownEnv({"vehicles": 20, "town": "northgate"})
     env.reset(seed=3)
     env.step(3)

@@ -26,7 +26,7 @@ def busy_world(name: str, vehicles: int = 10, seed: int = 2) -> World:
     ("name", "seconds"),
     [("brookside", 120), ("Town02", 60), ("Town05", 60), pytest.param("brookside", 600, marks=pytest.mark.slow)],
 )
-def test_vehicles_keep_to_their_lanes_keep_moving_and_hardly_crash(name: str, seconds: int) -> None:
+def test_vehicles_keep_their_lanes_keep_moving_and_rarely_crash(name: str, seconds: int) -> None:
     world = busy_world(name)
     crashed: set[int] = set()
     moving, seen, off = 0, 0, 0
@@ -43,7 +43,7 @@ def test_vehicles_keep_to_their_lanes_keep_moving_and_hardly_crash(name: str, se
     assert len(crashed) <= 2
 
 
-def test_crashed_vehicle_is_towed_and_another_comes_out_of_the_cars_sight() -> None:
+def test_crashed_vehicle_respawns_out_of_the_egos_sight() -> None:
     world = busy_world("brookside", vehicles=3)
     keys = [vehicle.key for vehicle in world.actors.vehicles]
     world.actors.vehicles[0].crashed = True

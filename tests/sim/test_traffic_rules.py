@@ -31,7 +31,7 @@ def compare(roads: TownNetwork, poses: Array, decision: int, frame: int = 0) -> 
 
 
 @pytest.mark.parametrize("name", ["brookside", "northgate", "Town02", "Town05"])
-def test_breaches_are_those_of_loops_over_everything(name: str) -> None:
+def test_breaches_equal_those_of_exhaustive_loops(name: str) -> None:
     roads, count = network(name), Counter[Infraction]()
     for seed in range(3):
         rng = np.random.default_rng(seed)
@@ -42,7 +42,7 @@ def test_breaches_are_those_of_loops_over_everything(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["brookside", "midtown", "northgate", "Town02", "Town05"])
-def test_breaches_are_those_of_loops_over_everything_on_many_drives(name: str) -> None:
+def test_breaches_equal_those_of_exhaustive_loops_on_many_drives(name: str) -> None:
     roads, count = network(name), Counter[Infraction]()
     for seed in range(100, 160):
         rng = np.random.default_rng(seed)
@@ -66,14 +66,14 @@ def passages(rng: np.random.Generator, count: int) -> Array:
     return np.concatenate(ways)
 
 
-def test_stands_at_stop_signs_count_as_in_loops_over_everything() -> None:
+def test_stands_at_stop_signs_equal_those_of_exhaustive_loops() -> None:
     roads, count = TownNetwork(crossing({"s": SignalKind.STOP})), Counter[Infraction]()
     for seed in range(8):
         count += compare(roads, passages(np.random.default_rng(seed), 10), 1 + 3 * seed)
     assert 20 < count[Infraction.STOP_SIGN] < 60
 
 
-def test_lanes_too_wide_for_the_cells_are_looked_at_one_by_one() -> None:
+def test_lanes_too_wide_for_the_cells_are_searched_one_by_one() -> None:
     town = crossing()
     wide = replace(town.lanes[way_in("s")], widths=np.full_like(town.lanes[way_in("s")].widths, 15.0))
     lanes = [wide if lane.id == wide.id else lane for lane in town.lanes]

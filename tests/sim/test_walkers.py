@@ -32,7 +32,7 @@ def open_crosswalks(name: str) -> list[tuple[int, int, int]]:
 
 @pytest.mark.parametrize("end", [0, 1])
 @pytest.mark.parametrize("which", [0, 1, 2])
-def test_car_gives_way_to_people_on_a_crosswalk_and_then_goes_on(which: int, end: int) -> None:
+def test_car_yields_to_pedestrians_on_a_crosswalk_and_then_continues(which: int, end: int) -> None:
     number, lane, connector = open_crosswalks("northgate")[which]
     roads = network("northgate")
     town, arrays = roads.town, town_arrays(roads)

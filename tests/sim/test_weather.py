@@ -40,7 +40,7 @@ def clear_but(parameter: WeatherParameter, value: float) -> Weather:
 
 
 @pytest.mark.parametrize("lights", [False, True])
-def test_clear_noon_has_no_effect_at_all(lights: bool) -> None:
+def test_clear_noon_has_no_effect(lights: bool) -> None:
     weather = Weather()
     view = weather.visibility(lights=lights)
     assert weather.friction == 1.0
@@ -70,7 +70,7 @@ def test_each_parameter_acts_one_way_on_sight_and_detection(
 
 
 @given(SKIES, st.booleans(), st.floats(0.0, 1.0), DISTANCES, DISTANCES)
-def test_sight_is_bounded_and_things_fade_with_distance(
+def test_sight_is_bounded_and_detection_falls_with_distance(
     sky: dict[WeatherParameter, float], lights: bool, clarity: float, a: float, b: float
 ) -> None:
     view = weather_of(sky).visibility(lights=lights, clarity=clarity)
@@ -84,14 +84,14 @@ def test_sight_is_bounded_and_things_fade_with_distance(
 
 
 @given(SKIES, DISTANCES)
-def test_head_lights_never_hurt(sky: dict[WeatherParameter, float], distance: float) -> None:
+def test_headlights_never_reduce_sight(sky: dict[WeatherParameter, float], distance: float) -> None:
     weather = weather_of(sky)
     on, off = weather.visibility(lights=True), weather.visibility(lights=False)
     assert on.sight >= off.sight
     assert on.gain(distance) >= off.gain(distance)
 
 
-def test_lights_help_in_the_dark_only() -> None:
+def test_headlights_help_in_the_dark_only() -> None:
     night = clear_but(P.SUN_ALTITUDE_ANGLE, -90.0)
     assert 20.0 < night.sight(lights=False) < 25.0
     assert 35.0 < night.sight(lights=True) < 45.0
@@ -105,7 +105,7 @@ def test_thickest_fog_leaves_five_percent_of_the_contrast_at_its_optical_range()
     assert weather.visibility(lights=False).transmission(DENSEST_FOG) == pytest.approx(0.05)
 
 
-def test_fog_that_begins_further_off_leaves_what_is_nearer_clear() -> None:
+def test_fog_start_distance_leaves_nearer_bodies_clear() -> None:
     weather = clear_but(P.FOG_DENSITY, 100.0)
     weather.set(P.FOG_DISTANCE, 30.0)
     view = weather.visibility(lights=False)
@@ -113,19 +113,19 @@ def test_fog_that_begins_further_off_leaves_what_is_nearer_clear() -> None:
     assert view.gain(40.0) < 0.5
 
 
-def test_rain_hides_what_drivers_were_measured_not_to_see() -> None:
+def test_visibility_in_rain_matches_measurements_of_drivers() -> None:
     # one inch an hour: 2000 ft at 40 mph (Ivey et al. 1975), where 5 % of the contrast are left
     view = clear_but(P.PRECIPITATION, 25.4).visibility(lights=False)
     assert view.transmission(2000 * 0.3048) == pytest.approx(0.05, rel=1e-6)
 
 
-def test_dusk_is_as_dark_as_an_almanac_has_it() -> None:
+def test_illuminance_at_dusk_matches_the_almanac() -> None:
     lux = [clear_but(P.SUN_ALTITUDE_ANGLE, a).visibility(lights=False).light for a in (0.0, -6.0, -18.0)]
     assert lux == pytest.approx([502.0, 5.0, 2.0], rel=0.01)  # with 2 lx of the street's lamps
 
 
 @given(SKIES, st.sampled_from(WETTING), SHARES, SHARES)
-def test_water_takes_grip_and_lengthens_braking(
+def test_water_reduces_grip_and_lengthens_braking(
     sky: dict[WeatherParameter, float], parameter: WeatherParameter, a: float, b: float
 ) -> None:
     low, high = sorted((a, b))
@@ -135,7 +135,7 @@ def test_water_takes_grip_and_lengthens_braking(
 
 
 @pytest.mark.parametrize("parameter", [parameter for parameter in P if parameter not in WETTING])
-def test_what_is_not_water_takes_no_grip(parameter: WeatherParameter) -> None:
+def test_dry_weather_keeps_the_grip(parameter: WeatherParameter) -> None:
     for share in (0.0, 1.0):
         assert weather_of({parameter: share}).friction == 1.0
 
@@ -153,9 +153,7 @@ def test_blur_halves_the_sight_of_a_clear_day() -> None:
 
 
 @given(SKIES, st.booleans())
-def test_what_is_within_sight_is_never_far_from_where_it_seems(
-    sky: dict[WeatherParameter, float], lights: bool
-) -> None:
+def test_position_errors_within_sight_are_bounded(sky: dict[WeatherParameter, float], lights: bool) -> None:
     view = weather_of(sky).visibility(lights=lights)
     sight = min(view.sight, 40.0)
     away, aside = position_error(view, sight)

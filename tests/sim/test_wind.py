@@ -22,13 +22,13 @@ def test_more_intensity_is_more_wind(time: float, a: float, b: float) -> None:
 
 
 @given(st.floats(0.0, GALE), st.floats(0.0, GALE), st.floats(0.1, 25.0))
-def test_drift_grows_with_the_wind_and_goes_with_it(a: float, b: float, speed: float) -> None:
+def test_drift_grows_with_the_wind_in_its_direction(a: float, b: float, speed: float) -> None:
     low, high = sorted((a, b))
     assert 0.0 <= drift_angle(low, math.pi / 2, speed) <= drift_angle(high, math.pi / 2, speed) < 0.02
     assert drift_angle(high, -math.pi / 2, speed) == pytest.approx(-drift_angle(high, math.pi / 2, speed))
 
 
-def test_side_force_of_a_gale_is_that_of_the_text_book() -> None:
+def test_side_force_of_a_gale_matches_the_textbook() -> None:
     # rho / 2 * A * C * V * w = 0.6 * 2.2 * 1.2 * 28.3 m/s * 20 m/s = 896 N, over 120 kN/rad
     assert drift_angle(20.0, math.pi / 2, 20.0) == pytest.approx(896 / 1.2e5, rel=1e-3)
 

@@ -65,7 +65,7 @@ def test_car_switches_lanes_round_a_roadblock() -> None:
 @pytest.mark.parametrize(
     ("beyond", "refused"), [(-20.0, False), (-12.0, True), (11.5, True), (21.0, True), (30.0, False)]
 )
-def test_car_turns_round_only_where_it_can_get_away_from_a_roadblock_beyond(beyond: float, refused: bool) -> None:
+def test_car_makes_a_u_turn_only_where_it_can_leave_before_the_next_roadblock(beyond: float, refused: bool) -> None:
     town = network("brookside").town
     lane, opposite = next(
         (lane.id, oncoming)
@@ -258,7 +258,7 @@ def test_pedestrian_close_to_a_car_steps_away_from_it() -> None:
 
 
 @pytest.mark.parametrize("frames", [1, 15, 300])
-def test_path_never_runs_out_however_seldom_decisions_are(frames: int) -> None:
+def test_path_never_ends_at_any_decision_interval(frames: int) -> None:
     town = network("Town05").town
     site = town.sites[0]
     world = world_at("Town05", site.lane, site.station, WorldConfig(vehicles=0, pedestrians=0, cruise_speed=90.0))
@@ -268,7 +268,7 @@ def test_path_never_runs_out_however_seldom_decisions_are(frames: int) -> None:
         assert abs(world.planner.offset) < 0.6
 
 
-def test_blind_car_goes_at_walking_pace_and_the_fault_ends_by_itself() -> None:
+def test_car_without_sight_drives_at_walking_pace_until_the_fault_ends() -> None:
     town = network("brookside").town
     world = world_at("brookside", long_lane(town), 2.0)
     assert world.set_fault(Sensor.VIEW, True) is None
@@ -316,7 +316,7 @@ def drive_at_random(name: str, seed: int, seconds: float) -> World:
 
 
 @pytest.mark.parametrize("name", ["brookside", "Town02", "Town05"])
-def test_random_driving_gives_no_collision_of_the_cars_own_making(name: str) -> None:
+def test_random_driving_causes_no_collision_by_the_egos_fault(name: str) -> None:
     assert drive_at_random(name, 1, 60.0).collisions == 0
 
 
@@ -324,5 +324,5 @@ def test_random_driving_gives_no_collision_of_the_cars_own_making(name: str) -> 
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("name", ["brookside", "Town02", "Town05"])
-def test_long_random_driving_gives_no_collision_of_the_cars_own_making(name: str, seed: int) -> None:
+def test_long_random_driving_causes_no_collision_by_the_egos_fault(name: str, seed: int) -> None:
     assert drive_at_random(name, seed, 300.0).collisions == 0

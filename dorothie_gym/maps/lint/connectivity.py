@@ -23,14 +23,14 @@ def connectivity_faults(town: Town) -> Iterator[Fault]:
     dead_ends = _dead_ends(town)
     for lane in dead_ends:
         x, y = town.lanes[lane].points[-1, :2]
-        message = f"lane {lane} ends here and goes on in no lane, nor does one beside it"
+        message = f"lane {lane} ends here: neither it nor a lane beside it has a successor"
         yield Fault(kind=FaultKind.DEAD_END, lanes=(lane,), position=(float(x), float(y)), message=message)
     onward = _matrix(town)
     reached, returns = _from_largest(onward)
     trapped = reached & ~returns
     trapped[dead_ends] = False
     for lanes in _groups(onward, trapped):
-        yield _fault(town, FaultKind.NO_RETURN, lanes, "be left for the rest of the town: every way on leads astray")
+        yield _fault(town, FaultKind.NO_RETURN, lanes, "be left for the rest of the town")
     for lanes in _groups(onward, ~reached & returns):
         yield _fault(town, FaultKind.UNREACHABLE, lanes, "be reached from the rest of the town")
     for lanes in _groups(onward, ~reached & ~returns):

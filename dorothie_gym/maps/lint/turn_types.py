@@ -46,7 +46,7 @@ def _turn(town: Town, link: LaneLink) -> Iterator[Fault]:
     """Checks a turn by its net change of direction, and beyond a half circle also by the driven one."""
     if not town.lanes[link.target].in_junction:
         if link.type is not LinkType.STRAIGHT and not town.lanes[link.source].in_junction:
-            yield _turn_fault(town, link, "leads into a lane that only goes on, across no junction")
+            yield _turn_fault(town, link, "leads into a lane that continues its road without a junction")
         return
     if town.lanes[link.source].in_junction:
         return  # the link into the junction carries the type

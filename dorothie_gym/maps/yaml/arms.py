@@ -96,8 +96,8 @@ def arms_at(crossing: Crossing, segments: Sequence[StreetSegment], ends: Sequenc
         crossing.plan.entry.fail("no street runs through it; put it into the course of one, or remove it")
     if len(ends) == 1:
         crossing.plan.entry.fail(
-            f"street {segments[ends[0][0]].street.name!r} ends here and nothing goes on: dead ends are not supported;"
-            " lead another street here"
+            f"street {segments[ends[0][0]].street.name!r} ends here and no street continues: dead ends are not"
+            " supported; lead another street here"
         )
     order = sorted(ends, key=lambda end: (wrap_radians(segments[end[0]].leg(end[1]).heading), end))
     return tuple(_arm(place, *end, segments[end[0]]) for place, end in enumerate(order))

@@ -86,8 +86,8 @@ def movements_at(crossing: Crossing, arms: tuple[Arm, ...]) -> tuple[Movement, .
     for arm in arms:
         if arm.incoming and not any(movement.source is arm for movement in found):
             arm.street.entry.fail(
-                f"it leads to {crossing.name!r} and no way goes on from there: its lanes would lead nowhere; turn a"
-                " one-way street round or make it two-way, or let this one only leave that junction (one_way)"
+                f"it leads to {crossing.name!r} and no street continues from there: its lanes would lead nowhere; turn"
+                " a one-way street round or make it two-way, or let this one only leave that junction (one_way)"
             )
         if arm.outgoing and not any(movement.target is arm for movement in found):
             arm.street.entry.fail(

@@ -1,7 +1,9 @@
 """Localization of the ego: odometry and GPS through an extended Kalman filter.
 
 State: x, y, heading, scale of the odometer, bias of the gyro. Without GPS the two errors add up and the covariance
-grows; with it they are learnt (Thrun, Burgard and Fox, Probabilistic Robotics, chapters 3 and 5).
+grows; with it they are learnt (Thrun, Burgard and Fox, Probabilistic Robotics, chapters 3 and 5). The tests compare
+with filterpy's filter; it is not used here, since it takes thirty times as long as these compiled functions and rounds
+differently, which would change recorded sessions.
 """
 
 from __future__ import annotations
@@ -33,10 +35,10 @@ GYRO_NOISE = math.radians(0.05)
 """Angle random walk of the gyro [rad per root of s], that of a cheap micromechanical one."""
 
 STANDS = 1e-3
-"""Movement in a frame below which the car stands [m], and is known not to turn."""
+"""Movement per frame below which the car stands and cannot turn [m]."""
 
 ODOMETRY_DRAWS = 4
-"""Normal numbers that a frame takes: of the bias, the gyro, the slip and the skid."""
+"""Normal random numbers per frame: for the bias, the gyro, the slip and the skid."""
 
 STATES = 5
 """x, y [m], heading [rad], scale of the odometer, bias of the gyro [rad/s]."""
@@ -105,7 +107,7 @@ def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: flo
     p[1, 1] += slip * s * s + skid * c * c
     p[0, 1] += (slip - skid) * c * s
     p[2, 2] += GYRO_NOISE * GYRO_NOISE * dt
-    for i in range(1, STATES):  # rounding must not tear the two halves apart
+    for i in range(1, STATES):  # keeps the matrix symmetric in spite of rounding
         for j in range(i):
             p[i, j] = p[j, i]
     mean[0] += dx
@@ -146,13 +148,13 @@ class Localizer:
         return self._covariance[:3, :3].copy()
 
     def localize(self, track: Array, frame: int, *, gps_from: int = 0) -> None:
-        """Takes in odometry of every frame, and a GPS fix of every `FIX_EVERY`th; the sensors' errors are added here.
+        """Updates the estimate with the odometry of each frame and a GPS fix every `FIX_EVERY` frames, errors added.
 
-        Nothing depends on how many frames a call has: all draw the same numbers.
+        The estimate does not depend on the number of frames per call: each frame draws the same numbers.
 
         Args:
-            track: true poses of successive frames, the first of them known already: x, y, heading, and columns that
-                do not matter here (n + 1, 3 or more) [m, m, rad].
+            track: true poses of successive frames, the first of them that of the previous call: x, y, heading, and
+                further columns, which are ignored (n + 1, 3 or more) [m, m, rad].
             frame: number of the first pose's frame.
             gps_from: there is no GPS before this frame.
         """
@@ -187,9 +189,9 @@ def follow(
 
 @compiled
 def correct(mean: Array, covariance: Array, axis: int, fix: float) -> None:
-    """Takes in the measurement of one coordinate by GPS.
+    """Updates an estimate with one coordinate of a GPS fix.
 
-    A fix's errors along the two axes do not depend on one another, so they may be taken in one after the other.
+    The errors of a fix along the two axes are independent, so that the axes may be used one after the other.
 
     Args:
         mean: (5,) estimate; written.

@@ -212,7 +212,7 @@ def test_episodes_are_those_of_plain_environments(config: dict[str, Any]) -> Non
 # --- Gymnasium's conventions ------------------------------------------------------------------------------------------
 
 
-def test_make_vec_makes_it() -> None:
+def test_make_vec_builds_the_compiled_environment() -> None:
     env = gym.make_vec("dorothie_gym/Town-v0", num_envs=3, config={"vehicles": 2})
     assert isinstance(env, TownVectorEnv) and env.num_envs == 3
     plain = TownEnv({"vehicles": 2})
@@ -257,7 +257,7 @@ def test_a_crash_ends_an_episode_and_the_next_step_begins_another() -> None:
     assert env.step(faster)[4]["speed"][1] > 2.0
 
 
-def test_time_runs_out() -> None:
+def test_episode_truncates_after_its_duration() -> None:
     env = TownVectorEnv(2, {"vehicles": 0, "duration": 2.0, "policy_frequency": 2})
     env.reset(seed=1)
     idle = np.full(2, IDLE)

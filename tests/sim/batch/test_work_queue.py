@@ -33,7 +33,7 @@ def test_every_number_is_taken_once(work: Callable[[NDArray[np.int64], int, NDAr
 
 
 @pytest.mark.parametrize(("count", "threads"), [(7, 3), (2, 2), (5, 1)])
-def test_one_s_own_come_first_and_then_those_of_others(count: int, threads: int) -> None:
+def test_own_block_is_taken_before_the_others(count: int, threads: int) -> None:
     turns = turns_of(count, threads)
     own = turns[threads - 1, :2].tolist()
     taken = [take(turns, threads - 1) for _ in range(count + 1)]

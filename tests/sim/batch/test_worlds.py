@@ -58,7 +58,7 @@ def alone(seed: int) -> bytes:
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
 @pytest.mark.parametrize("count", range(1, 8))
-def test_every_world_becomes_what_it_becomes_alone(threads: int, count: int) -> None:
+def test_every_world_evolves_as_a_single_world(threads: int, count: int) -> None:
     seeds = list(range(count))
     worlds = batch(seeds, threads)
     worlds.step(SUBSTEPS, DT, np.array([throttle(seed) for seed in seeds]), np.array([0.01 * seed for seed in seeds]))
@@ -83,7 +83,7 @@ def test_one_action_is_for_all_egos() -> None:
     assert worlds.arrays.vehicles.speed[:, 0] == pytest.approx([2.0, 2.0])
 
 
-def test_a_world_can_be_replaced_while_the_others_go_on() -> None:
+def test_a_world_can_be_replaced_between_steps() -> None:
     worlds, other = batch([1, 2, 3], 2), batch([1, 2, 3], 2)
     worlds.step(30, DT)
     other.step(30, DT)
@@ -92,7 +92,7 @@ def test_a_world_can_be_replaced_while_the_others_go_on() -> None:
     assert [worlds.world(k).tobytes() for k in (0, 2)] == [other.world(k).tobytes() for k in (0, 2)]
 
 
-def test_a_world_with_other_rooms_is_refused() -> None:
+def test_a_world_with_other_array_sizes_is_refused() -> None:
     with pytest.raises(ValueError, match=r"vehicles of the shape \(9,\), this one \(3,\)"):
         batch([1], 1).put(0, empty_world(town(), vehicles=3, pedestrians=4))
 

@@ -11,7 +11,7 @@ from dorothie_gym.sim.ego.limits import KMH, MAX_CRUISE, MIN_CRUISE
 from tests.sim.driving import drive, long_lane, network, on_lane
 
 
-def test_cruise_speed_goes_by_steps_of_five_within_its_range() -> None:
+def test_cruise_speed_changes_in_steps_of_five_within_its_range() -> None:
     roads = network("brookside")
     ego = on_lane(roads, long_lane(roads.town), 2.0).ego
     seen = [ego.cruise]
@@ -34,7 +34,7 @@ def test_car_drives_at_its_cruise_speed() -> None:
 
 
 @pytest.mark.parametrize("cruise", [40.0, 90.0])
-def test_car_comes_slowly_to_a_goal_and_can_be_stopped_within_two_metres(cruise: float) -> None:
+def test_car_approaches_a_goal_slowly_and_stops_within_two_metres(cruise: float) -> None:
     roads = network("brookside")
     lane = long_lane(roads.town)
     world = on_lane(roads, lane, 2.0)

@@ -62,7 +62,7 @@ def test_gap_is_from_nose_to_tail() -> None:
 
 
 @pytest.mark.parametrize("place", [(-5.0, 0.0), (30.0, 3.5), (30.0, -3.5), (90.0, 0.0)])
-def test_what_is_behind_beside_or_far_away_is_no_hazard(place: tuple[float, float]) -> None:
+def test_bodies_behind_beside_or_far_away_are_no_hazard(place: tuple[float, float]) -> None:
     assert ahead(body(*place)) is None
 
 
@@ -71,11 +71,11 @@ def test_prop_beside_the_path_is_no_hazard() -> None:
     assert ahead(body(30.0, 1.2, kind=ObjectClass.STATIC, length=0.4, width=0.4)) is not None
 
 
-def test_things_on_a_bridge_are_no_hazard() -> None:
+def test_bodies_on_a_bridge_are_no_hazard() -> None:
     assert ahead(body(30.0, height=5.0)) is None
 
 
-def test_things_up_a_slope_are_a_hazard() -> None:
+def test_bodies_up_a_slope_are_a_hazard() -> None:
     slope = lane(0, [(0.0, 0.0, 0.0), (100.0, 0.0, 12.0)])
     assert ahead(body(40.0, height=4.8), road=slope) is not None
     assert ahead(body(40.0, height=0.0), road=slope) is None

@@ -130,7 +130,7 @@ def test_stop_and_start() -> None:
     assert drive(world, lambda: car.speed > 3.0, 5.0).arrived
 
 
-def test_any_manoeuvre_starts_a_stopped_car_again() -> None:
+def test_any_manoeuvre_restarts_a_stopped_car() -> None:
     roads = network("brookside")
     ego = on_lane(roads, choice_lane(), 2.0).ego
     planner = ego.planner
@@ -141,13 +141,13 @@ def test_any_manoeuvre_starts_a_stopped_car_again() -> None:
 
 
 @pytest.mark.parametrize("action", [PhysicalAction.SPEED_CHANGE, PhysicalAction.LIGHT_CHANGE])
-def test_what_is_no_navigation_is_refused(action: PhysicalAction) -> None:
+def test_other_actions_than_navigation_are_refused(action: PhysicalAction) -> None:
     roads = network("brookside")
     ego = on_lane(roads, choice_lane(), 2.0).ego
     assert ego.planner.command(action, 0, 0.0) == f"{action.label} is no navigation action"
 
 
-def test_plan_is_not_changed_where_the_car_cannot_stop_before_the_junction_any_more() -> None:
+def test_plan_is_fixed_once_the_car_cannot_stop_before_the_junction() -> None:
     roads = network("brookside")
     town, lane = roads.town, roads.town.lanes[choice_lane()]
     first, second = town.exits(lane.id)[:2]

@@ -28,7 +28,7 @@ def scan_at_height(network, position, heading, height):
     return found[int(np.argmin(distances))] if found else stock(network, position, heading)
 
 
-def test_index_equals_the_stock_scan(network):
+def test_index_equals_highway_envs_scan(network):
     for position, heading, _ in places(network, 2000, seed=1):
         assert network.get_closest_lane_index(position) == stock(network, position, None)
         assert network.get_closest_lane_index(position, heading) == stock(network, position, heading)
@@ -61,7 +61,7 @@ def test_height_separates_the_bridge_from_the_road_below():
 
 
 @pytest.mark.parametrize("position", [[1e12, 0.0], [-1e300, 1e300], [np.nan, 0.0], [np.inf, 0.0]])
-def test_impossible_places_are_answered_as_by_the_stock_scan(position):
+def test_invalid_positions_are_answered_as_by_highway_envs_scan(position):
     network = TownNetwork(straight_town())
     with np.errstate(all="ignore"):
         expected = stock(network, np.array(position), None)

@@ -61,7 +61,7 @@ def test_inside_the_lane_the_closest_place_is_the_towns(x, y):
         assert (station, lateral) == pytest.approx(CURVE.town_lane.project(np.array([x, y])), abs=1e-6)
 
 
-def test_lane_goes_on_straight_beyond_its_ends():
+def test_lane_continues_straight_beyond_its_ends():
     assert CURVE.local_coordinates(np.array([-27.0, 2.0])) == pytest.approx((-7.0, 2.0), abs=0.1)
     end = CURVE.position(CURVE.length, 0)
     assert CURVE.position(CURVE.length + 10, 0) == pytest.approx(end + [0, 10], abs=0.2)

@@ -41,7 +41,7 @@ def test_town_is_read_once():
     assert town_arrays(network) is town_arrays(network)
 
 
-def test_body_whose_position_is_no_number_is_an_error():
+def test_nan_position_is_an_error():
     town = town_arrays(TownNetwork(find_town("curve")))
     with pytest.raises(ValueError, match="not a number"):
         closest_lane(town, np.nan, 0.0, 0.0, 1.0, 0.0, np.nan, 0)

@@ -51,7 +51,7 @@ def test_linked_lanes_share_a_node(network):
             assert source in network.predecessors(target)
 
 
-def test_lanes_that_one_may_change_between_are_one_edge_from_left_to_right(network):
+def test_lanes_with_lane_changes_are_one_edge_from_left_to_right(network):
     for link in network.town.links:
         if link.type is LinkType.LANE_CHANGE_RIGHT:
             left, right = network.index_of(link.source), network.index_of(link.target)
@@ -150,7 +150,7 @@ def test_paths_and_connections_work_as_inherited():
     assert not network.is_connected_road(network.index_of(SOUTH_OUT), network.index_of(WEST_IN), depth=2)
 
 
-def test_shortest_path_is_the_stock_one(network):
+def test_shortest_path_equals_highway_envs(network):
     rng = np.random.default_rng(0)
     nodes = sorted(network.graph)
     for _ in range(30):

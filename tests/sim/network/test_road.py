@@ -42,7 +42,7 @@ def place_in(things, thing):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_neighbours_on_a_straight_road_are_the_stock_ones(seed):
+def test_neighbours_on_a_straight_road_equal_highway_envs(seed):
     network = TownNetwork(straight_town(lanes=3, roads=1, length=300.0))
     ours, stock = scattered(network, TownRoad, seed), scattered(network, Road, seed)
     for mine, theirs in zip(ours.vehicles, stock.vehicles, strict=True):
@@ -53,7 +53,7 @@ def test_neighbours_on_a_straight_road_are_the_stock_ones(seed):
             ]
 
 
-def test_neighbours_with_equal_stations_are_the_stock_ones():
+def test_neighbours_with_equal_stations_equal_highway_envs():
     network = TownNetwork(straight_town(lanes=1, roads=1))
     roads = TownRoad(network), Road(network)
     for road in roads:
@@ -114,7 +114,7 @@ def test_oncoming_traffic_is_no_neighbour():
     assert road.neighbour_vehicles(ego) == (None, None)
 
 
-def test_things_on_a_bridge_are_neither_struck_nor_followed():
+def test_objects_on_a_bridge_neither_collide_nor_are_followed():
     road = TownRoad(TownNetwork(overpass_town()))
     below, above = on(road, 0, 99.0), on(road, 1, 99.0)
     assert road.height_of(below) == pytest.approx(0.0)
@@ -126,7 +126,7 @@ def test_things_on_a_bridge_are_neither_struck_nor_followed():
     assert road.neighbour_vehicles(road.vehicles[-1])[0] is None
 
 
-def test_own_height_of_a_thing_goes_before_that_of_its_lane():
+def test_own_height_of_an_object_overrides_that_of_its_lane():
     road = TownRoad(TownNetwork(overpass_town()))
     below, above = on(road, 0, 99.0), on(road, 1, 99.0)
     above.height = 0.5
@@ -142,7 +142,7 @@ def test_own_height_of_a_thing_goes_before_that_of_its_lane():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_step_equals_stock_at_one_height(seed):
+def test_step_equals_highway_envs_at_one_height(seed):
     network = TownNetwork(straight_town(lanes=3, roads=1, length=300.0))
     ours, stock = scattered(network, TownRoad, seed, count=40), scattered(network, Road, seed, count=40)
     for _ in range(30):
@@ -160,7 +160,7 @@ def test_step_equals_stock_at_one_height(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_idm_traffic_on_a_straight_road_drives_as_on_a_stock_road(seed):
+def test_idm_traffic_on_a_straight_road_drives_as_on_highway_envs_road(seed):
     network = TownNetwork(straight_town(lanes=3, roads=1, length=300.0))
     ours = scattered(network, TownRoad, seed, vehicle_class=IDMVehicle)
     stock = scattered(network, Road, seed, vehicle_class=IDMVehicle)
@@ -181,7 +181,7 @@ def test_empty_road_and_lone_vehicle():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_those_close_to_a_vehicle_are_the_stock_ones(seed):
+def test_close_objects_are_highway_envs(seed):
     network = TownNetwork(straight_town(lanes=3, roads=3))
     ours, stock = scattered(network, TownRoad, seed), scattered(network, Road, seed)
     for options in (

@@ -48,13 +48,13 @@ def test_street_walks_lie_beside_the_outermost_lanes_and_on_no_other(name):
             assert across == 0.0 or FROM_JUNCTION - 0.1 < station < beside.length - FROM_JUNCTION + 0.1
 
 
-def test_it_is_as_far_across_as_both_lanes_and_kerbs_are_wide():
+def test_distance_across_the_street_is_the_width_of_lanes_and_kerbs():
     arrays = town_arrays(two_way_network())
     points = arrays.walk_points
     assert points[points[:, 5] > 0.0, 5] == pytest.approx(8.0 + 2 * KERB, abs=0.01)
 
 
-def test_people_cross_the_street_and_walk_on_over_there():
+def test_pedestrians_cross_the_street_and_continue_on_the_other_side():
     network = two_way_network()
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=0, pedestrians=1)
@@ -109,7 +109,7 @@ def test_vehicle_stops_for_a_straying_pedestrian(speed):
     assert world.vehicles[0].x > 85.0 and not walker.crashed
 
 
-def test_no_street_walker_without_a_way_or_at_a_taken_place():
+def test_no_pedestrian_is_added_without_a_footway_or_at_an_occupied_place():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=1, pedestrians=2)
@@ -122,7 +122,7 @@ def test_no_street_walker_without_a_way_or_at_a_taken_place():
     assert add_street_walker(network, arrays, world, int(street.lane), 30.0) is None  # no room in the world
 
 
-def test_town_without_pavements_has_its_people_beside_the_streets():
+def test_pedestrians_walk_beside_the_streets_of_a_town_without_pavements():
     network = TownNetwork(bare("brookside"))
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=0, pedestrians=8, seed=1)

@@ -31,7 +31,7 @@ def distances(world):
 
 
 @pytest.mark.parametrize("name", ["brookside", "millbrook", "midtown", "northgate"])
-def test_one_walks_on_from_every_end_of_a_pavement_unless_a_road_lies_before_it(name):
+def test_every_end_of_a_pavement_continues_unless_it_ends_at_a_road(name):
     network = TownNetwork(find_town(name))
     walks, points = town_arrays(network).walks, town_arrays(network).walk_points
     pavements = [k for k in range(len(walks)) if walks.kind[k] == Footway.PAVEMENT]
@@ -54,7 +54,7 @@ def leads_over_a_lane(network, start, stop):
 
 
 @pytest.mark.parametrize("name", ["brookside", "midtown", "northgate"])
-def test_ways_between_pavements_keep_off_the_lanes_and_join_their_ends(name):
+def test_footways_between_pavements_avoid_lanes_and_join_their_ends(name):
     network = TownNetwork(find_town(name))
     arrays = town_arrays(network)
     corners = np.flatnonzero(arrays.walks.kind == Footway.CORNER)
@@ -132,7 +132,7 @@ def test_the_faster_one_overtakes_the_slower_one():
     assert world.pedestrians[0].station > world.pedestrians[1].station
 
 
-def test_people_walk_round_a_prop():
+def test_pedestrians_walk_round_a_prop():
     network = TownNetwork(find_town("brookside"))
     arrays = town_arrays(network)
     world = empty_world(arrays, **ALONE)

@@ -35,7 +35,7 @@ def test_every_crosswalk_joins_two_pavements_where_they_have_a_mouth(name):
 
 
 @pytest.mark.parametrize("name", TOWNS)
-def test_people_walk_over_the_middle_of_the_paint(name):
+def test_pedestrians_cross_in_the_middle_of_the_crosswalk(name):
     town = find_town(name)
     crossings = town_arrays(TownNetwork(town)).crossings
     for crosswalk, crossing in zip(town.crosswalks, crossings, strict=True):
@@ -46,7 +46,7 @@ def test_people_walk_over_the_middle_of_the_paint(name):
 
 
 @pytest.mark.parametrize("name", TOWNS)
-def test_lanes_cross_every_crosswalk_where_people_walk_over_it(name):
+def test_lanes_cross_every_crosswalk_on_the_line_of_the_pedestrians(name):
     town = find_town(name)
     arrays = town_arrays(TownNetwork(town))
     assert set(arrays.passages.crossing.tolist()) == set(range(len(town.crosswalks)))
@@ -61,7 +61,7 @@ def test_lanes_cross_every_crosswalk_where_people_walk_over_it(name):
 
 
 @pytest.mark.parametrize("name", TOWNS)
-def test_pavements_keep_off_the_lanes(name):
+def test_pavements_do_not_overlap_lanes(name):
     network = TownNetwork(find_town(name))
     arrays = town_arrays(network)
     for walk in arrays.walks[arrays.walks.kind == Footway.PAVEMENT]:

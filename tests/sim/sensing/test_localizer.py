@@ -99,14 +99,14 @@ def test_with_gps_the_error_is_under_a_metre() -> None:
         assert math.sqrt(np.mean(np.square(errors))) < 1.0
 
 
-def test_with_gps_the_filter_is_as_sure_as_it_may_be() -> None:
+def test_filter_with_gps_is_consistent() -> None:
     squared = [moment.squared(3) for moments in drives() for moment in moments if 5.0 < moment.time <= WARM]
     # the mean of chi-square with 3 degrees of freedom is 3; errors half a second apart go together, runs do not
     assert np.mean(squared) == pytest.approx(3.0, abs=3.0 * math.sqrt(6.0 / RUNS))
     assert np.mean([value < 7.815 for value in squared]) == pytest.approx(0.95, abs=0.03)
 
 
-def test_without_gps_the_estimate_drifts_and_the_filter_knows() -> None:
+def test_estimate_drifts_without_gps_and_covariance_covers_it() -> None:
     def spread(moments: tuple[Moment, ...], since: float) -> float:
         return float(np.trace(at(moments, WARM + since).covariance[:2, :2]))
 

@@ -45,13 +45,13 @@ def test_without_errors_dead_reckoning_finds_the_place() -> None:
     np.testing.assert_array_equal(mean[3:], [1.0, 0.0])
 
 
-def test_known_errors_are_taken_out() -> None:
+def test_known_sensor_errors_are_compensated() -> None:
     track = curve()
     mean, _ = dead_reckon(track, exact(), (1.03, 0.02), (0.7, 1.03, 0.02))
     np.testing.assert_allclose(mean[:3], track[-1])
 
 
-def test_unknown_errors_lead_astray() -> None:
+def test_unknown_sensor_errors_cause_drift() -> None:
     track = curve()
     (x, y, heading, *_), _ = dead_reckon(track, exact(), (1.03, 0.02), (0.7, 1.0, 0.0))
     assert np.hypot(x, y) == pytest.approx(1.03 * np.hypot(*track[-1, :2]), rel=0.01)
@@ -59,7 +59,7 @@ def test_unknown_errors_lead_astray() -> None:
 
 
 @pytest.mark.parametrize("believed", [(0.7, 1.0, 0.0), (0.9, 1.02, 0.01)])
-def test_covariance_moves_as_the_derivatives_of_dead_reckoning_have_it(believed: tuple[float, float, float]) -> None:
+def test_covariance_follows_the_derivatives_of_dead_reckoning(believed: tuple[float, float, float]) -> None:
     track, truth = curve(), np.array([1.01, 0.005])
 
     def end(heading: float, scale: float, bias: float) -> Array:
@@ -87,7 +87,7 @@ def test_a_standing_car_counts_neither_way_nor_turn() -> None:
     assert not covariance[:4].any()
 
 
-def test_covariance_has_the_spread_of_what_dead_reckoning_makes() -> None:
+def test_covariance_matches_the_spread_of_dead_reckoning() -> None:
     track = curve(45)
     draws = np.random.default_rng(2).standard_normal((6000, 45, ODOMETRY_DRAWS))
     ends = np.array([dead_reckon(track, draw, (1.0, 0.0), (0.7, 1.0, 0.0))[0][:3] for draw in draws])

@@ -15,7 +15,7 @@ from dorothie_gym.sim.sensing.localizer import Localizer
 from dorothie_gym.sim.sensing.visibility import Visibility
 from tests.sim.driving import network
 from tests.sim.state.plain_rules import lawless_way
-from tests.sim.sensing.test_seeing import Street
+from tests.sim.sensing.test_seen_bodies import Street
 digest = hashlib.sha256()
 for seed in range(4):
     view = Visibility(fog=0.02, rain=0.002, light=3.0, lamps=20200.0 * (seed % 2))

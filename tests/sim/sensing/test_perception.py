@@ -65,7 +65,7 @@ class Eyes:
 NO_PEDESTRIANS, NO_PROPS = empty_records(PedestrianRecord, 0), empty_records(PropRecord, 0)
 
 
-def test_on_a_clear_noon_everything_is_seen_where_it_is() -> None:
+def test_clear_noon_has_no_perception_errors() -> None:
     bodies = [body(10.0, key=1), body(79.0, key=2)]
     assert Eyes().look(bodies, Weather().visibility(lights=False), 0) == bodies
 
@@ -82,7 +82,7 @@ def test_perception_does_not_depend_on_the_number_of_calls() -> None:
     assert alone == [thing for thing in first if thing.key == bodies[1].key]
 
 
-def test_far_things_are_missed_as_often_as_the_formula_says() -> None:
+def test_miss_rate_of_distant_bodies_follows_the_formula() -> None:
     distance, eyes = FOG.sight + 8.0, Eyes()
     seen = [bool(eyes.look([body(distance, key=key)], FOG, 15 * key)) for key in range(4000)]
     expected = detection_probability(FOG, distance)
@@ -90,7 +90,7 @@ def test_far_things_are_missed_as_often_as_the_formula_says() -> None:
     assert np.mean(seen) == pytest.approx(expected, abs=0.03)
 
 
-def test_things_within_sight_are_never_missed() -> None:
+def test_bodies_within_sight_are_never_missed() -> None:
     eyes = Eyes()
     assert all(eyes.look([body(FOG.sight - 0.1, key=key)], FOG, key) for key in range(500))
 
@@ -138,7 +138,7 @@ def bad_world(trouble: str, seed: int, *, lights: bool = True) -> World:
 
 @pytest.mark.parametrize("trouble", TROUBLES)
 @pytest.mark.parametrize("lights", [False, True])
-def test_car_that_sees_badly_stops_before_what_is_in_its_way(trouble: str, lights: bool) -> None:
+def test_car_in_poor_sight_stops_before_obstacles(trouble: str, lights: bool) -> None:
     for seed in range(2):
         for blurred in (False, True):
             world = bad_world(trouble, seed, lights=lights)
@@ -152,7 +152,7 @@ def test_car_that_sees_badly_stops_before_what_is_in_its_way(trouble: str, light
 
 
 @pytest.mark.parametrize("trouble", TROUBLES)
-def test_car_never_goes_faster_than_it_can_stop_within_its_sight(trouble: str) -> None:
+def test_speed_allows_a_stop_within_sight(trouble: str) -> None:
     world = bad_world(trouble, 0)
     fastest = 0.0
     for _ in range(24):

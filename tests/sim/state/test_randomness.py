@@ -15,7 +15,7 @@ def body(seed: int):
     return world.vehicles[0]
 
 
-def test_numbers_are_marsaglias():
+def test_random_numbers_follow_marsaglia():
     one = body(3)
     state = int(one.random)
     for _ in range(1000):

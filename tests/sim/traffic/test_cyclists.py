@@ -86,7 +86,7 @@ def test_about_one_vehicle_in_eight_is_a_cyclist_on_a_slow_rightmost_lane():
     assert 0.08 < cyclists / vehicles < 0.17
 
 
-def test_cyclists_keep_off_fast_roads_when_they_choose_their_way_and_come_back_after_towing():
+def test_cyclists_avoid_fast_roads_in_routes_and_after_a_respawn():
     network = TownNetwork(find_town("northgate"))
     arrays = town_arrays(network)
     fast = arrays.lanes.limit > 17.0

@@ -131,7 +131,7 @@ def test_first_come_first_served_among_equals():
 
 @pytest.mark.parametrize("way", [1, 2, 3])  # left, straight on, right
 @pytest.mark.parametrize("sign", [None, SignalKind.STOP])
-def test_four_cars_at_a_crossing_of_equals_all_get_across(way, sign):
+def test_four_cars_at_a_junction_of_equals_all_cross(way, sign):
     town = crossing(dict.fromkeys(ARMS, sign) if sign else {})
     arrays, world = going(town, *((arm, ARMS[(k + way) % 4], 28.0) for k, arm in enumerate(ARMS)))
     done: set[int] = set()
@@ -139,7 +139,7 @@ def test_four_cars_at_a_crossing_of_equals_all_get_across(way, sign):
     assert len(done) == 4 and seconds < 45.0
 
 
-def test_no_more_are_let_in_than_have_room_behind_the_junction():
+def test_junction_admits_only_vehicles_with_room_behind_it():
     network = TownNetwork(crossing())
     poses = [Pose(way_out("n"), 18.0), *(Pose(way_in("s"), LENGTH - left, speed=8.0) for left in (18.0, 32.0, 46.0))]
     arrays, world = kernel_world(network, poses)
@@ -159,7 +159,7 @@ def test_no_more_are_let_in_than_have_room_behind_the_junction():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_crossing_paths_are_never_driven_at_once_and_no_vehicle_waits_for_ever(seed):
+def test_conflicting_paths_are_never_driven_together_and_no_vehicle_waits_for_ever(seed):
     town = crossing()
     rules, rng = right_of_way(town), np.random.default_rng(seed)
     ways = []
@@ -196,7 +196,7 @@ def test_vehicle_without_room_behind_the_junction_waits_and_then_reroutes():
 
 
 @pytest.mark.parametrize("name", ["brookside", "millbrook"])
-def test_lights_show_what_the_towns_programmes_say(name):
+def test_lights_follow_the_towns_programmes(name):
     town = find_town(name)
     town = town if town.programmes else lit(town)
     arrays = town_arrays(TownNetwork(town))

@@ -30,7 +30,7 @@ def on_lane(world, lane):
     ("lateral", "turned", "beside"),
     [(0.0, 0.0, False), (0.9, 0.1, False), (0.3, math.pi / 4, False), (0.9, math.pi / 4, True), (1.9, 0.0, True)],
 )
-def test_vehicle_that_reaches_into_the_lane_beside_is_on_it_too(lateral, turned, beside):
+def test_vehicle_across_a_lane_line_is_on_both_lanes(lateral, turned, beside):
     _town, world = kernel_world(two_lanes(), [Pose(0, 50.0, lateral=lateral, turned=turned)])
     assert on_lane(world, 0) == [0]
     assert on_lane(world, 1) == ([0] if beside else [])

@@ -52,7 +52,7 @@ def test_crashed_vehicle_comes_back_out_of_sight_with_a_new_key():
         assert abs(vehicle.x - 250.0) >= OUT_OF_SIGHT
 
 
-def test_vehicle_that_stands_for_long_is_towed_unless_its_light_is_red():
+def test_vehicle_that_stands_for_long_respawns_unless_its_light_is_red():
     network = TownNetwork(find_town("midtown"))
     town, arrays = network.town, town_arrays(network)
     lit = next(
@@ -78,7 +78,7 @@ def test_vehicle_that_stands_for_long_is_towed_unless_its_light_is_red():
     assert world.vehicles[1].key != key
 
 
-def test_queue_before_a_red_light_that_reaches_back_through_another_junction_is_not_towed():
+def test_queue_before_a_red_light_across_another_junction_does_not_respawn():
     network = TownNetwork(find_town("midtown"))
     town, arrays = network.town, town_arrays(network)
     lit = arrays.lanes.programme >= 0
@@ -128,7 +128,7 @@ def test_no_body_respawns_close_to_others():
         assert (np.abs(others.x - moved.x)[beside] >= 14.0).all()
 
 
-def test_vehicle_for_which_there_is_no_room_is_gone():
+def test_vehicle_without_room_is_removed():
     network = TownNetwork(straight_town(lanes=1, roads=1, length=60.0))
     arrays = town_arrays(network)
     world = empty_world(arrays, vehicles=2, pedestrians=0)

@@ -1,4 +1,4 @@
-"""Stock highway-env works on a town's road: drivers, observation types, viewer."""
+"""highway-env's vehicles, observation types and viewer on a town's road."""
 
 import itertools
 
@@ -90,7 +90,7 @@ def test_idm_vehicle_keeps_to_the_links_of_a_town(name):
 
 
 @pytest.mark.parametrize("name", OBSERVATIONS)
-def test_stock_observations_compute_on_a_town_road(name):
+def test_highway_envs_observations_work_on_a_town_road(name):
     env = StockEnv({"observation": OBSERVATIONS[name], "simulation_frequency": 15, "policy_frequency": 5})
     observation, _ = env.reset(seed=3)
     for _ in range(10):
@@ -101,7 +101,7 @@ def test_stock_observations_compute_on_a_town_road(name):
     env.close()
 
 
-def test_stock_environments_can_be_copied_and_simplified():
+def test_highway_envs_environments_can_be_copied_and_simplified():
     env = StockEnv({"policy_frequency": 5})
     env.reset(seed=0)
     simple = env.simplify()
@@ -111,7 +111,7 @@ def test_stock_environments_can_be_copied_and_simplified():
     assert (simple.vehicle.position != env.vehicle.position).any()
 
 
-def test_stock_viewer_draws_the_town(monkeypatch):
+def test_highway_envs_viewer_draws_the_town(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     env = StockEnv({"screen_width": 300, "screen_height": 200, "scaling": 3.0}, render_mode="rgb_array")
     env.reset(seed=0)

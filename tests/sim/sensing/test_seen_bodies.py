@@ -168,7 +168,7 @@ def plainly_perceived(
 
 @pytest.mark.parametrize("sky", SKIES)
 @pytest.mark.parametrize("lights", [False, True])
-def test_the_same_is_seen_as_by_the_rules_in_plain_python(sky: str, lights: bool) -> None:
+def test_perception_equals_the_plain_python_rules(sky: str, lights: bool) -> None:
     total = moved = 0
     for seed in range(60):
         street = Street(seed)
@@ -185,7 +185,7 @@ def test_the_same_is_seen_as_by_the_rules_in_plain_python(sky: str, lights: bool
     assert moved > 50  # on the clear noon by those whose view is blurred
 
 
-def test_records_tell_where_the_body_is_and_how_far_it_seems() -> None:
+def test_records_hold_row_and_perceived_distance() -> None:
     street = Street(3)
     for view in (weather_of("clear noon").visibility(lights=False), weather_of("fog").visibility(lights=False)):
         groups = {Group.VEHICLES: street.vehicles, Group.PEDESTRIANS: street.pedestrians, Group.PROPS: street.props}
@@ -222,7 +222,7 @@ def test_of_bodies_at_one_distance_the_lower_key_comes_first() -> None:
     assert [thing.key for thing in street.seen(Visibility(), 0)] == [1, 2, 3, 4, 7, 9]
 
 
-def test_nothing_is_seen_where_nothing_is() -> None:
+def test_empty_world_has_no_perceived_bodies() -> None:
     assert len(Street(0, vehicles=1, pedestrians=0, props=0).seen(Visibility(fog=0.05), 0)) == 0
 
 
