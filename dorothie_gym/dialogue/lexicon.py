@@ -87,7 +87,7 @@ def read_data(name: str) -> YamlMapping:
     Raises:
         PhraseFileError: if the file is not a YAML mapping.
     """
-    text = resources.files(__package__).joinpath("data", name).read_text(encoding="utf-8")
+    text = resources.files("dorothie_gym.dialogue").joinpath("data", name).read_text(encoding="utf-8")
     try:
         data = yaml.safe_load(text)
     except yaml.YAMLError as error:

@@ -6,7 +6,7 @@ import functools
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -28,8 +28,14 @@ from dorothie_gym.ontology import (
 
 _Option = TypeVar("_Option")
 
-Draw = Callable[[], float]
-"""Function that draws a number from [0, 1)."""
+
+class Draw(Protocol):
+    """Function that draws a number from [0, 1)."""
+
+    def __call__(self) -> float:
+        """Returns the next number."""
+        ...
+
 
 _DRAWN_AT_ONCE = 32
 """Numbers per draw from numpy; a single number costs as much as a batch."""
@@ -241,7 +247,7 @@ def _action_keys(wording: Wording) -> Mapping[ActionValue, tuple[str, ...]]:
     known = wording.known
     names = (("nth", "nth"), ("past", "past"), ("here", "here"), ("in", "distance"), ("to", "speed"))
     details = [detail for detail, name in names if name in known]
-    keys = {_OTHERS: (*details, "plain")}
+    keys: dict[ActionValue, tuple[str, ...]] = {_OTHERS: (*details, "plain")}
     for action, base in _bases(wording).items():
         keys[action] = (*(f"{base}_{detail}" for detail in details), base, *details, "plain")
     return keys

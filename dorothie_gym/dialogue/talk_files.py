@@ -63,7 +63,7 @@ class TalkFiles:
 
 def read_talk_files() -> dict[str, str]:
     """Returns the texts of the talk files of the package by name, sorted by name."""
-    folder = resources.files(__package__).joinpath("data", "talk")
+    folder = resources.files("dorothie_gym.dialogue").joinpath("data", "talk")
     files = sorted((item for item in folder.iterdir() if item.name.endswith(".talk")), key=lambda item: item.name)
     return {item.name: item.read_text(encoding="utf-8") for item in files}
 

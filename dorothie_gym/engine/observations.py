@@ -303,6 +303,7 @@ class Observable(Protocol):
 
     def observations(self, roles: Sequence[Role]) -> dict[str, Observation]:
         """Builds the observations of some roles at the present decision, by agent."""
+        ...
 
 
 class LazyObservations(Mapping[str, Observation]):

@@ -104,11 +104,15 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
 
     def observation_space(self, agent: str) -> spaces.Dict:
         """Returns the observation space of an agent, always the same object."""
-        return self.observation_spaces[agent]
+        space = self.observation_spaces[agent]
+        assert isinstance(space, spaces.Dict)
+        return space
 
     def action_space(self, agent: str) -> spaces.Dict:
         """Returns the action space of an agent, always the same object."""
-        return self.action_spaces[agent]
+        space = self.action_spaces[agent]
+        assert isinstance(space, spaces.Dict)
+        return space
 
     def reset(
         self, seed: int | None = None, options: ResetOptions | None = None
@@ -234,9 +238,10 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
 parallel_env = raw_env = DuoWizardEnv
 
 
-def env(**arguments: Any) -> AECEnv[str, Observation, ActionDict]:
+def env(**arguments: Any) -> AECEnv[str, Observation, ActionDict | None]:
     """Returns the environment in PettingZoo's turn-based form; arguments as of `DuoWizardEnv`."""
-    return parallel_to_aec(parallel_env(**arguments))
+    # PettingZoo declares actions that may be None, for agents that are done
+    return parallel_to_aec(parallel_env(**arguments))  # pyright: ignore[reportArgumentType]
 
 
 __all__ = ["DuoWizardEnv", "env", "parallel_env", "raw_env"]

@@ -227,10 +227,13 @@ def _way(view: PointView) -> NDArray[np.float64]:
 
 
 def _padded(values: Sequence[float], filler: float) -> NDArray[np.float64] | NDArray[np.int64]:
-    dtype = np.float64 if isinstance(filler, float) else np.int64
-    row = np.full(HISTORY_LENGTH, filler, dtype=dtype)
-    row[: len(values)] = values
-    return row
+    if isinstance(filler, float):
+        times = np.full(HISTORY_LENGTH, filler)
+        times[: len(values)] = values
+        return times
+    ids = np.full(HISTORY_LENGTH, filler, dtype=np.int64)
+    ids[: len(values)] = values
+    return ids
 
 
 def _speaker(move: MoveRecord) -> int:

@@ -147,7 +147,7 @@ class PointEnv(gym.Env[Observation, ActionDict]):
         self.task = task
         self.limits = limits or SpaceLimits()
         self.render_mode = render_mode
-        self.rules = RULES[task]
+        self.rules: PointRules[Any] = RULES[task]
         self.observation_space = history_space(task, self.limits)
         self.action_space = self.rules.action_space
         self._points: Iterator[Point] = iter(())

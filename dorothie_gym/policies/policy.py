@@ -116,6 +116,7 @@ class RoleObservations(Protocol):
 
     def of(self, roles: Sequence[Role]) -> Mapping[str, ObservationMapping]:
         """Returns the observations of some roles by agent."""
+        ...
 
 
 class ObservedSession(Protocol):
@@ -124,9 +125,11 @@ class ObservedSession(Protocol):
     @property
     def observations(self) -> RoleObservations:
         """Observations at the present decision."""
+        ...
 
     def mask(self, role: Role) -> Mapping[str, object]:
         """Returns the mask of a role's action space at the present decision."""
+        ...
 
 
 def policy_inputs(session: ObservedSession, policies: Mapping[Role, AnyPolicy]) -> dict[Role, ObservationMapping]:

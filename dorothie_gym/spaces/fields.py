@@ -194,8 +194,9 @@ class FieldBuffer:
     @classmethod
     def of_space(cls, space: spaces.Dict) -> Self:
         """Returns a buffer for all fields of a space that are arrays."""
-        arrays = spaces.Box | spaces.MultiDiscrete | spaces.MultiBinary
-        return cls({name: (f.dtype, f.shape) for name, f in space.spaces.items() if isinstance(f, arrays)})
+        arrays = (spaces.Box, spaces.MultiDiscrete, spaces.MultiBinary)
+        fields = {name: field for name, field in space.spaces.items() if isinstance(field, arrays)}
+        return cls({name: (field.dtype, field.shape) for name, field in fields.items()})
 
     def copy(self) -> Arrays:
         """Returns a copy of the template: arrays by name."""

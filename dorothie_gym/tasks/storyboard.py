@@ -114,26 +114,32 @@ class LandmarkSite(Protocol):
     @property
     def id(self) -> int:
         """Id of the site in its town."""
+        ...
 
     @property
     def lane(self) -> int:
         """Id of the lane that gives access."""
+        ...
 
     @property
     def station(self) -> float:
         """Distance of the waypoint along the lane [m]."""
+        ...
 
     @property
     def position(self) -> tuple[float, float]:
         """Position of the landmark (x, y) [m]."""
+        ...
 
     @property
     def waypoint(self) -> tuple[float, float]:
         """Closest point on the lane (x, y) [m]."""
+        ...
 
     @property
     def street(self) -> int:
         """Index of the street."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -86,11 +86,15 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
 
     def observation_space(self, agent: str) -> spaces.Box:
         """Returns the observation space, equal for all agents."""
-        return self.observation_spaces[agent]
+        space = self.observation_spaces[agent]
+        assert isinstance(space, spaces.Box)
+        return space
 
     def action_space(self, agent: str) -> spaces.MultiDiscrete:
         """Returns the action space, equal for all agents."""
-        return self.action_spaces[agent]
+        space = self.action_spaces[agent]
+        assert isinstance(space, spaces.MultiDiscrete)
+        return space
 
     def reset(
         self, seed: int | None = None, options: Mapping[str, object] | None = None

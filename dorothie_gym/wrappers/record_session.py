@@ -28,16 +28,20 @@ class Recordable(Protocol):
     @property
     def last_events(self) -> tuple[Event, ...]:
         """Events of the last step, or of the reset."""
+        ...
 
     @property
     def last_frames(self) -> NDArray[np.float64]:
         """Trajectory rows (n, 9) of the last step, or of the reset; columns as in `TRAJECTORY_COLUMNS`."""
+        ...
 
     def session_header(self) -> SessionHeader:
         """Returns the header of the session; called after each reset."""
+        ...
 
     def summary(self) -> Mapping[str, object]:
         """Returns the outcome of the session in JSON types; called when all agents are done."""
+        ...
 
 
 def name_by_seed(header: SessionHeader) -> str:
