@@ -84,7 +84,7 @@ def test_ctrl_c_exits_with_130_and_one_line(monkeypatch: pytest.MonkeyPatch) -> 
     def interrupted(*arguments: object, **settings: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dorothie_gym.bench.world.in_turns", interrupted)
+    monkeypatch.setattr("dorothie_gym.bench.world.alternate", interrupted)
     result = call("world", *SMALL, "--json")
     assert result.exit_code == 130 and result.stdout == ""
     assert result.stderr.count("\n") == 1 and "Interrupted" in result.stderr

@@ -69,7 +69,7 @@ def test_session_is_shown_in_a_window_as_long_as_it_is_open(recorded: Path, monk
 
 
 def test_invisible_window_is_refused(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dorothie_gym.cli.replay._is_invisible", lambda: True)
+    monkeypatch.setattr("dorothie_gym.cli.sessions._is_window_invisible", lambda: True)
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     result = call("replay", recorded)
     assert result.exit_code == 2 and "--video FILE.mp4" in result.stderr

@@ -72,7 +72,7 @@ def test_ctrl_c_while_a_corpus_is_read_is_told(
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(f"dorothie_gym.baselines.{module}.sessions_of", interrupted)
+    monkeypatch.setattr(f"dorothie_gym.baselines.{module}.replayable_sessions", interrupted)
     result = CliRunner().invoke(
         app, ["train-rl", algorithm, "--out", str(tmp_path), "--warm-start", str(tmp_path), "--workers", "0"]
     )

@@ -15,8 +15,9 @@ from torch.utils.flop_counter import FlopCounterMode
 from dorothie_gym.baselines.model_io import TASKS, Examples
 from dorothie_gym.baselines.reference_impl import PublishedTOTO, Senses, rebuild, train_step
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
-from dorothie_gym.bench.timing import Progress, cores, cpu_seconds, in_turns, machine, quiet, rounded
+from dorothie_gym.bench.timing import Progress, alternate, cpu_seconds, ignore_progress, machine, rounded
 from dorothie_gym.benchmark.features import Columns, build, points
+from dorothie_gym.processors import available_processors
 from dorothie_gym.recording import Corpus, Session
 from dorothie_gym.recording.points import Point, task_points
 
@@ -36,7 +37,7 @@ def measure(
     threads: int | None = None,
     batch_size: int = 64,
     repeats: int = 5,
-    progress: Progress = quiet,
+    progress: Progress = ignore_progress,
 ) -> dict[str, Any]:
     """Measures points a second in training and in answering, ours and the published loop's in turns.
 
@@ -53,7 +54,7 @@ def measure(
         SessionError: the corpus cannot be read.
     """
     before = torch.get_num_threads()
-    threads = threads or cores()
+    threads = threads or available_processors()
     torch.set_num_threads(threads)
     torch.manual_seed(0)
     timed = cpu_seconds if threads == 1 else _wall_seconds
@@ -78,7 +79,7 @@ def measure(
         }
         for work in works.values():
             work()  # memory is taken the first time
-        timing = in_turns(works, repeats, progress)
+        timing = alternate(works, repeats, progress)
     finally:
         torch.set_num_threads(before)
     rates = {name: one.rate for name, one in timing.items()}

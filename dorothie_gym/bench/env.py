@@ -1,4 +1,4 @@
-"""Steps a second of `DuoWizardEnv`, against highway-env's `intersection-v0` and, where it is installed, SUMO."""
+"""Steps per second of `DuoWizardEnv`, against highway-env's `intersection-v0` and, where it is installed, SUMO."""
 
 from __future__ import annotations
 
@@ -8,49 +8,50 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.bench.timing import Progress, cores, in_turns, machine, quiet, rounded
-from dorothie_gym.bench.workers import Worker
+from dorothie_gym.bench.timing import Figures, Progress, Worker, alternate, ignore_progress, machine, rounded
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.spaces import noop
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.highway_reference import StockIntersection
 
-WARM_UP = 60
-"""Decisions before anything is measured: 30 s."""
+WARM_UP_DECISIONS: Final = 60
+"""Decisions before the measurement: 30 s."""
 
-DAY = 86400.0
-"""No session ends by time while it is measured [s]."""
+MAX_SECONDS: Final = 86400.0
+"""Time limit of measured sessions, which none of them reaches [s]."""
 
 ENV, STOCK, SUMO = "DuoWizardEnv", "intersection-v0", "SUMO"
+"""Names of the measured programs."""
 
-WITHOUT_SUMO = "SUMO is not installed; pip install 'dorothie-gym[sumo]' brings it"
+NO_SUMO: Final = "SUMO is not installed; install dorothie-gym[sumo]"
 
 
 class IdleSession:
-    """A session in which nobody does anything: three agents are observed in full, and the car follows its road.
+    """Session in which no role acts: all three agents get complete observations, and the car follows its road.
 
     Args:
         town: name or file.
-        vehicles: of the traffic, as many as fit.
-        pedestrians: people on foot.
-        seed: of the session.
+        vehicles: number of vehicles, as many as fit.
+        pedestrians: number of pedestrians.
+        seed: seed of the session.
     """
 
     def __init__(self, town: str, vehicles: int, pedestrians: int, seed: int) -> None:
         world = WorldConfig(vehicles=vehicles, pedestrians=pedestrians)
-        self.env = DuoWizardEnv(town, config=EnvConfig(world=world, max_seconds=DAY))
+        self.env = DuoWizardEnv(town, config=EnvConfig(world=world, max_seconds=MAX_SECONDS))
         self._actions = {str(role): noop(role, self.env.limits) for role in AGENT_ROLES}
         self.env.reset(seed=seed)
-        self.seconds(WARM_UP, time.process_time)
+        self.seconds(WARM_UP_DECISIONS, time.process_time)
 
     def seconds(self, decisions: int, clock: Callable[[], float]) -> float:
-        """Lets it go on; returns what the steps took by a clock, beginnings of sessions left out [s]."""
+        """Plays a number of decisions and returns the duration of the steps by a clock, without resets [s]."""
         spent = 0.0
         while decisions > 0:
             if not self.env.agents:
@@ -64,7 +65,7 @@ class IdleSession:
 
 
 def prepare(town: str, vehicles: int, pedestrians: int, seed: int, decisions: int) -> Callable[[], float]:
-    """Work for a process of its own: so many decisions, in seconds of the clock on the wall."""
+    """Returns the work of a worker process: a number of decisions, timed in wall-clock seconds."""
     session = IdleSession(town, vehicles, pedestrians, seed)
     return partial(session.seconds, decisions, time.perf_counter)
 
@@ -79,26 +80,26 @@ def measure(
     stock_steps: int = 20,
     sumo_substeps: int = 3000,
     repeats: int = 7,
-    progress: Progress = quiet,
-) -> dict[str, Any]:
-    """Measures all in turns: what has one thread in CPU seconds, two processes in seconds of the clock on the wall.
+    progress: Progress = ignore_progress,
+) -> Figures:
+    """Measures all alternately: single-threaded programs in CPU seconds, two processes in wall-clock seconds.
 
     Args:
         town: name or file.
-        vehicles: as many as fit; 0 to 200.
-        pedestrians: 0 to 200.
-        seed: of the session.
-        decisions: steps in a repeat, of half a second of simulated time each.
-        stock_steps: steps of `intersection-v0` in a repeat.
-        sumo_substeps: of SUMO in a repeat.
-        repeats: how often each is measured.
-        progress: is told what is being done.
+        vehicles: number of vehicles, 0 to 200, as many as fit.
+        pedestrians: number of pedestrians, 0 to 200.
+        seed: seed of the session.
+        decisions: steps of a repetition, of half a second of simulated time each.
+        stock_steps: steps of `intersection-v0` in a repetition.
+        sumo_substeps: steps of SUMO in a repetition.
+        repeats: number of repetitions.
+        progress: callback for the progress.
 
     Raises:
-        TownError: there is no such town, or its file is wrong.
-        BenchmarkProcessError: a process that measures has ended before its time.
+        TownError: there is no such town, or its file is invalid.
+        BenchmarkProcessError: a worker process ended early.
     """
-    # imported here: a process that only drives needs none of the references
+    # imported here: the worker processes need none of the references
     from dorothie_gym.sim.highway_reference import StockIntersection
 
     progress("town", 0.0)
@@ -121,7 +122,7 @@ def measure(
             worker = stack.enter_context(Worker("sumo", **settings, substeps=sumo_substeps))
             worker.wait()
             works[SUMO] = lambda: worker.run() / sumo_substeps
-        timings = in_turns(works, repeats, lambda doing, share: progress(doing, 0.7 * share))
+        timings = alternate(works, repeats, lambda part, share: progress(part, 0.7 * share))
     scaling = _two_processes(town, vehicles, pedestrians, seed, decisions, repeats, progress)
     ours, theirs = timings[ENV], timings[STOCK]
     seconds = ours.rate * substeps / FRAME_RATE
@@ -142,7 +143,7 @@ def measure(
         "ratio": rounded(seconds / (theirs.rate * stock.seconds_per_step)),
         "sumo_substeps_per_second": rounded(timings[SUMO].rate) if sumo else None,
         "sumo_spread": timings[SUMO].spread if sumo else None,
-        "sumo_missing": None if sumo else WITHOUT_SUMO,
+        "sumo_missing": None if sumo else NO_SUMO,
         "two_processes_scaling": scaling,
         "repeats": repeats,
         "machine": machine(),
@@ -150,7 +151,7 @@ def measure(
 
 
 def _stock_seconds(stock: StockIntersection, steps: int) -> float:
-    """CPU time of a step of highway-env's environment; beginnings of episodes are left out [s]."""
+    """Returns the CPU time of a step of highway-env's environment, without resets [s]."""
     spent = 0.0
     for _ in range(steps):
         stock.prepare()
@@ -163,8 +164,8 @@ def _stock_seconds(stock: StockIntersection, steps: int) -> float:
 def _two_processes(
     town: str, vehicles: int, pedestrians: int, seed: int, decisions: int, repeats: int, progress: Progress
 ) -> float | None:  # fmt: skip
-    """Returns the throughput of two processes relative to one; None on a single core."""
-    if cores() < 2:
+    """Returns the throughput of two processes relative to one; None on a single processor."""
+    if available_processors() < 2:
         return None
     progress("two processes", 0.7)
     with ExitStack() as stack:
@@ -180,8 +181,8 @@ def _two_processes(
         for turn in range(repeats):
             progress("two processes", 0.7 + 0.3 * turn / repeats)
             alone = one.run(), other.run()
-            one.go()
-            other.go()
+            one.start()
+            other.start()
             together = one.seconds(), other.seconds()
             ratios.append(sum(a / t for a, t in zip(alone, together, strict=True)))
     return round(statistics.median(ratios), 3)

@@ -1,24 +1,31 @@
-"""Summaries of measurements, as text and as the rows of tables and charts."""
+"""Summaries of measurements: headline, notes and rows for tables, and the chart."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
+from dorothie_gym.bench.timing import Figures
+from dorothie_gym.rendering.charts import INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.rendering.palette import CAR, LIGHT_RED, ROAD
 from dorothie_gym.sim.config import FRAME_RATE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """One speed or time that was measured.
+    """A measured speed or time.
 
     Attributes:
-        label: of what.
-        value: in the unit of the report; the median of the repeats.
-        spread: interquartile range over the median, or None where it is not known.
-        best: of the repeats, or None.
-        reference: whether it is what ours is held against.
+        label: name of the measured program.
+        value: median of the repetitions, in the unit of the report.
+        spread: interquartile range divided by the median, or None if it is unknown.
+        best: best repetition, or None.
+        reference: whether it is a reference and not of this package.
     """
 
     label: str
@@ -30,7 +37,7 @@ class Measurement:
 
 @dataclass(frozen=True, kw_only=True)
 class Mark:
-    """A value on the scale of a report that tells how the rows are to be read."""
+    """Value on the scale of a report that the rows are compared with."""
 
     label: str
     value: float
@@ -38,18 +45,18 @@ class Mark:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """A measurement, as a person reads it.
+    """Summary of a measurement.
 
     Attributes:
-        title: what was measured.
-        setting: on what.
-        headline: what came out.
-        unit: of all rows.
+        title: subject of the measurement.
+        setting: town and traffic.
+        headline: main result.
+        unit: unit of all rows.
         rows: references first.
-        mark: a line across the chart, or None.
-        notes: what else is to be known, a line each.
-        machine: what it was measured on.
-        logarithmic: whether the values differ so much that a chart needs it.
+        mark: line across the chart, or None.
+        notes: further results, one line each.
+        machine: machine and versions.
+        logarithmic: whether the chart needs a logarithmic scale.
     """
 
     title: str
@@ -63,20 +70,20 @@ class Report:
     logarithmic: bool = True
 
 
-def world_report(figures: Mapping[str, Any]) -> Report:
+def world_report(figures: Figures) -> Report:
     """Returns the summary of `bench.world.measure`."""
-    people = f"{_count(figures['vehicles'], 'vehicle')} ({_count(figures['cyclists'], 'cyclist')} among them)"
-    there = f"{_count(figures['pedestrians'], 'pedestrian')}, {_count(figures['props'], 'prop')}"
+    traffic = f"{_count(figures['vehicles'], 'vehicle')} ({_count(figures['cyclists'], 'cyclist')} among them)"
+    others = f"{_count(figures['pedestrians'], 'pedestrian')}, {_count(figures['props'], 'prop')}"
     stock = figures["stock_substeps_per_second"]
     return Report(
-        title="A world with everything on",
-        setting=f"{figures['town']}: {figures['lanes']} lanes, {people}, {there}; one core",
-        headline=f"{number(figures['ratio'])} times highway-env's own road on the same plan, "
+        title="World with traffic, pedestrians, lights and props",
+        setting=f"{figures['town']}: {figures['lanes']} lanes, {traffic}, {others}; one core",
+        headline=f"{number(figures['ratio'])} times highway-env's own road on the same map, "
         f"{number(figures['substeps_per_second'] / FRAME_RATE)} times real time",
-        unit="substeps a second",
+        unit="substeps per second",
         rows=(
             Measurement(
-                label=f"highway-env's road\n{_count(figures['vehicles'], 'IDM vehicle')}, nothing else",
+                label=f"highway-env's road\n{_count(figures['vehicles'], 'IDM vehicle')}, no other actors",
                 value=stock, spread=figures["stock_spread"], best=figures["stock_best"], reference=True,
             ),
             Measurement(
@@ -85,13 +92,13 @@ def world_report(figures: Mapping[str, Any]) -> Report:
             ),
         ),
         mark=Mark(label="real time", value=FRAME_RATE),
-        notes=(f"one more world in the same town takes {figures['bytes_per_world'] / 1024:.0f} KiB",),
+        notes=(f"memory of one more world in the same town: {figures['bytes_per_world'] / 1024:.0f} KiB",),
         machine=machine_line(figures["machine"]),
     )  # fmt: skip
 
 
-def env_report(figures: Mapping[str, Any]) -> Report:
-    """Words for `env.measure`."""
+def env_report(figures: Figures) -> Report:
+    """Returns the summary of `bench.env.measure`."""
     simulated = figures["simulated_seconds_per_second"]
     rows = [
         Measurement(
@@ -106,26 +113,26 @@ def env_report(figures: Mapping[str, Any]) -> Report:
     step_share = simulated / figures["steps_per_second"]
     rows.append(
         Measurement(
-            label="DuoWizardEnv\nthree agents observed in full", value=simulated, spread=figures["spread"],
+            label="DuoWizardEnv\nthree agents, full observations", value=simulated, spread=figures["spread"],
             best=figures["best"] * step_share,
         )
     )  # fmt: skip
     scaling = figures["two_processes_scaling"]
     notes = [
-        f"{number(figures['steps_per_second'])} steps a second of {figures['substeps_per_step']} substeps; "
+        f"{number(figures['steps_per_second'])} steps per second of {figures['substeps_per_step']} substeps; "
         f"intersection-v0: {number(figures['stock_steps_per_second'])}",
-        "two processes were not measured: there is one core only"
+        "two processes were not measured on a single core"
         if scaling is None
-        else f"two processes do {scaling:.2f} times as much as one",
+        else f"throughput of two processes: {scaling:.2f} times that of one",
     ]
     if figures["sumo_missing"] is not None:
         notes.append(figures["sumo_missing"])
     return Report(
-        title="The environment of three agents",
+        title="Environment of three agents",
         setting=f"{figures['town']}: {figures['lanes']} lanes, {_count(figures['vehicles'], 'vehicle')}, "
         f"{_count(figures['pedestrians'], 'pedestrian')}; one core",
         headline=f"{number(figures['ratio'])} times as much simulated time as intersection-v0",
-        unit="simulated seconds a second",
+        unit="simulated seconds per second",
         rows=tuple(rows),
         mark=Mark(label="real time", value=1.0),
         notes=tuple(notes),
@@ -133,22 +140,22 @@ def env_report(figures: Mapping[str, Any]) -> Report:
     )
 
 
-def vector_report(figures: Mapping[str, Any]) -> Report:
-    """Words for `vector.measure` with the machine."""
+def vector_report(figures: Figures) -> Report:
+    """Returns the summary of `bench.vector.measure`."""
     threads = _count(figures["threads"], "thread")
-    notes = [f"the threads had {figures['processors']:.2f} processors to themselves"]
+    notes = [f"processors available to the threads: {figures['processors']:.2f}"]
     if "vector_steps_per_second" in figures:
-        vector, sync, processes = (number(figures[f"{way}_steps_per_second"]) for way in ("vector", "sync", "async"))
+        vector, sync, processes = (number(figures[f"{mode}_steps_per_second"]) for mode in ("vector", "sync", "async"))
         notes.append(
-            f"Town-v0, environments together: {vector} steps a second in one batch, {sync} by SyncVectorEnv, "
+            f"Town-v0, all environments: {vector} steps per second in one batch, {sync} by SyncVectorEnv, "
             f"{processes} by AsyncVectorEnv"
         )
     return Report(
-        title="Many worlds in one call",
+        title="Batch of worlds",
         setting=f"{figures['town']}: {_count(figures['worlds'], 'world')} "
         f"with {_count(figures['vehicles'], 'vehicle')} and {_count(figures['pedestrians'], 'pedestrian')} each",
-        headline=f"{threads} do {figures['scaling']:.2f} times as much as one",
-        unit="substeps a second, all worlds together",
+        headline=f"throughput of {threads}: {figures['scaling']:.2f} times that of one",
+        unit="substeps per second, all worlds",
         rows=(
             Measurement(label="one thread", value=figures["substeps_per_second_one_thread"], reference=True),
             Measurement(label=threads, value=figures["substeps_per_second"]),
@@ -159,18 +166,18 @@ def vector_report(figures: Mapping[str, Any]) -> Report:
     )
 
 
-def import_report(figures: Mapping[str, Any]) -> Report:
-    """Words for `importing.measure`."""
+def import_report(figures: Figures) -> Report:
+    """Returns the summary of `bench.importing.measure`."""
     seconds, stock = figures["seconds"], figures["highway_env_seconds"]
     return Report(
-        title="From nothing to a first environment",
-        setting=f"{figures['town']}; fresh processes, caches warm",
-        headline=f"a first environment takes {figures['ratio']:.2f} times as long as importing highway-env",
+        title="Import and first environment",
+        setting=f"{figures['town']}; new processes, warm caches",
+        headline=f"import and first environment take {figures['ratio']:.2f} times as long as importing highway-env",
         unit="seconds",
         rows=(
             Measurement(label="import highway_env", value=stock, spread=figures["highway_env_spread"], reference=True),
             Measurement(label="import dorothie_gym", value=seconds["package"], spread=figures["package_spread"]),
-            Measurement(label="... and make and reset\na first environment", value=seconds["first_environment"],
+            Measurement(label="... and first environment,\nmade and reset", value=seconds["first_environment"],
                 spread=figures["spread"]),
             Measurement(label="... and its first step", value=seconds["first_step"]),
         ),
@@ -179,11 +186,11 @@ def import_report(figures: Mapping[str, Any]) -> Report:
     )  # fmt: skip
 
 
-def rl_report(figures: Mapping[str, Any]) -> Report:
-    """Words for `baselines.rl.measuring.measure`."""
+def rl_report(figures: Figures) -> Report:
+    """Returns the summary of `baselines.rl.throughput.measure`."""
     names = {
         "environment": "physics and observations", "partners": "instructor and Ad-Wizard",
-        "policy": "choosing actions", "learner": "learning",
+        "policy": "action selection", "learner": "learning",
     }  # fmt: skip
     shares = ", ".join(f"{names[name]} {100 * share:.0f} %" for name, share in figures["shares"].items())
     rows = [
@@ -196,27 +203,27 @@ def rl_report(figures: Mapping[str, Any]) -> Report:
         title=f"Training {figures['algorithm']} on {figures['env']}",
         setting=f"{_count(figures['environments'], 'environment')}, network {figures['network']}, "
         f"{figures['steps']:,} steps each",
-        headline=f"{number(figures['steps_per_second'])} environment steps a second end to end",
-        unit="environment steps a second",
+        headline=f"{number(figures['steps_per_second'])} environment steps per second, end to end",
+        unit="environment steps per second",
         rows=tuple(rows),
-        mark=Mark(label="wanted on two cores", value=figures["target"]),
+        mark=Mark(label="target on two cores", value=figures["target"]),
         notes=(f"in one process: {shares}",),
         machine=machine_line(figures["machine"]),
         logarithmic=False,
     )
 
 
-def train_report(figures: Mapping[str, Any]) -> Report:
-    """Words for the measurement of training (`baselines.bench.measure`)."""
+def train_report(figures: Figures) -> Report:
+    """Returns the summary of `baselines.bench.measure`."""
     threads = _count(figures["threads"], "thread")
     giga = figures["flops_per_second"] / 1e9
     return Report(
         title="TOTO at the published size",
-        setting=f"{figures['parameters'] / 1e6:.0f} million numbers, batches of {figures['batch_size']} points, up to "
-        f"{figures['tokens']} tokens each; {threads}, float32",
+        setting=f"{figures['parameters'] / 1e6:.0f} million parameters, batches of {figures['batch_size']} points, "
+        f"up to {figures['tokens']} tokens each; {threads}, float32",
         headline=f"training: {number(figures['ratio'])} times the published loop, "
         f"{figures['matrix_share']:.0%} of the machine's matrix rate",
-        unit="points a second",
+        unit="points per second",
         rows=(
             Measurement(
                 label="published loop, training\none point at a time", value=figures["published_points_per_second"],
@@ -227,22 +234,22 @@ def train_report(figures: Mapping[str, Any]) -> Report:
                 best=figures["best"],
             ),
             Measurement(
-                label="published loop, answering", value=figures["published_inference_points_per_second"],
+                label="published loop, inference", value=figures["published_inference_points_per_second"],
                 reference=True,
             ),
-            Measurement(label="TOTO, answering", value=figures["inference_points_per_second"]),
+            Measurement(label="TOTO, inference", value=figures["inference_points_per_second"]),
         ),
         notes=(
-            f"answering: {number(figures['inference_ratio'])} times the published loop",
-            f"{number(figures['flops_per_point'] / 1e9)} billion operations a point in training: {number(giga)} "
-            f"billion a second, of {number(figures['matrix_flops_per_second'] / 1e9)} in products of large matrices",
-            f"the published model has {figures['published_parameters'] / 1e6:.0f} million numbers",
+            f"inference: {number(figures['inference_ratio'])} times the published loop",
+            f"{number(figures['flops_per_point'] / 1e9)} billion operations per point in training: {number(giga)} "
+            f"billion per second, of {number(figures['matrix_flops_per_second'] / 1e9)} in products of large matrices",
+            f"the published model has {figures['published_parameters'] / 1e6:.0f} million parameters",
         ),
         machine=f"{machine_line(figures['machine'])}, torch {figures['torch']}",
     )  # fmt: skip
 
 
-def machine_line(machine: Mapping[str, Any]) -> str:
+def machine_line(machine: Figures) -> str:
     """Returns the machine and versions of a measurement in one line."""
     return (
         f"{machine['processor']}, {_count(machine['cores'], 'core')}, {machine['system']}; Python {machine['python']}, "
@@ -251,7 +258,7 @@ def machine_line(machine: Mapping[str, Any]) -> str:
 
 
 def number(value: float) -> str:
-    """A number to three digits or to the unit: "0.062", "3.39", "128,571"."""
+    """Returns a number with three digits, or rounded to the unit: "0.062", "3.39", "128,571"."""
     if value >= 100.0:
         return f"{value:,.0f}"
     return f"{value:.3g}"
@@ -259,3 +266,91 @@ def number(value: float) -> str:
 
 def _count(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+# --- Chart ------------------------------------------------------------------------------------------------------------
+
+WIDTH: Final = 9.0
+"""Width of the chart [inches]."""
+
+DOTS_PER_INCH: Final = 150
+"""Resolution of the chart."""
+
+_ROW_HEIGHT, _MARGINS = 0.72, 1.95
+_FONT = "DejaVu Sans"
+
+
+def draw(report: Report, path: Path) -> None:
+    """Draws a report into a PNG file.
+
+    Args:
+        report: the report.
+        path: file to write.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    # imported here: matplotlib is slow to import
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with rc_context({"font.family": _FONT}):
+        rows, notes = _ROW_HEIGHT * len(report.rows), 0.2 * len(report.notes)
+        height = rows + _MARGINS + notes
+        figure = Figure(figsize=(WIDTH, height), dpi=DOTS_PER_INCH, facecolor=SHEET)
+        FigureCanvasAgg(figure)
+        _write_texts(figure, report, height)
+        axes = figure.add_axes(
+            (0.29, (0.83 + 0.2 * len(report.notes)) / height, 0.66, _ROW_HEIGHT * len(report.rows) / height)
+        )
+        _draw_bars(axes, report)
+        figure.savefig(path, format="png")
+
+
+def _write_texts(figure: Figure, report: Report, height: float) -> None:
+    """Writes headline, title and setting above the bars, notes and machine below them."""
+
+    def write(inches: float, text: str, size: float, colour: str, weight: str = "normal") -> None:
+        figure.text(0.03, inches / height, text, va="baseline", fontsize=size, color=colour, weight=weight)
+
+    write(height - 0.42, report.headline[0].upper() + report.headline[1:], 13.5, INK, "bold")
+    write(height - 0.72, f"{report.title} · {report.setting}", 9, SOFT)
+    for k, note in enumerate(reversed(report.notes)):
+        write(0.36 + 0.2 * k, note, 8.5, INK)
+    write(0.14, report.machine, 7, SOFT)
+
+
+def _draw_bars(axes: Axes, report: Report) -> None:
+    values = [row.value for row in report.rows]
+    known = [*values, report.mark.value] if report.mark else values
+    places = range(len(values))
+    if report.logarithmic:
+        axes.set_xscale("log")
+        left, right = min(known) / 3.0, max(known) * 12.0
+    else:
+        left, right = 0.0, max(known) * 1.25
+    axes.set_xlim(left, right)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.10g}")
+    colours = [hexadecimal(ROAD if row.reference else CAR) for row in report.rows]
+    axes.barh(places, [value - left for value in values], left=left, height=0.56, color=colours, zorder=2)
+    for k, row in enumerate(report.rows):
+        axes.annotate(
+            number(row.value), (row.value, k), xytext=(6, 0), textcoords="offset points", va="center", fontsize=11,
+            weight="bold", color=colours[k], zorder=4,
+        )  # fmt: skip
+    if report.mark is not None:
+        axes.axvline(report.mark.value, color=hexadecimal(LIGHT_RED), linewidth=1.4, linestyle=(0, (4, 3)), zorder=3)
+        axes.annotate(
+            report.mark.label, (report.mark.value, 1.0), xycoords=("data", "axes fraction"), xytext=(4, 3),
+            textcoords="offset points", fontsize=8.5, color=hexadecimal(LIGHT_RED),
+        )  # fmt: skip
+    axes.set_yticks(list(places), [row.label for row in report.rows], fontsize=9, color=INK)
+    axes.set_ylim(len(values) - 0.5, -0.5)
+    axes.set_xlabel(report.unit + (" (logarithmic)" if report.logarithmic else ""), fontsize=8.5, color=SOFT)
+    axes.tick_params(axis="x", labelsize=8, colors=SOFT, which="both", length=0)
+    axes.tick_params(axis="y", length=0)
+    axes.grid(axis="x", color="white", linewidth=1.0, zorder=0)
+    axes.set_facecolor(SHEET)
+    for side in axes.spines.values():
+        side.set_visible(False)

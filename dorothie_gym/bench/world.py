@@ -1,15 +1,15 @@
-"""Substeps a second of a world with everything on, against highway-env's own road on the same plan."""
+"""Substeps per second of a world with all actors, against highway-env's own road on the same map."""
 
 from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Final
 
 import numpy as np
 
-from dorothie_gym.bench.timing import Progress, cpu_seconds, in_turns, machine, quiet, rounded
+from dorothie_gym.bench.timing import Figures, Progress, alternate, cpu_seconds, ignore_progress, machine, rounded
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.config import FRAME_RATE
@@ -20,16 +20,17 @@ from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step
 
-SUBSTEPS = 15
-"""Substeps in a call: a decision of half a second."""
+SUBSTEPS: Final = 15
+"""Substeps of a call: a decision of half a second."""
 
-WARM_UP = 900
-"""Substeps before anything is measured: 30 s, in which traffic forms queues at the lights."""
+WARM_UP_SUBSTEPS: Final = 900
+"""Substeps before the measurement: 30 s, in which traffic forms queues at the lights."""
 
-FROM_PROPS = 20.0
-"""Props are placed no closer than this to any vehicle [m]."""
+PROP_CLEARANCE: Final = 20.0
+"""Least distance of a prop from any vehicle [m]."""
 
-KERNEL, STOCK = "compiled kernel", "highway-env's road"
+KERNEL, STOCK = "compiled simulation", "highway-env's road"
+"""Names of the measured programs."""
 
 _COPIES = 8
 
@@ -44,31 +45,31 @@ def measure(
     calls: int = 600,
     stock_substeps: int = 6,
     repeats: int = 7,
-    progress: Progress = quiet,
-) -> dict[str, Any]:
-    """Measures both in turns, in CPU seconds.
+    progress: Progress = ignore_progress,
+) -> Figures:
+    """Measures both alternately, in CPU seconds.
 
     Args:
         town: name or file.
-        vehicles: as many as fit, a tenth of them cyclists.
-        pedestrians: people on foot.
-        props: in the middle of lanes with another lane beside.
-        seed: of places and wishes.
-        calls: calls of the kernel in a repeat, of 15 substeps each.
-        stock_substeps: of highway-env's road in a repeat.
-        repeats: how often each is measured.
-        progress: is told what is being done.
+        vehicles: number of vehicles, as many as fit, a tenth of them cyclists.
+        pedestrians: number of pedestrians.
+        props: number of props, in the middle of lanes with a neighbouring lane.
+        seed: seed of positions and destinations.
+        calls: calls of the simulation in a repetition, of `SUBSTEPS` each.
+        stock_substeps: substeps of highway-env's road in a repetition.
+        repeats: number of repetitions.
+        progress: callback for the progress.
 
     Raises:
-        TownError: there is no such town, or its file is wrong.
+        TownError: there is no such town, or its file is invalid.
     """
     progress("town", 0.0)
     network = TownNetwork(load_town(town))
     arrays = town_arrays(network)
     world = crowd(network, arrays, vehicles=vehicles, pedestrians=pedestrians, props=props, seed=seed)
     progress("warming up", 0.0)
-    step(arrays, world, WARM_UP, 1.0 / FRAME_RATE)
-    timings = in_turns(
+    step(arrays, world, WARM_UP_SUBSTEPS, 1.0 / FRAME_RATE)
+    timings = alternate(
         {
             KERNEL: lambda: cpu_seconds(partial(_run, arrays, world, calls)) / (calls * SUBSTEPS),
             STOCK: _stock_work(network, world, stock_substeps),
@@ -102,7 +103,7 @@ def measure(
 def crowd(
     network: TownNetwork, arrays: TownArrays, *, vehicles: int, pedestrians: int, props: int, seed: int
 ) -> WorldArrays:  # fmt: skip
-    """A world with everything on: cars and cyclists, people, lights and signs, and props for the traffic to pass."""
+    """Returns a world with cars, cyclists, pedestrians, lights and signs, and props that the traffic has to pass."""
     world = empty_world(arrays, vehicles=vehicles, pedestrians=pedestrians, props=props, seed=seed)
     populate(network, arrays, world, seed=seed, vehicles=vehicles, pedestrians=pedestrians)
     lanes = network.town.lanes
@@ -113,14 +114,14 @@ def crowd(
             break
         station = 0.5 * lanes[lane].length
         x, y = lanes[lane].position(station)
-        if np.hypot(world.vehicles["x"] - x, world.vehicles["y"] - y).min(initial=np.inf) > FROM_PROPS:
+        if np.hypot(world.vehicles["x"] - x, world.vehicles["y"] - y).min(initial=np.inf) > PROP_CLEARANCE:
             add_prop(network, arrays, world, PropKind.TRAFFIC_CONE, lane, station)
             placed += 1
     return world
 
 
 def bytes_per_world(world: WorldArrays) -> int:
-    """Memory that one more such world takes in the same town, Python's own objects included [bytes]."""
+    """Returns the memory of one more such world in the same town, including Python's own objects [bytes]."""
     tracemalloc.start()
     try:
         before = tracemalloc.get_traced_memory()[0]
@@ -136,7 +137,8 @@ def _run(arrays: TownArrays, world: WorldArrays, calls: int) -> None:
 
 
 def _stock_work(network: TownNetwork, world: WorldArrays, substeps: int) -> Callable[[], float]:
-    # imported here: highway-env is slow to import, and nothing else of this module needs it
+    """Returns the measurement of a substep of highway-env's road with the same vehicles."""
+    # imported here: highway-env is slow to import
     from dorothie_gym.sim.highway_reference import run_stock, stock_road
 
     road = stock_road(network, world)

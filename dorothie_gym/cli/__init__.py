@@ -1,4 +1,4 @@
-"""The command line: `dorothie-gym run`, `towns`, `storyboards`, `evaluate` and `bench`."""
+"""Command line: the application `dorothie-gym` and one module for each group of its commands."""
 
 from dorothie_gym.cli.app import app, main
 

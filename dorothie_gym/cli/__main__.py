@@ -1,4 +1,4 @@
-"""`python -m dorothie_gym.cli`, for where the script is not on the path."""
+"""`python -m dorothie_gym.cli`, for systems without the script on their path."""
 
 from dorothie_gym.cli.app import main
 

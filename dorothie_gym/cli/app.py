@@ -10,17 +10,14 @@ import typer
 
 from dorothie_gym._version import __version__
 from dorothie_gym.cli.bench import bench
-from dorothie_gym.cli.compare import compare
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.generate import generate
-from dorothie_gym.cli.leaderboard import leaderboard
 from dorothie_gym.cli.listings import storyboards, towns
 from dorothie_gym.cli.options import PictureCommand
-from dorothie_gym.cli.replay import replay
-from dorothie_gym.cli.rollout import rollout
+from dorothie_gym.cli.rollout import leaderboard, rollout
 from dorothie_gym.cli.run import run
-from dorothie_gym.cli.show import show
+from dorothie_gym.cli.sessions import compare, replay, show
 from dorothie_gym.cli.stats import stats
 from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl

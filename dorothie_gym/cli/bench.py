@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from dorothie_gym.cli.options import OWN_NAME, AsJson, PictureCommand
+from dorothie_gym.cli.options import OWN_NAME, AsJson, CommandContext, PictureCommand
 from dorothie_gym.cli.output import INTERRUPTED, check_picture, fail, print_json, reporting_errors, stderr, stdout
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from dorothie_gym.bench.report import Report
+    from dorothie_gym.bench.timing import Figures, Progress
 
-Measure: TypeAlias = Callable[[Callable[[str, float], None]], dict[str, Any]]
+Measure: TypeAlias = "Callable[[Progress], Figures]"
 """Measurement; takes a callback for its progress."""
 
 
@@ -28,7 +29,7 @@ _UsageError: Any = typer.BadParameter.__base__
 class BenchCommand(PictureCommand):
     """Command that reports invalid options in one line."""
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: CommandContext, args: list[str]) -> list[str]:
         """Parses the options; exits with code 2 if one is invalid."""
         try:
             return super().parse_args(ctx, args)
@@ -65,11 +66,12 @@ def world(
 ) -> None:
     """Substeps per second of a full world, compared with the road of highway-env on the same map."""
 
-    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+    def measured(progress: Progress) -> Figures:
         from dorothie_gym.bench.world import measure
 
-        settings: dict[str, Any] = {"vehicles": vehicles, "pedestrians": pedestrians, "props": props, "seed": seed}
-        return measure(town, **settings, repeats=repeats, progress=progress)
+        return measure(
+            town, vehicles=vehicles, pedestrians=pedestrians, props=props, seed=seed, repeats=repeats, progress=progress
+        )
 
     _bench("world", measured, picture, as_json)
 
@@ -86,11 +88,10 @@ def env(
 ) -> None:
     """Steps per second of the environment of three agents, compared with intersection-v0 of highway-env and SUMO."""
 
-    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+    def measured(progress: Progress) -> Figures:
         from dorothie_gym.bench.env import measure
 
-        settings: dict[str, Any] = {"vehicles": vehicles, "pedestrians": pedestrians, "seed": seed}
-        return measure(town, **settings, repeats=repeats, progress=progress)
+        return measure(town, vehicles=vehicles, pedestrians=pedestrians, seed=seed, repeats=repeats, progress=progress)
 
     _bench("env", measured, picture, as_json)
 
@@ -108,13 +109,13 @@ def vector(
 ) -> None:
     """Batches of worlds on several threads, compared with one thread, and the vectorization modes of Gymnasium."""
 
-    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
-        from dorothie_gym.bench.timing import machine
+    def measured(progress: Progress) -> Figures:
         from dorothie_gym.bench.vector import measure
 
-        progress("threads and environments", 0.0)
-        settings: dict[str, Any] = {"vehicles": vehicles, "pedestrians": pedestrians, "threads": threads}
-        return {**measure(town, worlds=worlds, **settings, repeats=repeats), "machine": machine()}
+        return measure(
+            town, worlds=worlds, vehicles=vehicles, pedestrians=pedestrians, threads=threads, repeats=repeats,
+            progress=progress,
+        )  # fmt: skip
 
     _bench("vector", measured, picture, as_json)
 
@@ -135,16 +136,18 @@ def rl(
 ) -> None:
     """Environment steps per second of a whole training, and the shares of its time."""
 
-    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+    def measured(progress: Progress) -> Figures:
         try:
             from dorothie_gym.baselines.rl.throughput import measure
         except ImportError:
             fail("bench rl needs torch and stable-baselines3; run: pip install 'dorothie-gym[baselines]'")
         from dorothie_gym.errors import SettingsError
 
-        settings: dict[str, Any] = {"algorithm": algorithm, "environments": environments, "workers": workers}
         try:
-            return measure(env, **settings, steps=steps, seed=seed, progress=progress)
+            return measure(
+                env, algorithm=algorithm, environments=environments, workers=workers, steps=steps, seed=seed,
+                progress=progress,
+            )  # fmt: skip
         except SettingsError as error:
             fail(str(error))
 
@@ -155,7 +158,7 @@ def rl(
 def importing(repeats: Repeats = 7, picture: Picture = None, as_json: AsJson = False) -> None:
     """Time to import the package and to create a first environment, compared with importing highway-env."""
 
-    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+    def measured(progress: Progress) -> Figures:
         from dorothie_gym.bench.importing import measure
 
         return measure(repeats=repeats, progress=progress)
@@ -179,7 +182,7 @@ def train(
 ) -> None:
     """Points per second in training at the published size, compared with the published loop and the matrix rate."""
 
-    def measured(progress: Callable[[str, float], None]) -> dict[str, Any]:
+    def measured(progress: Progress) -> Figures:
         try:
             from dorothie_gym.baselines.bench import measure
         except ImportError as error:
@@ -218,7 +221,7 @@ def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> 
     if not as_json:
         _show(report)
     if picture is not None:
-        from dorothie_gym.bench.chart import draw
+        from dorothie_gym.bench.report import draw
 
         draw(report, picture)
         if not as_json:
@@ -226,18 +229,18 @@ def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> 
 
 
 @contextmanager
-def _progress() -> Iterator[Callable[[str, float], None]]:
+def _progress() -> Iterator[Progress]:
     """Shows a progress bar on a terminal until all is done."""
     console = stderr()
     if not console.is_terminal:
-        yield lambda doing, share: None
+        yield lambda part, share: None
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("measuring {task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         bar = progress.add_task("", total=1.0)
-        yield lambda doing, share: progress.update(bar, description=doing, completed=share)
+        yield lambda part, share: progress.update(bar, description=part, completed=share)
 
 
 def _show(report: Report) -> None:

@@ -1,4 +1,4 @@
-"""A session as a film: the view that follows the car, ten frames a second."""
+"""Video of a session: the view that follows the car, ten frames per second."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
-from dorothie_gym.cli.output import video_writer
+from dorothie_gym.angles import wrap_radians
+from dorothie_gym.cli.output import VideoWriter, video_writer
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_scene import scene_of
 from dorothie_gym.recording import FRAME_RATE
@@ -18,16 +19,16 @@ from dorothie_gym.rendering.frames import SceneRenderer
 from dorothie_gym.rendering.scene import Actor, Scene
 
 FRAMES_PER_SECOND = 10
-"""The benchmark's frame rate (design, Time)."""
+"""Frame rate of the video."""
 
-_FASTEST = 25.0
-"""Whoever would have to be faster between two decisions is another one [m/s]."""
+_MAX_SPEED = 25.0
+"""Actors of two decisions that are farther apart than this speed allows are different ones [m/s]."""
 
 
 class Film:
-    """Writes a film of a session while it is played; hand it to `play_session` as `on_step`.
+    """Writes a video of a session while it is played; pass it to `play_session` as `on_step`.
 
-    Between two decisions the car is where it was, frame by frame, and the others where a straight line puts them.
+    Between two decisions, the car follows its recorded trajectory; other actors are interpolated linearly.
 
     Args:
         path: file to write; its suffix chooses the format.
@@ -39,17 +40,17 @@ class Film:
     def __init__(self, path: Path) -> None:
         self.frames = 0
         self._renderer = SceneRenderer()
-        self._writer: Any = video_writer(path, FRAMES_PER_SECOND)
+        self._writer: VideoWriter = video_writer(path, FRAMES_PER_SECOND)
         self._last: Scene | None = None
 
     def __enter__(self) -> Self:
-        """The film itself."""
+        """Returns the film."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Closes the file, which can be played from then on."""
+        """Closes the file."""
         self._writer.close()
 
     def __call__(self, engine: SessionEngine) -> None:
@@ -68,7 +69,7 @@ class Film:
 
 
 def _in_between(before: Scene, after: Scene, engine: SessionEngine) -> list[Scene]:
-    """The scenes of a decision, ten a second, the present one last; words and tasks change with the last."""
+    """Returns the scenes of a decision, ten per second; texts and tasks change with the last."""
     rows = engine.last_frames
     step = FRAME_RATE // FRAMES_PER_SECOND
     scenes = []
@@ -87,16 +88,16 @@ def _in_between(before: Scene, after: Scene, engine: SessionEngine) -> list[Scen
 
 
 def _moved(before: Sequence[Actor], after: Sequence[Actor], share: float, seconds: float) -> list[Actor]:
-    """Everybody of `after` on the way there from the nearest one of the same kind in `before`."""
+    """Returns the actors of `after`, interpolated from the nearest actor of the same kind in `before`."""
     moved = []
     for actor in after:
         near = [other for other in before if other.kind == actor.kind]
         gaps = [float(np.hypot(other.x - actor.x, other.y - actor.y)) for other in near]
-        if not near or min(gaps) > _FASTEST * seconds:
+        if not near or min(gaps) > _MAX_SPEED * seconds:
             moved.append(actor)
             continue
         start = near[int(np.argmin(gaps))]
-        turn = (actor.heading - start.heading + np.pi) % (2 * np.pi) - np.pi
+        turn = wrap_radians(actor.heading - start.heading)
         moved.append(
             replace(
                 actor,

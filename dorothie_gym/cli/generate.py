@@ -14,12 +14,12 @@ from dorothie_gym.cli.output import (
     INTERRUPTED,
     fail,
     print_json,
-    processors,
     reporting_errors,
     session_progress,
     stderr,
     stdout,
 )
+from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.rollout import Generated
@@ -51,7 +51,7 @@ def generate(
                     out,
                     sessions=sessions,
                     seed=seed,
-                    workers=workers or processors(),
+                    workers=workers or available_processors(),
                     ray=ray,
                     config=config,
                     on_session=on_session,

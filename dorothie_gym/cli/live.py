@@ -32,14 +32,14 @@ SPEAKERS: Mapping[Role, tuple[str, str]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class ScriptLine:
-    """One line of the script.
+    """Line of the displayed transcript.
 
     Attributes:
-        time: when [s].
-        speaker: whose line it is.
-        text: what is said, or what happens.
-        style: of the text.
-        acts: dialogue acts in short; empty for what is not speech.
+        time: time of the event [s].
+        speaker: role that speaks or acts.
+        text: words, or description of the event.
+        style: style of the text.
+        acts: short form of the dialogue acts; empty for other events.
     """
 
     time: float
@@ -50,11 +50,11 @@ class ScriptLine:
 
 
 def script_lines(events: Iterable[Event], task: Callable[[int], str]) -> list[ScriptLine]:
-    """Returns the lines for the events of a decision; events that are of no interest to a spectator have none.
+    """Returns the lines for the events of a decision; internal events have none.
 
     Args:
-        events: what happened.
-        task: the words of a subgoal, by its number.
+        events: the events.
+        task: returns the description of a subgoal by its number.
     """
     lines: list[ScriptLine] = []
     last: int | None = None
@@ -69,7 +69,7 @@ def script_lines(events: Iterable[Event], task: Callable[[int], str]) -> list[Sc
             continue
         move = move_record(event, -1)
         act = str(move.act).removesuffix("()")
-        if move.utterance == last:  # a further act of the words that stand there already
+        if move.utterance == last:  # a further act of the same utterance
             before = lines.pop()
             act = f"{before.acts} {act}"
         last = move.utterance
@@ -156,12 +156,12 @@ def clock(seconds: float) -> str:
 
 
 class LiveShow:
-    """Shows a session as it is played; hand it to `play_session` as `on_step`.
+    """Shows a session while it is played; pass it to `play_session` as `on_step`.
 
-    On a terminal, tasks and clock stay below the talk; into a file or a pipe only the talk is written.
+    On a terminal, tasks and clock stay below the dialogue; only the dialogue is written into a file or a pipe.
 
     Args:
-        console: where to show it.
+        console: console for the output.
     """
 
     def __init__(self, console: Console) -> None:
@@ -171,7 +171,7 @@ class LiveShow:
         self._begun: float | None = None
 
     def __enter__(self) -> Self:
-        """Begins to show."""
+        """Starts the display."""
         if self._live is not None:
             self._live.start()
         return self
@@ -179,12 +179,12 @@ class LiveShow:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Takes tasks and clock off the terminal."""
+        """Removes tasks and clock from the terminal."""
         if self._live is not None:
             self._live.stop()
 
     def __call__(self, engine: SessionEngine) -> None:
-        """Shows what happened in the last decision."""
+        """Shows the events of the last decision."""
         if self._begun is None:
             self._begun = time.perf_counter()
             self._console.print(_opening(engine.session, self._console, self._width))
@@ -216,7 +216,7 @@ class LiveShow:
 
 
 def tasks(task: TaskState, console: Console) -> RenderableType:
-    """The live subgoals, those that are reached in green."""
+    """Returns a table of the live subgoals; those that are reached are green."""
     table = Table.grid(padding=(0, 1))
     for i in task.live:
         unicode, ascii_only, style = _MARKS[task.status(i)]
@@ -226,12 +226,12 @@ def tasks(task: TaskState, console: Console) -> RenderableType:
 
 
 def summary(facts: dict[str, Any], files: dict[str, str], console: Console) -> RenderableType:
-    """Outcome of a session.
+    """Returns the outcome of a session.
 
     Args:
-        facts: what `dorothie-gym run --json` writes.
-        files: what was written where.
-        console: where it will be shown.
+        facts: output of `dorothie-gym run --json`.
+        files: paths of the written files, by kind.
+        console: console for the output.
     """
     subgoals = facts["subgoals"]
     if facts["success"]:

@@ -1,15 +1,19 @@
-"""Options that several commands share."""
+"""Options that several commands share, and the settings and players that they select."""
 
 from __future__ import annotations
 
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 from typer.core import TyperCommand
 
+from dorothie_gym.cli.output import fail
+
 if TYPE_CHECKING:
     from dorothie_gym.engine.config import EnvConfig
+    from dorothie_gym.ontology import Role
+    from dorothie_gym.policies import Player
 
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
@@ -76,6 +80,44 @@ def env_config(max_seconds: float | None, word_errors: float) -> EnvConfig:
     return EnvConfig(max_seconds=max_seconds, word_error_rate=word_errors)
 
 
+# --- Players ----------------------------------------------------------------------------------------------------------
+
+
+def find_cast(participant: str, co_wizard: str, ad_wizard: str) -> dict[Role, Player]:
+    """Returns the player of each role; exits if a name or file is unknown.
+
+    Args:
+        participant: name of a policy, or file of a learned policy.
+        co_wizard: as for the participant.
+        ad_wizard: as for the participant.
+    """
+    from dorothie_gym.errors import PolicyLoadError
+    from dorothie_gym.ontology import AGENT_ROLES
+    from dorothie_gym.policies import find_player
+
+    given = dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True))
+    try:
+        cast = {role: find_player(name, role) for role, name in given.items()}
+    except PolicyLoadError as error:
+        fail(str(error))
+    for role, player in cast.items():
+        if player.path is not None:
+            _check_loads(player, role)
+    return cast
+
+
+def _check_loads(player: Player, role: Role) -> None:
+    """Loads a learned policy once, so that a damaged file is reported before the first session."""
+    from dorothie_gym.spaces import SpaceLimits
+
+    try:
+        player.make(role, SpaceLimits())
+    except ImportError as error:
+        fail(f"{role}: {player.name} needs {error.name}; run: pip install 'dorothie-gym[baselines]'")
+    except ValueError as error:
+        fail(f"{role}: {error}")
+
+
 # --- Options with an optional value -----------------------------------------------------------------------------------
 
 OWN_NAME = "<own name>"
@@ -83,11 +125,14 @@ OWN_NAME = "<own name>"
 
 _TOWNS = (".yaml", ".yml", ".xodr")
 
+CommandContext: TypeAlias = Any
+"""`Context` of click, or of typer's own copy of click, depending on its version."""
+
 
 class PictureCommand(TyperCommand):
     """Command with an option `--picture` whose value may be omitted, which typer does not support."""
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # Context of click, or of typer's copy of it
+    def parse_args(self, ctx: CommandContext, args: list[str]) -> list[str]:
         """Inserts the omitted value: the next word is the value only if it can be the name of a picture."""
         given: list[str] = []
         for k, arg in enumerate(args):

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
-import os
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn, Protocol
 
 import typer
 from rich.console import Console
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 FAILED = 1
 """Exit code where a command could not do its work."""
@@ -125,19 +128,27 @@ def check_video(path: Path) -> None:
         fail("--video needs imageio, which is not installed; run: pip install 'dorothie-gym[video]'")
 
 
-def video_writer(path: Path, frames_per_second: float) -> Any:  # imageio.v2 has no types
+class VideoWriter(Protocol):
+    """Writer of imageio, which has no types."""
+
+    def append_data(self, image: NDArray[np.uint8]) -> None:
+        """Appends a frame."""
+
+    def close(self) -> None:
+        """Closes the file."""
+
+
+def video_writer(path: Path, frames_per_second: float) -> VideoWriter:
     """Returns a video writer of imageio; raises `ImportError` if the extra `video` is not installed."""
     import imageio.v2 as imageio
 
-    return imageio.get_writer(path, fps=frames_per_second, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"])
+    writer: VideoWriter = imageio.get_writer(
+        path, fps=frames_per_second, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"]
+    )
+    return writer
 
 
-# --- Progress and processes -------------------------------------------------------------------------------------------
-
-
-def processors() -> int:
-    """Returns the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+# --- Progress ---------------------------------------------------------------------------------------------------------
 
 
 @contextmanager

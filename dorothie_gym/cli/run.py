@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dorothie_gym.cli.options import AdWizard, AsJson, CoWizard, Participant, WordErrors, env_config
+from dorothie_gym.cli.options import AdWizard, AsJson, CoWizard, Participant, WordErrors, env_config, find_cast
 from dorothie_gym.cli.output import (
     INTERRUPTED,
     check_picture,
@@ -23,7 +23,6 @@ from dorothie_gym.cli.output import (
     stderr,
     stdout,
 )
-from dorothie_gym.cli.players import find_cast
 
 if TYPE_CHECKING:
     from dorothie_gym.engine.session_engine import SessionEngine

@@ -1,4 +1,4 @@
-"""`dorothie-gym train` and `dorothie-gym table`: models trained on a corpus, and the table of all of them."""
+"""`dorothie-gym train` and `table`: training of models on a corpus, and the results table of all models."""
 
 from __future__ import annotations
 
@@ -19,21 +19,23 @@ if TYPE_CHECKING:
     from dorothie_gym.benchmark import ResultsTable
 
 RUNS = Path("runs")
-"""Folder of trainings where none is named: one for each corpus within."""
+"""Default folder of trainings; it contains one folder per corpus."""
 
 CorpusOption = Annotated[
     Path | None,
-    typer.Option("--corpus", metavar="DIR", help="Folder of the corpus; without it a small one is made once and kept."),
+    typer.Option("--corpus", metavar="DIR", help="Folder of the corpus; default: a small corpus, generated once."),
 ]
 Size = Annotated[str, typer.Option("--config", help="small (two cores) or paper (the published sizes).")]
-Seeds = Annotated[int, typer.Option(min=1, max=99, help="How many: 0, 1, ...")]
+Seeds = Annotated[int, typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...")]
 Encoder = Annotated[
-    str, typer.Option(help="Of texts: auto (minilm where installed, else hashing), hashing, minilm, bert.")
+    str, typer.Option(help="Text encoder: auto (minilm if installed, else hashing), hashing, minilm, bert.")
 ]
 Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder of the trainings; a started training is resumed.")
 ]
-Workers = Annotated[int | None, typer.Option(min=1, max=256, help="Processes; all cores without it.")]
+Workers = Annotated[
+    int | None, typer.Option(min=1, max=256, help="Number of worker processes; default one per processor.")
+]
 
 
 def train(
@@ -46,7 +48,10 @@ def train(
     workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
-    """Train a model with some seeds, test it, and tell its figures. When it is stopped, the same command goes on."""
+    """Train a model with several seeds, test it, and print its scores.
+
+    An interrupted run is resumed by the same command.
+    """
     with _reporting_errors():
         from dorothie_gym.baselines.experiment import gather_table, table_experiments
         from dorothie_gym.baselines.model_zoo import find_row
@@ -76,16 +81,16 @@ def table(
     corpus: CorpusOption = None,
     size: Size = "small",
     seeds: Seeds = 5,
-    models: Annotated[str, typer.Option(help="all, or some by their commands: toto,bert,...")] = "all",
+    models: Annotated[str, typer.Option(help="all, or a list of models: toto,bert,...")] = "all",
     encoder: Encoder = "auto",
     out: Out = None,
     workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
-    """Train every model that is not trained yet, and make the paper's complete table, with its figures beside ours.
+    """Train all models that are not trained yet, and write the paper's results table with its figures beside ours.
 
-    The table is written as Markdown, LaTeX, JSON and pictures, with all predictions behind it. When it is stopped,
-    the same command goes on.
+    The output is Markdown, LaTeX, JSON, pictures, and the file of all predictions. An interrupted run is resumed by the
+    same command.
     """
     begun = time.perf_counter()
     with _reporting_errors():
@@ -112,19 +117,19 @@ def table(
 
 
 def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> list[dict[str, Any]]:
-    """Runs the jobs, and returns what came of them in their order."""
+    """Runs the trainings, and returns their results in the same order."""
     from dorothie_gym.baselines.experiment import run_experiments
-    from dorothie_gym.bench.timing import cores
+    from dorothie_gym.processors import available_processors
 
     found: dict[Path, dict[str, Any]] = {}
     try:
         with _progress(len(jobs), quiet=quiet) as (on_epoch, on_job):
-            for job, result in run_experiments(jobs, workers or cores(), on_epoch):
+            for job, result in run_experiments(jobs, workers or available_processors(), on_epoch):
                 found[job.folder] = result
                 on_job(job)
     except KeyboardInterrupt:
-        told = f"Interrupted with {len(found)} of {len(jobs)} trainings finished; the same command goes on."
-        stderr().print(told, markup=False, soft_wrap=True)
+        message = f"Interrupted with {len(found)} of {len(jobs)} trainings finished; resume with the same command."
+        stderr().print(message, markup=False, soft_wrap=True)
         raise typer.Exit(INTERRUPTED) from None
     return [found[job.folder] for job in jobs]
 
@@ -133,7 +138,7 @@ def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> lis
 def _progress(
     jobs: int, *, quiet: bool
 ) -> Iterator[tuple[Callable[[Experiment, Epoch], None], Callable[[Experiment], None]]]:
-    """A bar on standard error while that is a terminal."""
+    """Shows a progress bar on a terminal."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = stderr()
@@ -152,7 +157,7 @@ def _progress(
 
 
 def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
-    """The corpus, and the folder of its trainings, which is made."""
+    """Returns the corpus, and the folder of its trainings, which is created."""
     folder = corpus
     if folder is None:
         from dorothie_gym.errors import CacheError
@@ -176,7 +181,7 @@ def _show(table: ResultsTable) -> None:
 
 @contextmanager
 def _reporting_errors() -> Iterator[None]:
-    """Turns a user's mistakes into one message, those of training among them."""
+    """Turns errors of the input and of the training into one message."""
     try:
         import torch  # noqa: F401
     except ImportError:

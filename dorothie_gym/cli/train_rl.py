@@ -1,4 +1,4 @@
-"""`dorothie-gym train-rl`: reinforcement learning."""
+"""`dorothie-gym train-rl`: reinforcement learning and self-play."""
 
 from __future__ import annotations
 
@@ -7,114 +7,32 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn, TypeAlias, TypeVar
 
 import typer
 
 from dorothie_gym.cli.options import AsJson, Ray
 from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.rl import TrainingResult, TrainingSettings
+    from dorothie_gym.baselines.rl.run import OnProgress, OnStage, RunEvaluation
+    from dorothie_gym.baselines.rl.settings import RunSettings, SelfPlaySettings
     from dorothie_gym.baselines.rl.training import TrainingEvaluation
     from dorothie_gym.baselines.selfplay.training import SelfPlayEvaluation
 
+Evaluation = TypeVar("Evaluation", bound="RunEvaluation")
+Settings = TypeVar("Settings", bound="RunSettings")
+
+DEFAULT_ENV = "dorothie_gym/Navigation-v0"
+"""Environment of train-rl."""
+
+Given: TypeAlias = Mapping[str, object]
+"""Settings from the command line, by name; None keeps the default."""
 
 _OPTIONS = ("steps", "environments", "workers", "seed", "evaluate_every", "episodes")
-
-
-def processes(environments: int) -> int:
-    """Returns the default number of worker processes: one per processor, or 0 on a single processor."""
-    from dorothie_gym.sim.batch.worlds import available_processors
-
-    processors = available_processors()
-    return min(processors, environments) if processors > 1 else 0
-
-
-OnStep = Callable[[int, int, Any], None]
-OnPreparation = Callable[[str, int, int], None]
-
-
-@contextmanager
-def training_progress(
-    total: int, out: Path, line: Callable[[Any], str], *, quiet: bool
-) -> Iterator[tuple[OnStep, OnPreparation]]:  # fmt: skip
-    """Shows a progress bar on a terminal and a line per evaluation; handles Ctrl-C before the first step.
-
-    Args:
-        total: number of training steps.
-        out: folder of the run.
-        line: formats an evaluation.
-        quiet: whether bar and lines are hidden.
-
-    Yields:
-        Callbacks for the steps of the training, and for the work before the first step.
-    """
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = stderr()
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
-        bar = progress.add_task("Steps", total=total)
-
-        def watch(done: int, steps: int, row: Any) -> None:
-            progress.update(bar, description="Steps", completed=done, total=steps)
-            if row is not None and not quiet:
-                progress.console.print(line(row), markup=False, soft_wrap=True)
-
-        def tell(what: str, done: int, all_of_it: int) -> None:
-            progress.update(bar, description=what, completed=done, total=all_of_it)
-
-        try:
-            yield watch, tell
-        except KeyboardInterrupt:  # a running training catches it and saves
-            progress.stop()
-            message = f"Interrupted before the first step; {out} is unchanged. The same command starts again."
-            console.print(message, markup=False, soft_wrap=True)
-            raise typer.Exit(INTERRUPTED) from None
-
-
-def facts_of(run: Any, settings: Any) -> dict[str, Any]:
-    """Returns the result of a run and its settings in JSON types."""
-    return {
-        "out": str(run.folder),
-        "finished": run.finished,
-        "steps": run.steps,
-        "seconds": round(run.seconds, 3),
-        "steps_per_second": round(run.steps / run.seconds, 1) if run.seconds else None,
-        "evaluations": [row.as_json() for row in run.rows],
-        "settings": settings.as_json(),
-    }
-
-
-def rate_line(name: str, run: Any) -> str:
-    """Returns the number of steps of a run and their rate, in a line."""
-    rate = run.steps / run.seconds if run.seconds else 0.0
-    return f"{name}: {run.steps:,} steps in {run.seconds:.0f} s ({rate:.0f} per second, without evaluations)"
-
-
-def options_of(settings: Any, ray: str | None) -> list[str]:
-    """Returns the command-line options for the settings of a run and for the cluster."""
-    words = [word for name in _OPTIONS for word in (f"--{name.replace('_', '-')}", str(getattr(settings, name)))]
-    more = {"--warm-start": settings.warm_start, "--ray": ray}
-    return words + [word for name, value in more.items() if value is not None for word in (name, value)]
-
-
-def exit_interrupted(steps: int, total: int, out: Path, command: str) -> NoReturn:
-    """Prints after Ctrl-C the folder of the run and the command that resumes it, and exits."""
-    stderr().print(
-        f"Interrupted after {steps:,} of {total:,} steps; the run is saved in {out}. Resume with: {command}",
-        markup=False, soft_wrap=True,
-    )  # fmt: skip
-    raise typer.Exit(INTERRUPTED)
-
-
-# --- `dorothie-gym train-rl`: reinforcement learning -----------------------------------------------------------------
-
-DRIVING = "dorothie_gym/Navigation-v0"
-
-NEEDS = "train-rl needs torch and stable-baselines3; run: pip install 'dorothie-gym[baselines]'"
 
 
 def train_rl(
@@ -122,7 +40,7 @@ def train_rl(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the run; a started run is resumed.")],
     env: Annotated[
         str | None,
-        typer.Option(metavar="ID", help=f"Id of the environment; default {DRIVING}; selfplay has its own."),
+        typer.Option(metavar="ID", help=f"Id of the environment; default {DEFAULT_ENV}; selfplay has its own."),
     ] = None,
     setting: Annotated[
         list[str] | None,
@@ -163,47 +81,25 @@ def train_rl(
     roles at once, each in its own folder that rollout can play; --set shared=true gives them one network.
     """
     given = _read_settings(setting or [])
-    changes = {
+    changes: Given = {
         "steps": steps, "environments": environments, "workers": workers, "seed": seed,
         "evaluate_every": evaluate_every, "episodes": episodes,
         "warm_start": None if warm_start is None else str(warm_start),
     }  # fmt: skip
-    try:
-        from dorothie_gym.baselines.rl import Training, tuned_settings
-        from dorothie_gym.errors import ModelFileError, SettingsError
-    except ImportError:
-        fail(NEEDS)
-    from dorothie_gym.errors import ProcessError, SessionError
-
-    if algorithm == "selfplay":
-        if env is not None:
-            fail("--env: selfplay uses DuoWizardEnv; omit the option, and choose a town with --set town=NAME")
-        train_selfplay(out, given, changes, ray=ray, as_json=as_json)
-        return
-    with reporting_errors():
-        try:
-            settings = tuned_settings(algorithm, env or DRIVING, env_settings=given, **changes)
-            if workers is None and ray is None:
-                settings = replace(settings, workers=processes(settings.environments))
-            with training_progress(settings.steps, out, _line, quiet=as_json) as (watch, tell):
-                run = Training(settings, out, watch, ray, tell).go()
-        except (SettingsError, ModelFileError, SessionError) as error:
-            fail(str(error))
-        except ProcessError as error:
-            fail(str(error), FAILED)
-    if as_json:
-        print_json(_facts(run, settings))
-    else:
-        _show(run, settings)
-    if not run.finished:
-        exit_interrupted(run.steps, settings.steps, out, _command(settings, out, ray))
+    with _reporting_errors():
+        if algorithm == "selfplay":
+            if env is not None:
+                fail("--env: selfplay uses DuoWizardEnv; omit the option, and choose a town with --set town=NAME")
+            _train_selfplay(out, given, changes, ray=ray, as_json=as_json)
+        else:
+            _train(algorithm, env or DEFAULT_ENV, out, given, changes, ray=ray, as_json=as_json)
 
 
-def _read_settings(given: list[str]) -> dict[str, Any]:
-    """Returns the arguments of the environment; values are parsed as YAML, so that numbers are numbers."""
+def _read_settings(given: list[str]) -> dict[str, object]:
+    """Returns the settings of --set; values are parsed as YAML, so that numbers are numbers."""
     import yaml
 
-    settings: dict[str, Any] = {}
+    settings: dict[str, object] = {}
     for item in given:
         name, separator, value = item.partition("=")
         if not (name.isidentifier() and separator):
@@ -215,7 +111,61 @@ def _read_settings(given: list[str]) -> dict[str, Any]:
     return settings
 
 
-def _line(row: Any) -> str:
+@contextmanager
+def _reporting_errors() -> Iterator[None]:
+    """Turns errors of the settings, of the corpus and of processes into one message."""
+    try:
+        import sb3_contrib  # noqa: F401
+        import torch  # noqa: F401
+    except ImportError:
+        fail("train-rl needs torch and stable-baselines3; run: pip install 'dorothie-gym[baselines]'")
+    from dorothie_gym.errors import ModelFileError, ProcessError, SettingsError
+
+    with reporting_errors():
+        try:
+            yield
+        except (SettingsError, ModelFileError) as error:
+            fail(str(error))
+        except ProcessError as error:
+            fail(str(error), FAILED)
+
+
+# --- Reinforcement learning -------------------------------------------------------------------------------------------
+
+
+def _train(
+    algorithm: str, env: str, out: Path, given: Given, changes: Given, *, ray: str | None, as_json: bool
+) -> None:
+    """Trains a model of stable-baselines3 and prints the result.
+
+    Args:
+        algorithm: name of the algorithm.
+        env: id of the environment.
+        out: folder of the run.
+        given: arguments of the environment.
+        changes: other settings.
+        ray: address of a Ray cluster that steps the environments, or None.
+        as_json: whether to print one JSON object and nothing else.
+    """
+    from dorothie_gym.baselines.rl import Training, tuned_settings
+    from dorothie_gym.baselines.rl.training import best_of
+
+    settings = tuned_settings(algorithm, env, env_settings=given, **changes)
+    if changes["workers"] is None and ray is None:
+        settings = _with_default_workers(settings)
+    with _progress(settings.steps, out, _line, quiet=as_json) as (on_progress, on_stage):
+        result = Training(settings, out, on_progress, ray, on_stage).run()
+    if as_json:
+        best = best_of(result.rows)
+        print_json({**_facts(result, settings), "best": None if best is None else best.as_json()})
+    else:
+        _show(result, settings)
+    if not result.finished:
+        arguments = [settings.algorithm, "--env", settings.env, "--out", str(out)]
+        _exit_interrupted(result.steps, settings, out, _command(arguments, given, settings, ray))
+
+
+def _line(row: TrainingEvaluation) -> str:
     outcome = row.outcome
     return (
         f"{row.steps:>10,} steps, {row.seconds:6.0f} s: success {100 * outcome.success:5.1f} % "
@@ -224,73 +174,49 @@ def _line(row: Any) -> str:
     )
 
 
-def _show(run: TrainingResult[TrainingEvaluation], settings: TrainingSettings) -> None:
-    from dorothie_gym.baselines.rl.checkpoint import DESCRIPTION
-    from dorothie_gym.baselines.rl.training import BEST, CURVE, best_of
+def _show(result: TrainingResult[TrainingEvaluation], settings: TrainingSettings) -> None:
+    from dorothie_gym.baselines.rl.run import BEST, CURVE
+    from dorothie_gym.baselines.rl.training import best_of
+    from dorothie_gym.policies.policy_loader import DESCRIPTION
 
     console = stdout()
-    console.print(rate_line(f"{settings.algorithm} on {settings.env}", run), markup=False, soft_wrap=True)
-    best = best_of(run.rows)
+    console.print(_rate_line(f"{settings.algorithm} on {settings.env}", result), markup=False, soft_wrap=True)
+    best = best_of(result.rows)
     if best is not None:
         console.print(f"Best: {_line(best).strip()}", markup=False, soft_wrap=True)
-        console.print(f"Curve: {run.folder / CURVE}", markup=False, soft_wrap=True)
-        console.print(f"Best model: {run.folder / BEST / DESCRIPTION}", markup=False, soft_wrap=True)
-    console.print(f"Model: {run.folder / DESCRIPTION}", markup=False, soft_wrap=True)
-
-
-def _facts(run: TrainingResult[TrainingEvaluation], settings: TrainingSettings) -> dict[str, Any]:
-    from dorothie_gym.baselines.rl.training import best_of
-
-    best = best_of(run.rows)
-    return {**facts_of(run, settings), "best": None if best is None else best.as_json()}
-
-
-def _command(settings: TrainingSettings, out: Path, ray: str | None) -> str:
-    """Returns the command that resumes the run."""
-    words = ["dorothie-gym", "train-rl", settings.algorithm, "--env", settings.env, "--out", str(out)]
-    for name, value in settings.env_settings.items():
-        words += ["--set", f"{name}={value}"]
-    return shlex.join([*words, *options_of(settings, ray)])
+        console.print(f"Curve: {result.folder / CURVE}", markup=False, soft_wrap=True)
+        console.print(f"Best model: {result.folder / BEST / DESCRIPTION}", markup=False, soft_wrap=True)
+    console.print(f"Model: {result.folder / DESCRIPTION}", markup=False, soft_wrap=True)
 
 
 # --- Self-play --------------------------------------------------------------------------------------------------------
 
 
-def train_selfplay(
-    out: Path, given: Mapping[str, Any], changes: Mapping[str, Any], *, ray: str | None, as_json: bool
-) -> None:
+def _train_selfplay(out: Path, given: Given, changes: Given, *, ray: str | None, as_json: bool) -> None:
     """Trains all three roles by self-play and prints the result.
 
     Args:
         out: folder of the run.
-        given: arguments from `--set`.
-        changes: options; None keeps the default.
+        given: settings of --set.
+        changes: other settings.
         ray: address of a Ray cluster that steps the sessions, or None.
         as_json: whether to print one JSON object and nothing else.
     """
-    from dorothie_gym.baselines.selfplay.settings import selfplay_settings
+    from dorothie_gym.baselines.rl.settings import selfplay_settings
     from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
-    from dorothie_gym.errors import ModelFileError, ProcessError, SessionError, SettingsError
 
-    with reporting_errors():
-        try:
-            settings = selfplay_settings(given, **changes)
-            if changes["workers"] is None and ray is None:
-                settings = replace(settings, workers=processes(settings.environments))
-            with training_progress(settings.steps, out, _selfplay_line, quiet=as_json) as (watch, tell):
-                run = SelfPlayTraining(settings, out, watch, ray, tell).go()
-        except (SettingsError, ModelFileError, SessionError) as error:
-            fail(str(error))
-        except ProcessError as error:
-            fail(str(error), FAILED)
+    settings: SelfPlaySettings = selfplay_settings(given, **changes)
+    if changes["workers"] is None and ray is None:
+        settings = _with_default_workers(settings)
+    with _progress(settings.steps, out, _selfplay_line, quiet=as_json) as (on_progress, on_stage):
+        result = SelfPlayTraining(settings, out, on_progress, ray, on_stage).run()
     if as_json:
-        print_json(facts_of(run, settings))
+        print_json(_facts(result, settings))
     else:
-        _show_selfplay(run)
-    if not run.finished:
-        words = ["dorothie-gym", "train-rl", "selfplay", "--out", str(out)]
-        words += [word for name, value in given.items() for word in ("--set", f"{name}={value}")]
-        exit_interrupted(run.steps, settings.steps, out, shlex.join([*words, *options_of(settings, ray)]))
+        _show_selfplay(result)
+    if not result.finished:
+        command = _command(["selfplay", "--out", str(out)], given, settings, ray)
+        _exit_interrupted(result.steps, settings, out, command)
 
 
 def _selfplay_line(row: SelfPlayEvaluation) -> str:
@@ -301,13 +227,99 @@ def _selfplay_line(row: SelfPlayEvaluation) -> str:
     )
 
 
-def _show_selfplay(run: TrainingResult[SelfPlayEvaluation]) -> None:
-    from dorothie_gym.baselines.rl.training import CURVE
+def _show_selfplay(result: TrainingResult[SelfPlayEvaluation]) -> None:
+    from dorothie_gym.baselines.rl.run import CURVE
 
     console = stdout()
-    console.print(rate_line("selfplay", run), markup=False, soft_wrap=True)
-    if run.rows:
-        console.print(f"Curve: {run.folder / CURVE}", markup=False, soft_wrap=True)
-    if run.steps:
-        roles = " ".join(f"--{role.replace('_', '-')} {shlex.quote(str(run.folder / role))}" for role in AGENT_ROLES)
+    console.print(_rate_line("selfplay", result), markup=False, soft_wrap=True)
+    if result.rows:
+        console.print(f"Curve: {result.folder / CURVE}", markup=False, soft_wrap=True)
+    if result.steps:
+        roles = " ".join(f"--{role.replace('_', '-')} {shlex.quote(str(result.folder / role))}" for role in AGENT_ROLES)
         console.print(f"Play: dorothie-gym rollout {roles}", markup=False, soft_wrap=True)
+
+
+# --- Both -------------------------------------------------------------------------------------------------------------
+
+
+def _with_default_workers(settings: Settings) -> Settings:
+    """Returns settings with one worker process per processor; with none on a single processor."""
+    processors = available_processors()
+    return replace(settings, workers=min(processors, settings.environments) if processors > 1 else 0)
+
+
+@contextmanager
+def _progress(
+    total: int, out: Path, line: Callable[[Evaluation], str], *, quiet: bool
+) -> Iterator[tuple[OnProgress[Evaluation], OnStage]]:
+    """Shows a progress bar on a terminal and a line per evaluation; handles Ctrl-C before the first step.
+
+    Args:
+        total: number of training steps.
+        out: folder of the run.
+        line: formats an evaluation.
+        quiet: whether bar and lines are hidden.
+
+    Yields:
+        Callbacks for the steps of the training, and for the work before the first step.
+    """
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = stderr()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("Steps", total=total)
+
+        def on_progress(done: int, steps: int, row: Evaluation | None) -> None:
+            progress.update(bar, description="Steps", completed=done, total=steps)
+            if row is not None and not quiet:
+                progress.console.print(line(row), markup=False, soft_wrap=True)
+
+        def on_stage(stage: str, done: int, stage_total: int) -> None:
+            progress.update(bar, description=stage, completed=done, total=stage_total)
+
+        try:
+            yield on_progress, on_stage
+        except KeyboardInterrupt:  # a running training catches it and saves
+            progress.stop()
+            message = f"Interrupted before the first step; {out} is unchanged. The same command starts again."
+            console.print(message, markup=False, soft_wrap=True)
+            raise typer.Exit(INTERRUPTED) from None
+
+
+def _facts(result: TrainingResult[Evaluation], settings: RunSettings) -> dict[str, object]:
+    """Returns the result of a run and its settings in JSON types."""
+    return {
+        "out": str(result.folder),
+        "finished": result.finished,
+        "steps": result.steps,
+        "seconds": round(result.seconds, 3),
+        "steps_per_second": round(result.steps / result.seconds, 1) if result.seconds else None,
+        "evaluations": [row.as_json() for row in result.rows],
+        "settings": settings.as_json(),
+    }
+
+
+def _rate_line(name: str, result: TrainingResult[Evaluation]) -> str:
+    """Returns a line with the number of steps of a run and their rate."""
+    rate = result.steps / result.seconds if result.seconds else 0.0
+    return f"{name}: {result.steps:,} steps in {result.seconds:.0f} s ({rate:.0f} per second, without evaluations)"
+
+
+def _command(arguments: list[str], given: Given, settings: RunSettings, ray: str | None) -> str:
+    """Returns the command that resumes a run."""
+    words = ["dorothie-gym", "train-rl", *arguments]
+    words += [word for name, value in given.items() for word in ("--set", f"{name}={value}")]
+    words += [word for name in _OPTIONS for word in (f"--{name.replace('_', '-')}", str(getattr(settings, name)))]
+    optional = {"--warm-start": settings.warm_start, "--ray": ray}
+    words += [word for name, value in optional.items() if value is not None for word in (name, value)]
+    return shlex.join(words)
+
+
+def _exit_interrupted(steps: int, settings: RunSettings, out: Path, command: str) -> NoReturn:
+    """Prints after Ctrl-C the folder of the run and the command that resumes it, and exits."""
+    stderr().print(
+        f"Interrupted after {steps:,} of {settings.steps:,} steps; the run is saved in {out}. Resume with: {command}",
+        markup=False, soft_wrap=True,
+    )  # fmt: skip
+    raise typer.Exit(INTERRUPTED)

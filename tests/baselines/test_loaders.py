@@ -8,8 +8,7 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines import checkpoints, loaders
-from dorothie_gym.baselines.rl import checkpoint
-from dorothie_gym.baselines.selfplay import settings
+from dorothie_gym.baselines.rl import checkpoint, settings
 from dorothie_gym.policies.policy_loader import MODEL_LOADERS
 
 

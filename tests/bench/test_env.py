@@ -7,7 +7,7 @@ import pytest
 from highway_env.vehicle.behavior import IDMVehicle
 
 from dorothie_gym.bench import env as bench
-from dorothie_gym.bench.env import WITHOUT_SUMO, IdleSession, measure
+from dorothie_gym.bench.env import NO_SUMO, IdleSession, measure
 from dorothie_gym.sim.highway_reference import StockIntersection
 
 KEYS = [
@@ -17,9 +17,9 @@ KEYS = [
 ]  # fmt: skip
 
 
-def test_the_figures_agree_with_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_figures_are_consistent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "find_spec", lambda name: None)
-    monkeypatch.setattr(bench, "cores", lambda: 1)
+    monkeypatch.setattr(bench, "available_processors", lambda: 1)
     figures = measure("brookside", vehicles=2, pedestrians=1, decisions=2, stock_steps=1, repeats=2)
     assert list(figures) == KEYS and json.loads(json.dumps(figures)) == figures
     assert figures["substeps_per_step"] == 15
@@ -28,35 +28,35 @@ def test_the_figures_agree_with_each_other(monkeypatch: pytest.MonkeyPatch) -> N
     assert simulated == pytest.approx(figures["steps_per_second"] / 2, rel=2e-3)
     assert figures["ratio"] == pytest.approx(simulated / figures["stock_simulated_seconds_per_second"], rel=2e-3)
     assert figures["stock_simulated_seconds_per_second"] == figures["stock_steps_per_second"] > 0.0  # one second each
-    assert figures["sumo_substeps_per_second"] is None and figures["sumo_missing"] == WITHOUT_SUMO
-    assert "dorothie-gym[sumo]" in WITHOUT_SUMO
+    assert figures["sumo_substeps_per_second"] is None and figures["sumo_missing"] == NO_SUMO
+    assert "dorothie-gym[sumo]" in NO_SUMO
     assert figures["two_processes_scaling"] is None
 
 
-def test_two_processes_are_held_against_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench, "cores", lambda: 2)
-    scaling = bench._two_processes("brookside", 0, 0, 0, 20, 1, lambda doing, share: None)
+def test_two_processes_are_compared_with_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, "available_processors", lambda: 2)
+    scaling = bench._two_processes("brookside", 0, 0, 0, 20, 1, lambda part, share: None)
     assert scaling is not None and 0.1 < scaling < 10.0
 
 
-def test_sumo_drives_on_a_grid_where_it_is_installed() -> None:
+def test_sumo_worker_steps_a_grid() -> None:
     pytest.importorskip("libsumo", reason="the extra [sumo] is not installed")
     pytest.importorskip("sumo", reason="the extra [sumo] is not installed")
-    from dorothie_gym.bench.workers import Worker
+    from dorothie_gym.bench.timing import Worker
 
     with Worker("sumo", lanes=80, length=3000.0, vehicles=5, seed=0, substeps=50) as worker:
         worker.wait()
         assert worker.run() > 0.0
 
 
-def test_a_session_goes_on_after_its_end() -> None:
+def test_idle_session_restarts_after_its_end() -> None:
     session = IdleSession("brookside", 0, 0, 0)
     session.env.agents = []
     assert session.seconds(3, time.perf_counter) > 0.0
     assert session.env.agents and session.env.session.world.time == 1.5
 
 
-def test_the_stock_intersection_begins_anew_after_an_episode() -> None:
+def test_stock_intersection_restarts_after_an_episode() -> None:
     stock = StockIntersection(seed=0)
     assert (stock.seconds_per_step, stock.substeps_per_step) == (1.0, 15)
     for _ in range(16):  # an episode lasts 13 steps at most
@@ -66,9 +66,9 @@ def test_the_stock_intersection_begins_anew_after_an_episode() -> None:
     stock.close()
 
 
-def test_the_stock_intersection_leaves_the_vehicles_of_other_roads_as_they_were() -> None:
-    taste = {name: value for name, value in vars(IDMVehicle).items() if name.isupper()}
+def test_stock_intersection_restores_parameters_of_idm_vehicles() -> None:
+    parameters = {name: value for name, value in vars(IDMVehicle).items() if name.isupper()}
     stock = StockIntersection(seed=0)
-    assert vars(IDMVehicle)["COMFORT_ACC_MAX"] != taste["COMFORT_ACC_MAX"]
+    assert vars(IDMVehicle)["COMFORT_ACC_MAX"] != parameters["COMFORT_ACC_MAX"]
     stock.close()
-    assert {name: value for name, value in vars(IDMVehicle).items() if name.isupper()} == taste
+    assert {name: value for name, value in vars(IDMVehicle).items() if name.isupper()} == parameters

@@ -5,13 +5,13 @@ import json
 import pytest
 
 from dorothie_gym.bench import importing
-from dorothie_gym.bench.importing import ENVIRONMENT, PACKAGE, STEP, STOCK, measure
+from dorothie_gym.bench.importing import FIRST_ENV, FIRST_STEP, HIGHWAY_ENV, PACKAGE, measure
 
-TAKEN = {STOCK: 0.5, PACKAGE: 0.1, ENVIRONMENT: 1.2, STEP: 1.5}
+TAKEN = {HIGHWAY_ENV: 0.5, PACKAGE: 0.1, FIRST_ENV: 1.2, FIRST_STEP: 1.5}
 
 
-def test_the_figures_agree_with_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The processes take seconds each, so that here their times are given."""
+def test_figures_are_consistent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Durations are given, because real processes take seconds each."""
     names = {code: name for name, code in importing._CODE.items()}
     run: list[str] = []
 
@@ -24,9 +24,9 @@ def test_the_figures_agree_with_each_other(monkeypatch: pytest.MonkeyPatch) -> N
     assert json.loads(json.dumps(figures)) == figures
     assert figures["seconds"] == {"package": 0.1, "first_environment": 1.2, "first_step": 1.5}
     assert figures["highway_env_seconds"] == 0.5 and figures["ratio"] == 2.4
-    assert run[:2] == [STOCK, STEP], "one run of each fills the caches"
-    assert run[2:] == [STOCK, PACKAGE, ENVIRONMENT, STEP] * 2
+    assert run[:2] == [HIGHWAY_ENV, FIRST_STEP], "one run of each fills the caches"
+    assert run[2:] == [HIGHWAY_ENV, PACKAGE, FIRST_ENV, FIRST_STEP] * 2
 
 
-def test_a_fresh_process_is_timed() -> None:
+def test_new_process_is_timed() -> None:
     assert 0.0 < importing._seconds("pass") < importing._seconds(importing._CODE[PACKAGE])

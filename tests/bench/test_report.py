@@ -5,8 +5,17 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.bench.chart import DOTS, SIZE, draw
-from dorothie_gym.bench.report import Report, env_report, import_report, number, vector_report, world_report
+from dorothie_gym.bench.report import (
+    DOTS_PER_INCH,
+    WIDTH,
+    Report,
+    draw,
+    env_report,
+    import_report,
+    number,
+    vector_report,
+    world_report,
+)
 from dorothie_gym.bench.timing import machine
 
 WORLD = {
@@ -36,40 +45,40 @@ def reported(report: Any, figures: dict[str, Any], **changes: Any) -> Report:
     return made
 
 
-def test_the_world_is_told_with_its_ratio_and_real_time() -> None:
+def test_world_report_states_ratio_and_real_time() -> None:
     report = reported(world_report, WORLD)
-    assert report.headline == "36,170 times highway-env's own road on the same plan, 4,010 times real time"
+    assert report.headline == "36,170 times highway-env's own road on the same map, 4,010 times real time"
     assert "30 vehicles (1 cyclist among them), 20 pedestrians, 4 props" in report.setting
     assert [(row.value, row.reference) for row in report.rows] == [(3.325, True), (120300.0, False)]
     assert report.mark is not None and report.mark.value == 30
-    assert report.notes == ("one more world in the same town takes 33 KiB",)
+    assert report.notes == ("memory of one more world in the same town: 33 KiB",)
 
 
-def test_the_environment_is_told_in_simulated_time() -> None:
+def test_environment_report_is_in_simulated_time() -> None:
     report = reported(env_report, ENV)
     assert [row.value for row in report.rows] == [35.0, 1100.0, 2200.0]
     assert report.rows[-1].best == pytest.approx(2300.0)
-    assert report.notes[-1] == "two processes do 1.93 times as much as one"
+    assert report.notes[-1] == "throughput of two processes: 1.93 times that of one"
 
 
-def test_what_was_not_measured_is_told() -> None:
+def test_environment_report_lists_missing_measurements() -> None:
     report = reported(
         env_report, ENV, sumo_substeps_per_second=None, sumo_spread=None, sumo_missing="no SUMO",
         two_processes_scaling=None,
     )  # fmt: skip
     assert [row.value for row in report.rows] == [35.0, 2200.0]
-    assert report.notes[-2:] == ("two processes were not measured: there is one core only", "no SUMO")
+    assert report.notes[-2:] == ("two processes were not measured on a single core", "no SUMO")
 
 
-def test_threads_are_told_with_one_of_them() -> None:
+def test_vector_report_compares_several_threads_with_one() -> None:
     report = reported(vector_report, VECTOR)
-    assert report.headline == "2 threads do 1.94 times as much as one"
+    assert report.headline == "throughput of 2 threads: 1.94 times that of one"
     assert "64 worlds" in report.setting and "AsyncVectorEnv" in report.notes[-1]
     bare = {key: value for key, value in VECTOR.items() if not key.endswith("_steps_per_second")}
     assert len(reported(vector_report, bare).notes) == 1
 
 
-def test_numbers_are_written_for_people() -> None:
+def test_number_has_three_digits_or_whole_units() -> None:
     assert [number(value) for value in (128571.4, 99.94, 3.385, 0.0621)] == ["128,571", "99.9", "3.38", "0.0621"]
 
 
@@ -78,12 +87,12 @@ def test_numbers_are_written_for_people() -> None:
     [(world_report, WORLD), (env_report, ENV), (vector_report, VECTOR), (import_report, IMPORT)],
     ids=["world", "env", "vector", "import"],
 )
-def test_a_chart_is_drawn_with_all_in_it(report: Any, figures: dict[str, Any], tmp_path: Path) -> None:
+def test_chart_fits_its_texts(report: Any, figures: dict[str, Any], tmp_path: Path) -> None:
     pygame = pytest.importorskip("pygame")
     path = tmp_path / "chart.png"
     draw(reported(report, figures), path)
     picture = pygame.image.load(str(path))
-    assert picture.get_width() == SIZE * DOTS
+    assert picture.get_width() == WIDTH * DOTS_PER_INCH
     for x, y in ((0, 0), (picture.get_width() - 1, 0), (0, picture.get_height() - 1)):
-        assert picture.get_at((x, y)) == picture.get_at((3, 3)), "nothing runs over the edge"
+        assert picture.get_at((x, y)) == picture.get_at((3, 3)), "no text crosses the edge"
     assert path.stat().st_size < 150_000

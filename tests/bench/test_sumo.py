@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.bench.sumo import _grid, _lanes_of
+from dorothie_gym.bench.sumo import _lanes_of, _write_grid
 
 
 @pytest.mark.parametrize("size", [3, 5])
-def test_the_lanes_of_a_grid_are_counted_as_sumo_does(size: int, tmp_path: Path) -> None:
+def test_number_of_lanes_equals_that_of_sumo(size: int, tmp_path: Path) -> None:
     pytest.importorskip("sumo", reason="the extra [sumo] is not installed")
     path = tmp_path / "grid.net.xml"
-    _grid(path, _lanes_of(size), 40.0 * 4 * size * (size - 1))
+    _write_grid(path, _lanes_of(size), 40.0 * 4 * size * (size - 1))
     assert path.read_text(encoding="utf-8").count("<lane ") == _lanes_of(size)

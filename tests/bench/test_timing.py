@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from dorothie_gym.bench.timing import Timing, cpu_seconds, in_turns, machine, rounded
+from dorothie_gym.bench.timing import Timing, Worker, alternate, cpu_seconds, machine, rounded
+from dorothie_gym.errors import BenchmarkProcessError
 
 
 def test_median_best_and_spread_of_repeats() -> None:
@@ -15,37 +16,42 @@ def test_median_best_and_spread_of_repeats() -> None:
 
 
 @pytest.mark.parametrize("seconds", [(), (0.1, 0.0)])
-def test_a_timing_without_time_is_refused(seconds: tuple[float, ...]) -> None:
+def test_timing_without_duration_is_refused(seconds: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match=r"Timing\.seconds"):
         Timing(seconds)
 
 
-def test_works_are_done_in_turns_and_progress_grows() -> None:
+def test_functions_alternate_and_progress_grows() -> None:
     done: list[str] = []
-    told: list[tuple[str, float]] = []
+    reported: list[tuple[str, float]] = []
 
     def work(name: str, seconds: float) -> float:
         done.append(name)
         return seconds
 
-    timings = in_turns(
-        {"one": lambda: work("one", 1.0), "two": lambda: work("two", 2.0)}, 3, lambda *what: told.append(what)
+    timings = alternate(
+        {"one": lambda: work("one", 1.0), "two": lambda: work("two", 2.0)}, 3, lambda *part: reported.append(part)
     )
-    assert done == ["one", "two"] * 3 == [name for name, _ in told]
+    assert done == ["one", "two"] * 3 == [name for name, _ in reported]
     assert timings["one"].seconds == (1.0,) * 3 and timings["two"].median == 2.0
-    shares = [share for _, share in told]
+    shares = [share for _, share in reported]
     assert shares == sorted(shares) and shares[0] == 0.0 and shares[-1] < 1.0
 
 
-def test_cpu_time_counts_work() -> None:
+def test_cpu_time_grows_with_work() -> None:
     assert cpu_seconds(lambda: sum(range(200_000))) > cpu_seconds(lambda: None) >= 0.0
 
 
-def test_the_machine_is_named_with_versions() -> None:
+def test_machine_lists_processor_and_versions() -> None:
     facts = machine()
     assert list(facts) == ["processor", "cores", "system", "python", "numba", "numpy", "highway_env"]
     assert all(facts.values()) and isinstance(facts["cores"], int)
 
 
-def test_numbers_are_rounded_to_what_is_known() -> None:
+def test_rounded_keeps_four_digits() -> None:
     assert [rounded(v) for v in (123456.0, 3.14159, 0.00123456)] == [123500.0, 3.142, 0.001235]
+
+
+def test_worker_that_fails_to_start_reports_the_reason() -> None:
+    with Worker("no_such_job") as worker, pytest.raises(BenchmarkProcessError, match="No module named .*no_such_job"):
+        worker.wait()

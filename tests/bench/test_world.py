@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from dorothie_gym.bench.world import FROM_PROPS, bytes_per_world, crowd, measure
+from dorothie_gym.bench.world import PROP_CLEARANCE, bytes_per_world, crowd, measure
 from dorothie_gym.maps import load_town
 from dorothie_gym.sim.highway_reference import run_stock, stock_lane, stock_road
 from dorothie_gym.sim.network.network import TownNetwork
@@ -18,7 +18,7 @@ KEYS = [
 ]  # fmt: skip
 
 
-def test_the_figures_agree_with_each_other() -> None:
+def test_figures_are_consistent() -> None:
     town = load_town("brookside")
     figures = measure("brookside", vehicles=4, pedestrians=3, props=1, seed=2, calls=4, stock_substeps=1, repeats=3)
     assert list(figures) == KEYS and json.loads(json.dumps(figures)) == figures
@@ -36,7 +36,7 @@ def test_vehicles_that_do_not_fit_are_not_counted() -> None:
     assert 20 < figures["vehicles"] < 200 and figures["pedestrians"] == 0 == figures["props"]
 
 
-def test_the_crowd_has_everybody_and_props_away_from_vehicles() -> None:
+def test_crowd_has_all_actors_and_props_away_from_vehicles() -> None:
     network = TownNetwork(load_town("midtown"))
     arrays = town_arrays(network)
     world = crowd(network, arrays, vehicles=40, pedestrians=5, props=6, seed=1)
@@ -45,17 +45,17 @@ def test_the_crowd_has_everybody_and_props_away_from_vehicles() -> None:
     props = world.props[world.props.present]
     assert len(props) == 6
     for prop in props:
-        assert np.hypot(world.vehicles.x - prop.x, world.vehicles.y - prop.y).min() > FROM_PROPS
+        assert np.hypot(world.vehicles.x - prop.x, world.vehicles.y - prop.y).min() > PROP_CLEARANCE
     assert crowd(network, arrays, vehicles=40, pedestrians=5, props=6, seed=1).tobytes() == world.tobytes()
 
 
-def test_memory_of_one_more_world_is_that_of_its_arrays_and_little_more() -> None:
+def test_memory_of_one_more_world_is_little_more_than_its_arrays() -> None:
     network = TownNetwork(load_town("brookside"))
     world = crowd(network, town_arrays(network), vehicles=5, pedestrians=5, props=0, seed=0)
     assert world.nbytes < bytes_per_world(world) < world.nbytes + 16_384
 
 
-def test_the_stock_road_has_the_same_plan_and_the_same_vehicles() -> None:
+def test_stock_road_has_the_same_lanes_and_vehicles() -> None:
     network = TownNetwork(load_town("brookside"))
     world = crowd(network, town_arrays(network), vehicles=6, pedestrians=5, props=0, seed=3)
     road = stock_road(network, world)
@@ -72,7 +72,7 @@ def test_the_stock_road_has_the_same_plan_and_the_same_vehicles() -> None:
 
 
 @pytest.mark.parametrize("town", ["brookside", "northgate"])
-def test_stock_lanes_run_where_ours_do(town: str) -> None:
+def test_stock_lanes_follow_those_of_the_town(town: str) -> None:
     for lane in load_town(town).lanes[::7]:
         stock = stock_lane(lane)
         assert stock.length == pytest.approx(lane.length, rel=0.01, abs=0.1)

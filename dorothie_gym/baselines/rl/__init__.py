@@ -2,8 +2,9 @@
 
 from dorothie_gym.baselines.rl.checkpoint import load_model
 from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics, evaluate_policy
+from dorothie_gym.baselines.rl.run import TrainingResult
 from dorothie_gym.baselines.rl.settings import ALGORITHMS, TrainingSettings, tuned_settings
-from dorothie_gym.baselines.rl.training import Training, TrainingResult
+from dorothie_gym.baselines.rl.training import Training
 from dorothie_gym.errors import ModelFileError, SettingsError
 
 __all__ = [

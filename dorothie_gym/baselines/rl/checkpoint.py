@@ -1,4 +1,4 @@
-"""Checkpoints of stable-baselines3 models without pickles: tensors in safetensors, everything else in JSON."""
+"""Models of stable-baselines3 and their files without pickles: tensors in safetensors, everything else in JSON."""
 
 from __future__ import annotations
 
@@ -8,28 +8,40 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, TypeAlias
 
 import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
+from stable_baselines3.common.vec_env import VecEnv
 
 from dorothie_gym.baselines.rl.environments import make_env
-from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, TrainingSettings
+from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, RunSettings, TrainingSettings
+from dorothie_gym.baselines.rl.vector_env import AnyEnv
 from dorothie_gym.errors import ModelFileError, SettingsError
 from dorothie_gym.files import replacing
+from dorothie_gym.policies.policy_loader import DESCRIPTION
 
-TENSORS, DESCRIPTION = "model.safetensors", "model.json"
-"""Files of a model in its folder."""
+Model: TypeAlias = Any
+"""Algorithm of stable-baselines3 or sb3-contrib: algorithms differ in attributes, and sb3-contrib has no types."""
 
-KIND = "dorothie_gym-rl"
-"""Kind of the models of `train-rl` in `model.json`; `policy_loader` plays files by it."""
+Network: TypeAlias = Any
+"""Policy network of a `Model`, for the same reasons without a type."""
 
-FORMAT = 1
+Page: TypeAlias = dict[str, Any]
+"""Content of `model.json`; a reader checks the fields that it uses."""
+
+TENSORS: Final = "model.safetensors"
+"""File of a model beside `model.json`."""
+
+KIND: Final = "dorothie_gym-rl"
+"""Kind of the models of `train-rl` in `model.json`; `policy_loader` selects the loader of a file by it."""
+
+MODEL_FORMAT: Final = 1
 """Version of the two files."""
 
 
-def make_model(settings: TrainingSettings, env: Any, *, log: Path | None = None) -> Any:
+def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv, *, log: Path | None = None) -> Model:
     """Returns an untrained model.
 
     Args:
@@ -38,7 +50,7 @@ def make_model(settings: TrainingSettings, env: Any, *, log: Path | None = None)
         log: folder for TensorBoard, or None.
 
     Raises:
-        SettingsError: the algorithm does not take the environment's actions, or a parameter.
+        SettingsError: the algorithm does not accept the environment's actions, or a parameter.
     """
     package, name = ALGORITHMS[settings.algorithm]
     parameters = dict(settings.parameters)
@@ -66,21 +78,21 @@ class LinearSchedule:
 
 
 def save_model(
-    model: Any, settings: Any, folder: Path, seconds: float, more: Mapping[str, Any] | None = None
-) -> None:  # fmt: skip
+    model: Model, settings: RunSettings, folder: Path, seconds: float, fields: Mapping[str, object] | None = None
+) -> None:
     """Writes a model with the state of its optimisers into a folder; an older one stays whole until it is replaced.
 
     Replay buffers are not saved.
 
     Args:
-        model: of stable-baselines3.
-        settings: settings of the training; has `as_json`.
+        model: the model.
+        settings: settings of the training.
         folder: folder of the two files.
         seconds: duration of the training [s].
-        more: further fields of the description.
+        fields: further fields of `model.json`; `kind` replaces `KIND`.
     """
     tensors: dict[str, torch.Tensor] = {}
-    groups: dict[str, Any] = {}
+    groups: dict[str, object] = {}
     for name, state in model.get_parameters().items():
         if "param_groups" in state:
             groups[name] = state["param_groups"]
@@ -90,10 +102,10 @@ def save_model(
         else:
             tensors |= {f"{name}/{key}": value for key, value in state.items()}
     tensors |= {f"variables/{name}": value for name, value in _variables(model)}
-    description = {
-        "format": FORMAT,
+    page: Page = {
+        "format": MODEL_FORMAT,
         "kind": KIND,
-        **(more or {}),
+        **(fields or {}),
         "settings": settings.as_json(),
         "steps": int(model.num_timesteps),
         "seconds": round(seconds, 2),
@@ -101,36 +113,36 @@ def save_model(
         "optimisers": groups,
     }
     folder.mkdir(parents=True, exist_ok=True)
-    with replacing(folder / DESCRIPTION) as about, replacing(folder / TENSORS) as weights:
+    with replacing(folder / DESCRIPTION) as card, replacing(folder / TENSORS) as weights:
         save_file({name: value.detach().contiguous().clone() for name, value in tensors.items()}, weights)
-        about.write_text(json.dumps(description, indent=1) + "\n", encoding="utf-8")
+        card.write_text(json.dumps(page, indent=1) + "\n", encoding="utf-8")
 
 
-def read_description(folder: Path) -> dict[str, Any]:
+def read_description(folder: Path) -> Page:
     """Returns the content of `model.json` in a folder.
 
     Raises:
-        ModelFileError: it is missing, or not as it must be.
+        ModelFileError: the file is missing, damaged, or of another version.
     """
     path = folder / DESCRIPTION
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        page = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ModelFileError(f"{path}: does not exist; `dorothie-gym train-rl --out {folder}` makes one") from None
     except json.JSONDecodeError as error:
         raise ModelFileError(f"{path}, line {error.lineno}: {error.msg}") from None
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
-        raise ModelFileError(f"{path}: format is not {FORMAT}; the model is of another version of dorothie_gym")
-    return found
+    if not isinstance(page, dict) or page.get("format") != MODEL_FORMAT:
+        raise ModelFileError(f"{path}: format is not {MODEL_FORMAT}; the model is of another version of dorothie_gym")
+    return page
 
 
-def restore(model: Any, folder: Path) -> None:
+def restore(model: Model, folder: Path) -> None:
     """Restores weights, optimisers and step count of a model from a folder.
 
     Raises:
         ModelFileError: the files are missing or damaged, or of a model with other layers.
     """
-    description = read_description(folder)
+    page = read_description(folder)
     path = folder / TENSORS
     try:
         tensors = load_file(path)
@@ -138,9 +150,9 @@ def restore(model: Any, folder: Path) -> None:
         raise ModelFileError(f"{path}: cannot be read ({error})") from None
     variables = {name.split("/", 1)[1]: value for name, value in tensors.items() if name.startswith("variables/")}
     parameters = {
-        name: _optimiser(name, description["optimisers"], tensors)
-        if name in description["optimisers"]
-        else _under(f"{name}/", tensors)
+        name: _optimiser(name, page["optimisers"], tensors)
+        if name in page["optimisers"]
+        else _tensors_under(f"{name}/", tensors)
         for name in model.get_parameters()
     }
     try:
@@ -149,10 +161,10 @@ def restore(model: Any, folder: Path) -> None:
         raise ModelFileError(f"{path}: does not fit the environment or the network ({error})") from None
     for name, value in _variables(model):
         value.data.copy_(variables[name])
-    model.num_timesteps, model._n_updates = int(description["steps"]), int(description["updates"])
+    model.num_timesteps, model._n_updates = int(page["steps"]), int(page["updates"])
 
 
-def load_model(folder: str | Path) -> tuple[Any, TrainingSettings]:
+def load_model(folder: str | Path) -> tuple[Model, TrainingSettings]:
     """Returns a trained model and the settings of its training.
 
     Args:
@@ -160,26 +172,26 @@ def load_model(folder: str | Path) -> tuple[Any, TrainingSettings]:
 
     Raises:
         ModelFileError: the files are missing or damaged.
-        SettingsError: the environment that it was trained in cannot be made.
+        SettingsError: the environment that the model was trained in cannot be made.
     """
     folder = Path(folder)
     folder = folder.parent if folder.is_file() else folder
     settings = TrainingSettings(**read_description(folder)["settings"])
     env = make_env(settings.env, settings.env_settings)
-    model = make_model(_for_one(settings), env)
+    model = make_model(with_fitting_batches(settings, rows=1), env)
     restore(model, folder)
     return model, settings
 
 
-def _for_one(settings: TrainingSettings) -> TrainingSettings:
-    """Returns the settings for a single environment, with a batch size that it can fill."""
+def with_fitting_batches(settings: TrainingSettings, rows: int) -> TrainingSettings:
+    """Returns settings whose batch size divides the size of a rollout of a number of parallel environments."""
     parameters = dict(settings.parameters)
     if {"n_steps", "batch_size"} <= set(parameters):
-        parameters["batch_size"] = math.gcd(parameters["n_steps"], parameters["batch_size"])
+        parameters["batch_size"] = math.gcd(parameters["n_steps"] * rows, parameters["batch_size"])
     return replace(settings, parameters=parameters)
 
 
-def _variables(model: Any) -> Iterator[tuple[str, torch.Tensor]]:
+def _variables(model: Model) -> Iterator[tuple[str, torch.Tensor]]:
     """Yields tensors of an algorithm outside its networks (SAC: the logarithm of its temperature)."""
     for name in model._get_torch_save_params()[1]:
         value = getattr(model, name)
@@ -187,13 +199,16 @@ def _variables(model: Any) -> Iterator[tuple[str, torch.Tensor]]:
             yield name, value
 
 
-def _under(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+def _tensors_under(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
     return {name[len(prefix) :]: value for name, value in tensors.items() if name.startswith(prefix)}
 
 
-def _optimiser(name: str, groups: Mapping[str, Any], tensors: Mapping[str, torch.Tensor]) -> dict[str, Any]:
+def _optimiser(
+    name: str, groups: Mapping[str, object], tensors: Mapping[str, torch.Tensor]
+) -> dict[str, object]:  # fmt: skip
+    """Returns the state of an optimiser, as torch's `state_dict` has it."""
     state: dict[int, dict[str, torch.Tensor]] = {}
-    for key, value in _under(f"{name}/", tensors).items():
+    for key, value in _tensors_under(f"{name}/", tensors).items():
         index, quantity = key.split("/")
         state.setdefault(int(index), {})[quantity] = value
     return {"state": state, "param_groups": groups[name]}

@@ -6,30 +6,30 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, TypeAlias
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.rl.checkpoint import load_model
+from dorothie_gym.baselines.rl.checkpoint import Model, load_model
 from dorothie_gym.baselines.rl.environments import masks_of
 from dorothie_gym.baselines.rl.settings import NAVIGATION
+from dorothie_gym.baselines.rl.vector_env import MakeEnv
 from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation import NavigationPolicy
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.spaces import SpaceLimits
 
-SEEDS_FROM = 1_000_000
-"""Seeds of evaluations begin here; training draws others."""
+FIRST_SEED: Final = 1_000_000
+"""Seed of the first episode of an evaluation; training uses smaller seeds."""
 
-AT_ONCE = 8
-"""Episodes played at once: networks are faster on batches."""
+PARALLEL_EPISODES: Final = 8
+"""Number of episodes played in parallel: networks are faster on batches."""
 
-Z = 1.96
+Z: Final = 1.96
 """Quantile of the normal distribution for an interval of 95 %."""
 
-Act = Callable[[NDArray[Any], NDArray[np.bool_] | None], Sequence[Any]]
+Act: TypeAlias = Callable[[Vector, NDArray[np.bool_] | None], Sequence[Any]]
 """Function from observations (n, ...) and masks (n, m), if environments have them, to actions."""
 
 
@@ -54,18 +54,16 @@ class EpisodeStatistics:
     episodes: int
 
 
-def evaluate_policy(
-    make: Callable[[], gym.Env[Any, Any]], act: Act, episodes: int, seed: int = SEEDS_FROM
-) -> EpisodeStatistics:
-    """Plays episodes with the seeds from `seed` on.
+def evaluate_policy(make: MakeEnv, act: Act, episodes: int, seed: int = FIRST_SEED) -> EpisodeStatistics:
+    """Plays episodes with consecutive seeds.
 
     Args:
         make: makes an environment.
         act: policy.
-        episodes: how many.
-        seed: of the first.
+        episodes: number of episodes.
+        seed: seed of the first episode.
     """
-    envs = [make() for _ in range(min(AT_ONCE, episodes))]
+    envs = [make() for _ in range(min(PARALLEL_EPISODES, episodes))]
     successes, rewards, lengths = np.zeros(episodes), np.zeros(episodes), np.zeros(episodes)
     playing = dict(enumerate(range(len(envs))))  # environment: episode
     observations = {k: env.reset(seed=seed + k)[0] for k, env in enumerate(envs)}
@@ -95,12 +93,12 @@ def evaluate_policy(
     )  # fmt: skip
 
 
-def act_with(model: Any, *, masked: bool) -> Act:
-    """Returns the greedy policy of a stable-baselines3 model."""
+def greedy_policy(model: Model, *, masked: bool) -> Act:
+    """Returns the greedy policy of a model; `masked` models respect the masks."""
 
-    def act(observations: NDArray[Any], masks: NDArray[np.bool_] | None) -> Sequence[Any]:
-        more = {"action_masks": masks} if masked and masks is not None else {}
-        actions: Sequence[Any] = model.predict(observations, deterministic=True, **more)[0]
+    def act(observations: Vector, masks: NDArray[np.bool_] | None) -> Sequence[Any]:
+        keywords = {"action_masks": masks} if masked and masks is not None else {}
+        actions: Sequence[Any] = model.predict(observations, deterministic=True, **keywords)[0]
         return actions
 
     return act
@@ -131,18 +129,20 @@ def make_player(path: Path, limits: SpaceLimits) -> NavigationPolicy:
     """
     model, settings = load_model(path)
     if settings.env != NAVIGATION:
-        raise SettingsError(f"{path}: learned in {settings.env}; only drivers of {NAVIGATION} can play the co_wizard")
+        raise SettingsError(
+            f"{path}: was trained in {settings.env}; only models trained in {NAVIGATION} can play the co_wizard"
+        )
     seconds = settings.env_settings.get("max_seconds", MAX_SECONDS)
-    return NavigationPolicy(Chooser(model, masked=settings.masked), limits, max_seconds=seconds)
+    return NavigationPolicy(GreedyDriver(model, masked=settings.masked), limits, max_seconds=seconds)
 
 
-class Chooser:
-    """Greedy policy of a model in `Navigation-v0`."""
+class GreedyDriver:
+    """Greedy policy of a model for single observations of `Navigation-v0`."""
 
-    def __init__(self, model: Any, *, masked: bool) -> None:
+    def __init__(self, model: Model, *, masked: bool) -> None:
         self._model, self._masked = model, masked
 
     def __call__(self, observation: Vector, mask: NDArray[np.bool_]) -> int:
         """Returns an action of `Navigation-v0`; masked algorithms respect the mask (18,)."""
-        more = {"action_masks": mask} if self._masked else {}
-        return int(self._model.predict(observation, deterministic=True, **more)[0])
+        keywords = {"action_masks": mask} if self._masked else {}
+        return int(self._model.predict(observation, deterministic=True, **keywords)[0])

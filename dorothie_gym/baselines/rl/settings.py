@@ -1,15 +1,19 @@
-"""Settings of reinforcement learning; tuned defaults are in data files."""
+"""Settings of reinforcement learning and of self-play; tuned defaults are in data files."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import resources
-from typing import Any
+from typing import Any, Final, Self, TypeAlias
 
 import yaml
 
 from dorothie_gym.errors import SettingsError
+
+Arguments: TypeAlias = Mapping[str, Any]
+"""Keyword arguments of an environment or an algorithm, of any type; both check them."""
 
 ALGORITHMS: Mapping[str, tuple[str, str]] = {
     "ppo": ("stable_baselines3", "PPO"),
@@ -20,41 +24,38 @@ ALGORITHMS: Mapping[str, tuple[str, str]] = {
 }
 """Algorithms by name: the package and the class."""
 
-CLONING = ("ppo", "maskable_ppo", "a2c")
-"""Algorithms that support a warm start by behaviour cloning."""
+ON_POLICY: Final = ("ppo", "maskable_ppo", "a2c")
+"""Algorithms that learn from rollouts; they support a warm start by behaviour cloning."""
 
-NAVIGATION = "dorothie_gym/Navigation-v0"
+NAVIGATION: Final = "dorothie_gym/Navigation-v0"
 """Id of the environment whose policies can play the Co-Wizard."""
 
-DEFAULT = "default"
-"""Entry of a data file for environments without an own one."""
+DEFAULT: Final = "default"
+"""Entry of a data file for environments without an entry of their own."""
 
-FINAL_RATE = "final_learning_rate"
+FINAL_RATE: Final = "final_learning_rate"
 """Additional parameter: the learning rate falls linearly from `learning_rate` to this."""
+
+RESUMABLE: Final = ("steps", "evaluate_every", "episodes", "workers")
+"""Settings that may change when a run is resumed."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainingSettings:
-    """Settings of a training run.
+class RunSettings:
+    """Settings that reinforcement learning and self-play share.
 
     Attributes:
-        algorithm: one of `ALGORITHMS`.
-        env: id of the environment.
-        env_settings: arguments of the environment.
-        steps: of all environments together.
+        steps: number of steps of all environments together.
         environments: number of parallel environments.
-        workers: processes that step them; 0 steps them in the process that learns.
-        seed: of networks, environments and exploration.
-        evaluate_every: steps between evaluations.
-        episodes: of an evaluation.
+        workers: number of processes that step them; 0 steps them in the process that learns.
+        seed: seed of networks, environments and exploration.
+        evaluate_every: number of steps between evaluations.
+        episodes: number of episodes of an evaluation.
         network: widths of the hidden layers.
-        parameters: of the algorithm, as stable-baselines3 names them; see `FINAL_RATE`.
-        warm_start: folder of a corpus whose Co-Wizards are cloned first; None for none.
+        parameters: parameters of the algorithm, as stable-baselines3 names them; see `FINAL_RATE`.
+        warm_start: folder of a corpus for behaviour cloning before the training; None for none.
     """
 
-    algorithm: str
-    env: str
-    env_settings: Mapping[str, Any] = field(default_factory=dict)
     steps: int = 600_000
     environments: int = 8
     workers: int = 0
@@ -62,50 +63,181 @@ class TrainingSettings:
     evaluate_every: int = 50_000
     episodes: int = 50
     network: tuple[int, ...] = (64, 64)
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Arguments = field(default_factory=dict)
     warm_start: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "network", tuple(self.network))
-        if self.algorithm not in ALGORITHMS:
-            raise SettingsError(f"algorithm is {self.algorithm!r}; it must be one of {', '.join(ALGORITHMS)}")
         for name in ("steps", "environments", "evaluate_every", "episodes"):
             if not isinstance(getattr(self, name), int) or getattr(self, name) < 1:
                 raise SettingsError(f"{name} is {getattr(self, name)!r}; it must be a whole number of at least 1")
         if not 0 <= self.workers <= self.environments:
             raise SettingsError(f"workers is {self.workers}; it must be in 0..{self.environments}, the environments")
-        if self.warm_start is not None and (self.algorithm not in CLONING or self.env != NAVIGATION):
-            raise SettingsError(
-                f"warm_start: {self.algorithm} on {self.env} cannot learn from a corpus; {', '.join(CLONING)} "
-                f"on {NAVIGATION} can"
-            )
         if not 0 <= self.seed < 2**31:
             raise SettingsError(f"seed is {self.seed}; it must be in 0..{2**31 - 1}")
+
+    def as_json(self) -> dict[str, Any]:
+        """Returns the settings in JSON types; the class accepts them as keyword arguments."""
+        return {**asdict(self), "network": list(self.network)}
+
+    def check_resumable(self, begun: Self, folder: object) -> None:
+        """Raises `SettingsError` if a run in a folder was begun with other settings; `RESUMABLE` may differ."""
+        wanted = json.loads(json.dumps(self.as_json()))  # tuples become lists, as in a file
+        same = replace(begun, **{name: getattr(self, name) for name in RESUMABLE}).as_json()
+        for name, value in wanted.items():
+            if same[name] != value:
+                raise SettingsError(
+                    f"{folder}: a run with another {name} is there ({same[name]}, not {value}); "
+                    "choose another folder, or resume with the same settings"
+                )
+
+
+# --- Reinforcement learning -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingSettings(RunSettings):
+    """Settings of reinforcement learning.
+
+    Attributes:
+        algorithm: one of `ALGORITHMS`.
+        env: id of the environment.
+        env_settings: arguments of the environment.
+    """
+
+    algorithm: str
+    env: str
+    env_settings: Arguments = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _check_algorithm(self.algorithm)
+        super().__post_init__()
+        if self.warm_start is not None and (self.algorithm not in ON_POLICY or self.env != NAVIGATION):
+            raise SettingsError(
+                f"warm_start: {self.algorithm} on {self.env} cannot learn from a corpus; {', '.join(ON_POLICY)} "
+                f"on {NAVIGATION} can"
+            )
 
     @property
     def masked(self) -> bool:
         """Whether the algorithm respects the action mask."""
         return self.algorithm == "maskable_ppo"
 
-    def as_json(self) -> dict[str, Any]:
-        """The settings in JSON types; `TrainingSettings(**...)` reads them back."""
-        return {**asdict(self), "network": list(self.network)}
 
-
-def tuned_settings(algorithm: str, env: str, **changes: Any) -> TrainingSettings:
+def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSettings:
     """Returns the tuned settings of an algorithm and an environment, with changes.
 
     Args:
         algorithm: one of `ALGORITHMS`.
-        env: id of the environment; the file's default is taken where there is nothing for it.
+        env: id of the environment; an environment without tuned settings gets the default of the algorithm.
         changes: fields of `TrainingSettings`; None leaves a field as it is.
 
     Raises:
         SettingsError: there is no such algorithm, or a field is out of its range.
     """
-    if algorithm not in ALGORITHMS:
-        raise SettingsError(f"algorithm is {algorithm!r}; it must be one of {', '.join(ALGORITHMS)}")
-    text = resources.files(__package__).joinpath("data", f"{algorithm}.yaml").read_text(encoding="utf-8")
-    entries = yaml.safe_load(text)
+    _check_algorithm(algorithm)
+    entries = _read_data(algorithm)
     tuned = TrainingSettings(algorithm=algorithm, env=env, **entries.get(env, entries[DEFAULT]))
-    return replace(tuned, **{name: value for name, value in changes.items() if value is not None})
+    return replace(tuned, **_given(changes))
+
+
+def _check_algorithm(name: str) -> None:
+    if name not in ALGORITHMS:
+        raise SettingsError(f"algorithm is {name!r}; it must be one of {', '.join(ALGORITHMS)}")
+
+
+def _read_data(name: str) -> dict[str, Any]:
+    text = resources.files(__package__).joinpath("data", f"{name}.yaml").read_text(encoding="utf-8")
+    entries: dict[str, Any] = yaml.safe_load(text)
+    return entries
+
+
+def _given(changes: Arguments) -> dict[str, Any]:
+    return {name: value for name, value in changes.items() if value is not None}
+
+
+# --- Self-play --------------------------------------------------------------------------------------------------------
+
+SELFPLAY: Final = "selfplay"
+"""Name of the algorithm at the command line, and kind of its models in `model.json`."""
+
+ENV_FIELDS: Final = ("town", "storyboard", "traffic", "max_seconds", "progress")
+"""Settings of self-play that are arguments of `SelfPlayEnv`."""
+
+PARTIAL_FIELDS: Final = ("past_environments", "coached_environments")
+"""Settings of self-play: numbers of environments in which not all roles learn."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SelfPlaySettings(RunSettings):
+    """Settings of self-play.
+
+    Attributes:
+        shared: whether one network plays all roles; otherwise each role has its own.
+        town, storyboard, traffic, max_seconds, progress: see `SelfPlayEnv`.
+        coached_environments: number of environments in which Co-Wizard and participant take turns to learn while the
+            other roles are scripted. Agents that learn only from each other have to invent a language, which may
+            differ from that of the corpus (Lowe et al. 2020, "On the interaction between supervision and self-play in
+            emergent communication").
+        past_environments: number of environments in which a past checkpoint plays the Ad-Wizard and does not learn.
+    """
+
+    environments: int = 16
+    evaluate_every: int = 100_000
+    episodes: int = 20
+    network: tuple[int, ...] = (128, 128)
+    shared: bool = False
+    town: str = "brookside"
+    storyboard: str | None = None
+    traffic: str = "light"
+    max_seconds: float = 600.0
+    progress: float = 0.02
+    coached_environments: int = 0
+    past_environments: int = 0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.shared, bool):
+            raise SettingsError(f"shared is {self.shared!r}; it must be true or false")
+        super().__post_init__()
+        left = self.environments - 1
+        for name in PARTIAL_FIELDS:
+            value = getattr(self, name)
+            if not isinstance(value, int) or not 0 <= value <= left:
+                raise SettingsError(f"{name} is {value!r}; it must be in 0..{left}: all roles learn in at least one")
+            left -= value
+
+    @property
+    def env_settings(self) -> dict[str, Any]:
+        """Arguments of `SelfPlayEnv`."""
+        return {name: getattr(self, name) for name in ENV_FIELDS}
+
+    def learner(self, seed: int = 0) -> TrainingSettings:
+        """Returns the settings of a learner; `seed` is that of its network."""
+        return TrainingSettings(
+            algorithm="maskable_ppo", env=SELFPLAY, seed=seed, network=self.network, parameters=self.parameters,
+            steps=self.steps, environments=self.environments, workers=self.workers, episodes=self.episodes,
+            evaluate_every=self.evaluate_every,
+        )  # fmt: skip
+
+
+def selfplay_settings(given: Arguments | None = None, **changes: object) -> SelfPlaySettings:
+    """Returns the default settings with changes.
+
+    Args:
+        given: settings of the user: `shared`, `PARTIAL_FIELDS` and `ENV_FIELDS`.
+        changes: other fields; None leaves a field as it is.
+
+    Raises:
+        SettingsError: there is no such field, or it is out of its range.
+    """
+    given = given or {}
+    settable = ("shared", *PARTIAL_FIELDS, *ENV_FIELDS)
+    unknown = [name for name in given if name not in settable]
+    if unknown:
+        raise SettingsError(f"selfplay has no {unknown[0]!r}; the settings are {', '.join(settable)}")
+    tuned = _read_data(SELFPLAY)
+    found = {**tuned, **_given(changes), **given}
+    for name in set(PARTIAL_FIELDS) - set(given):  # in proportion, where there are fewer environments
+        found[name] = tuned[name] * min(found["environments"], tuned["environments"]) // tuned["environments"]
+    assert set(found) <= {each.name for each in fields(SelfPlaySettings)}
+    return SelfPlaySettings(**found)

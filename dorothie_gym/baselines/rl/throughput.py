@@ -6,18 +6,18 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
 from dorothie_gym.baselines.rl.checkpoint import make_model
-from dorothie_gym.baselines.rl.environments import make_vector
-from dorothie_gym.baselines.rl.settings import TrainingSettings, tuned_settings
-from dorothie_gym.bench.timing import Progress, cores, machine, quiet, rounded
+from dorothie_gym.baselines.rl.environments import make_training_env
+from dorothie_gym.baselines.rl.settings import ON_POLICY, TrainingSettings, tuned_settings
+from dorothie_gym.bench.timing import Figures, Progress, ignore_progress, machine, rounded
 from dorothie_gym.envs.driving_session import DrivingSession
 from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation.instructor import Instructor
+from dorothie_gym.processors import available_processors
 
 TARGET = 1000.0
 """Target of environment steps per second, end to end, on two cores."""
@@ -34,28 +34,28 @@ def measure(
     workers: int | None = None,
     steps: int = 16_384,
     seed: int = 0,
-    progress: Progress = quiet,
-) -> dict[str, Any]:
+    progress: Progress = ignore_progress,
+) -> Figures:
     """Trains for a while in this process, then with worker processes.
 
     Args:
         env: id of the environment.
         algorithm: one that learns from rollouts: ppo, maskable_ppo or a2c.
-        environments: how many play at once.
-        workers: processes for the second run; None for one per core, 0 leaves it out.
-        steps: of a run, after a first rollout that is not counted.
-        seed: of all.
+        environments: number of parallel environments.
+        workers: number of processes of the second run; None for one per processor, 0 leaves the run out.
+        steps: number of steps of a run, after a first rollout that is not counted.
+        seed: seed of networks and environments.
         progress: called with the name of each stage and the share done.
 
     Raises:
         SettingsError: an argument is invalid.
     """
-    if algorithm not in ("ppo", "maskable_ppo", "a2c"):
-        raise SettingsError(f"algorithm is {algorithm!r}; it must be ppo, maskable_ppo or a2c")
+    if algorithm not in ON_POLICY:
+        raise SettingsError(f"algorithm is {algorithm!r}; it must be one of {', '.join(ON_POLICY)}")
     settings = tuned_settings(algorithm, env, environments=environments, seed=seed, workers=0)
     progress("one process", 0.0)
     alone = _run(settings, steps)
-    workers = min(cores(), environments) if workers is None else workers
+    workers = min(available_processors(), environments) if workers is None else workers
     together: dict[str, float] | None = None
     if workers:
         progress(f"{workers} worker processes", 0.5)
@@ -81,44 +81,44 @@ def measure(
 
 
 def _run(settings: TrainingSettings, steps: int) -> dict[str, float]:
-    """Seconds of a run: of all, of rollouts, of the environments' steps, and of the partners in them."""
+    """Returns the durations of a run: total, rollouts, steps of the environments, and partners in these steps [s]."""
     torch.set_num_threads(1)
-    vector = make_vector(settings)
+    vector = make_training_env(settings)
     try:
         with (
             _timed(vector, "step_wait") as step,
-            _timed(Instructor, "instruct") as told,
-            _timed(DrivingSession, "interfere") as played,
+            _timed(Instructor, "instruct") as instructing,
+            _timed(DrivingSession, "interfere") as interfering,
         ):
             model = make_model(settings, vector)
             model.learn(1, log_interval=None)  # the first rollout compiles and warms up
-            for seconds in (step, told, played):
+            for seconds in (step, instructing, interfering):
                 seconds[0] = 0.0
             clock = _Clock()
-            begun, done = time.perf_counter(), model.num_timesteps
+            since, done = time.perf_counter(), model.num_timesteps
             model.learn(steps, callback=clock, reset_num_timesteps=False, log_interval=None)
-            spent, more = time.perf_counter() - begun, model.num_timesteps - done
+            spent, more = time.perf_counter() - since, model.num_timesteps - done
     finally:
         vector.close()
-    scale = steps / more  # whole rollouts are played, so that there are a few more steps
+    scale = steps / more  # only whole rollouts are played: a few more steps than requested
     return {
         "seconds": spent * scale,
         "rollout": clock.seconds * scale,
         "step": step[0] * scale,
-        "partners": (told[0] + played[0]) * scale,
+        "partners": (instructing[0] + interfering[0]) * scale,
     }
 
 
 @contextmanager
-def _timed(holder: Any, name: str) -> Iterator[list[float]]:
+def _timed(holder: object, name: str) -> Iterator[list[float]]:
     """Measures the time spent in a method; yields a list with the running total [s]."""
     seconds, method = [0.0], getattr(holder, name)
     own = name in vars(holder)
 
-    def timed(*arguments: Any, **named: Any) -> Any:
+    def timed(*arguments: object, **keywords: object) -> object:
         start = time.perf_counter()
         try:
-            return method(*arguments, **named)
+            return method(*arguments, **keywords)
         finally:
             seconds[0] += time.perf_counter() - start
 
@@ -133,7 +133,7 @@ def _timed(holder: Any, name: str) -> Iterator[list[float]]:
 
 
 class _Clock(BaseCallback):
-    """Keeps the time of rollouts."""
+    """Measures the duration of rollouts."""
 
     def __init__(self) -> None:
         super().__init__()

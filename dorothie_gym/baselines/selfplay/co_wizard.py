@@ -1,4 +1,4 @@
-"""The Co-Wizard's seat: it sees and drives as in `Navigation-v0`, notes the goal that was named, and can ask."""
+"""Interface of the Co-Wizard, which drives as in `Navigation-v0`, sets the goal that was named, and can ask."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ import enum
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.baselines.selfplay.role_interface import Mask, RoleInterface
-from dorothie_gym.baselines.selfplay.utterance_memory import HeardRemark, listen
+from dorothie_gym.baselines.selfplay.role_interface import LastUtterance, Mask, RoleInterface, last_utterance
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
@@ -38,14 +37,23 @@ from dorothie_gym.policies.navigation.junction_exits import JunctionExits, neare
 from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, NavigationEncoder
 from dorothie_gym.policies.observation_parser import read_landmarks, scalar
 from dorothie_gym.policies.route_progress import CANONICAL
-from dorothie_gym.spaces import CoWizardAction, ExitColumn, Mental, Physical, SpaceLimits, Speech
+from dorothie_gym.spaces import (
+    ActionMapping,
+    CoWizardAction,
+    ExitColumn,
+    Mental,
+    ObservationMapping,
+    Physical,
+    SpaceLimits,
+    Speech,
+)
 
 
 class ExtraAction(enum.IntEnum):
     """Actions of the Co-Wizard besides driving, numbered after `NavigationAction`."""
 
     NOTE_GOAL = len(ACTIONS)
-    """Heads for the place that was named last: the car comes up to it slowly."""
+    """Sets the last-named landmark as goal: the car approaches it slowly."""
     ACKNOWLEDGE = len(ACTIONS) + 1
     ASK_GOAL = len(ACTIONS) + 2
     ASK_WAY = len(ACTIONS) + 3
@@ -62,20 +70,25 @@ _SPEECH: Mapping[int, Speech] = {
 
 @dataclass(frozen=True, kw_only=True)
 class CoWizardMemory:
-    """What the Co-Wizard remembers: the participant's last remark, the place named last, and the one noted.
+    """Memory of the Co-Wizard.
 
-    `told` is the same as a driver of `Navigation-v0` has it; `seen` is what was observed at the decision before.
+    Attributes:
+        heard: the participant's last utterance.
+        named: landmark that was named last.
+        noted: landmark that is set as goal.
+        instruction: last instruction, in the form of `Navigation-v0`.
+        previous: observation of the previous decision.
     """
 
-    heard: HeardRemark | None = None
+    heard: LastUtterance | None = None
     named: LandmarkName | None = None
     noted: LandmarkName | None = None
-    told: HeardInstruction = field(default_factory=HeardInstruction)
-    seen: Mapping[str, Any] | None = None
+    instruction: HeardInstruction = field(default_factory=HeardInstruction)
+    previous: ObservationMapping | None = None
 
 
-class CoWizardInterface(RoleInterface[CoWizardMemory]):
-    """See `NavigationAction` for how it drives, `ExtraAction` for the rest, and `FIELDS` for what it sees."""
+class CoWizardInterface(RoleInterface[CoWizardMemory, CoWizardAction]):
+    """Interface of the Co-Wizard: `NavigationAction` and `ExtraAction` list its actions, `FIELDS` its own features."""
 
     role = Role.CO_WIZARD
     speakers = (Role.PARTICIPANT,)
@@ -85,71 +98,74 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
 
     def __init__(self, town: Town, limits: SpaceLimits) -> None:
         super().__init__(town, limits)
-        self._ways = JunctionExits(town)
-        self._likely = EstimatedActionMask(town, self._ways)
-        self._viewpoint = NavigationEncoder(town, self._ways, EnvConfig.max_seconds)
+        self._exits = JunctionExits(town)
+        self._feasible = EstimatedActionMask(town, self._exits)
+        self._encoder = NavigationEncoder(town, self._exits, EnvConfig.max_seconds)
 
-    def begin(self) -> CoWizardMemory:
+    def initial_memory(self) -> CoWizardMemory:
         """Returns an empty memory."""
         return CoWizardMemory()
 
-    def notice(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> CoWizardMemory:
-        """Listens: what was said is an instruction, and a place that was named is the goal, where the map has it."""
-        told = memory.told if memory.seen is None else memory.told.driven_on(memory.seen, observation)
-        heard, named = listen(observation, Role.PARTICIPANT, memory.heard), memory.named
+    def update(self, observation: ObservationMapping, memory: CoWizardMemory) -> CoWizardMemory:
+        """Stores an utterance as instruction, and a named landmark that is on the map as goal."""
+        instruction = memory.instruction
+        if memory.previous is not None:
+            instruction = instruction.driven_on(memory.previous, observation)
+        heard, named = last_utterance(observation, Role.PARTICIPANT, memory.heard), memory.named
         if heard is not None and heard is not memory.heard:
-            told = replace(told, instruction=self._instruction(observation, heard), driven=0.0)
+            instruction = replace(instruction, instruction=self._instruction(observation, heard), driven=0.0)
             if heard.landmark is not None:
-                named, told = heard.landmark, replace(told, goal=self._place(observation, heard.landmark))
-        return replace(memory, heard=heard, named=named, told=told, seen=observation)
+                named = heard.landmark
+                instruction = replace(instruction, goal=self._place(observation, heard.landmark))
+        return replace(memory, heard=heard, named=named, instruction=instruction, previous=observation)
 
-    def remarks(self, memory: CoWizardMemory) -> tuple[HeardRemark | None, ...]:
+    def utterances(self, memory: CoWizardMemory) -> tuple[LastUtterance | None, ...]:
         """Returns the participant's last utterance."""
         return (memory.heard,)
 
-    def own(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> list[float]:
-        """Returns the observation of `Navigation-v0`, whether a goal is noted, and whether it is the last-named one."""
-        view: list[float] = self._viewpoint.observe(observation, memory.told, ()).tolist()
+    def own_features(self, observation: ObservationMapping, memory: CoWizardMemory) -> list[float]:
+        """Returns the observation of `Navigation-v0`, whether a goal is set, and whether it is the last-named one."""
+        view: list[float] = self._encoder.observe(observation, memory.instruction, ()).tolist()
         noted = memory.noted is not None
         return [*view, float(noted), float(noted and memory.noted is memory.named)]
 
-    def mask(self, observation: Mapping[str, Any], memory: CoWizardMemory) -> Mask:
+    def mask(self, observation: ObservationMapping, memory: CoWizardMemory) -> Mask:
         """Returns the actions that the car would probably carry out and that change something."""
         mask = np.zeros(self.actions, dtype=np.bool_)
-        mask[: len(ACTIONS)] = self._likely.mask(observation)
+        mask[: len(ACTIONS)] = self._feasible.mask(observation)
         mask[ExtraAction.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
         mask[list(_SPEECH)] = scalar(observation, "speaking") <= 0.0
         return mask
 
-    def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
+    def permitted(self, observation: ObservationMapping, masks: ActionMapping) -> Mask:
         """Returns the actions that the car would carry out, or already prepares."""
-        allowed = np.ones(self.actions, dtype=np.bool_)
+        permitted = np.ones(self.actions, dtype=np.bool_)
         for action in ACTIONS[1:]:
-            if prepares(action, observation, self._ways):
+            if prepares(action, observation, self._exits):
                 continue
-            physical = physical_of(action, observation, self._ways)
+            physical = physical_of(action, observation, self._exits)
             assert physical is not None
-            allowed[action] = bool(masks["physical"][physical.action])
+            permitted[action] = bool(masks["physical"][physical.action])
             if physical.action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH):
-                allowed[action] &= bool(masks["angle"][physical.angle + 180])
-        return allowed
+                permitted[action] &= bool(masks["angle"][physical.angle + 180])
+        return permitted
 
     def act(
-        self, choice: int, observation: Mapping[str, Any], memory: CoWizardMemory
+        self, choice: int, observation: ObservationMapping, memory: CoWizardMemory
     ) -> tuple[CoWizardAction, CoWizardMemory]:  # fmt: skip
-        """Drives, speaks or notes."""
+        """Returns the action that drives, speaks or sets the goal."""
         if choice == ExtraAction.NOTE_GOAL and memory.named is not None:
             note = Mental(action=MentalAction.GOAL_UPDATE, goals=(memory.named,))
             return CoWizardAction(mental=note), replace(memory, noted=memory.named)
         if choice in _SPEECH:
             return CoWizardAction(speech=_SPEECH[choice]), memory
-        return CoWizardAction(physical=physical_of(NavigationAction(choice), observation, self._ways)), memory
+        return CoWizardAction(physical=physical_of(NavigationAction(choice), observation, self._exits)), memory
 
-    def choice_of(self, action: CoWizardAction, observation: Mapping[str, Any], memory: CoWizardMemory) -> int:
-        """Returns the number of the driving action, else of the noted goal, else of the utterance."""
+    def choice_of(self, action: CoWizardAction, observation: ObservationMapping, memory: CoWizardMemory) -> int:
+        """Returns the number of the driving action, else of the goal that is set, else of the utterance."""
         physical, mental, speech = action.physical, action.mental, action.speech
         if physical is not None:
-            return self._driven(physical, observation)
+            return self._driving_choice(physical, observation)
         if mental is not None and mental.action is MentalAction.GOAL_UPDATE and memory.named in mental.goals:
             return ExtraAction.NOTE_GOAL
         if speech is None:
@@ -157,14 +173,14 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         same = (choice for choice, known in _SPEECH.items() if known.act.move is speech.act.move)
         return next((k for k in same if _SPEECH[k].act.slots <= speech.act.slots), int(NavigationAction.NOTHING))
 
-    def _driven(self, physical: Physical, observation: Mapping[str, Any]) -> int:
+    def _driving_choice(self, physical: Physical, observation: ObservationMapping) -> int:
         if physical.action is PhysicalAction.SPEED_CHANGE:
             return NavigationAction.FASTER if physical.up else NavigationAction.SLOWER
         if physical.action is PhysicalAction.LIGHT_CHANGE:
             return NavigationAction.LIGHTS
-        return action_of(physical, observation, self._ways)
+        return action_of(physical, observation, self._exits)
 
-    def _instruction(self, observation: Mapping[str, Any], heard: HeardRemark) -> NavigationInstruction:
+    def _instruction(self, observation: ObservationMapping, heard: LastUtterance) -> NavigationInstruction:
         """Returns an utterance as an instruction of `Navigation-v0`; turns refer to the next junction with a choice."""
         exits = observation["exits"][observation["exits"][:, ExitColumn.PRESENT] > 0.0]
         turns = ActionValue.J_TURN in heard.act.slots
@@ -172,14 +188,14 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         sector = None if heard.direction is None else self._sector(observation, CANONICAL[heard.direction])
         return NavigationInstruction(act=heard.act, sector=sector, distance=distance, time=heard.time)
 
-    def _sector(self, observation: Mapping[str, Any], angle: float) -> int:
-        """Returns the sector of the exit nearest to an angle [degrees]."""
-        choice = self._ways.choice_ahead(observation)
-        ways = () if choice is None else self._ways.by_sector(choice)
-        misfits = {k: abs(float(wrap_degrees(way.angle - angle))) for k, way in enumerate(ways) if way is not None}
+    def _sector(self, observation: ObservationMapping, angle: float) -> int:
+        """Returns the sector of the exit whose angle is closest to `angle` [degrees]."""
+        lane = self._exits.choice_ahead(observation)
+        exits = () if lane is None else self._exits.by_sector(lane)
+        misfits = {k: abs(float(wrap_degrees(way.angle - angle))) for k, way in enumerate(exits) if way is not None}
         return min(misfits, key=misfits.__getitem__) if misfits else nearest_sector(angle)
 
-    def _place(self, observation: Mapping[str, Any], name: LandmarkName) -> Place | None:
+    def _place(self, observation: ObservationMapping, name: LandmarkName) -> Place | None:
         """Returns the stopping place of the nearest landmark of a name on the map."""
         x, y, _ = observation["pose"].tolist()
         marks = [mark for mark in read_landmarks(observation, self.town) if mark.name is name]

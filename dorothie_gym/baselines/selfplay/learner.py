@@ -1,13 +1,10 @@
-"""A network that learns for one role or for all: MaskablePPO, fed from outside."""
+"""Network that learns for one role or for all: MaskablePPO on rollouts that the caller collects."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -17,71 +14,68 @@ from numpy.typing import NDArray
 from stable_baselines3.common.logger import Logger, configure
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, Demonstrations, ReportProgress, clone, hold_actor
-from dorothie_gym.baselines.rl.checkpoint import make_model
+from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, Demonstrations, clone, freeze_actor
+from dorothie_gym.baselines.rl.checkpoint import Model, make_model, with_fitting_batches
+from dorothie_gym.baselines.rl.run import OnStage
 from dorothie_gym.baselines.rl.settings import TrainingSettings
-from dorothie_gym.baselines.selfplay.role_interface import Mask, Vector
-from dorothie_gym.baselines.selfplay.role_layout import RoleLayout, pad_masks, pad_vectors
+from dorothie_gym.baselines.selfplay.env import RoleLayout, pad_masks, pad_vectors
+from dorothie_gym.baselines.selfplay.role_interface import Mask
+from dorothie_gym.policies.navigation.observation_vector import Vector
 
-Rows = NDArray[np.int64]
 
-
-class Spaces(gym.Env[Vector, np.int64]):
-    """Nothing but the spaces of a network: it is fed from outside and asks no environment."""
+class SpacesOnlyEnv(gym.Env[Vector, np.int64]):
+    """Spaces of a network that is never stepped by stable-baselines3 itself."""
 
     def __init__(self, size: int, actions: int) -> None:
         self.observation_space = spaces.Box(-1.0, 1.0, (size,), dtype=np.float32)
         self.action_space = spaces.Discrete(actions)
 
 
-def make_network(settings: TrainingSettings, size: int, actions: int, rows: int = 1) -> Any:
-    """Returns a MaskablePPO for vectors (size,), a number of actions, and a number of rows per update.
-
-    Batches get smaller where the rows of a rollout cannot be shared out among them evenly.
-    """
-    parameters = dict(settings.parameters)
-    if {"n_steps", "batch_size"} <= set(parameters):
-        parameters["batch_size"] = math.gcd(parameters["n_steps"] * rows, parameters["batch_size"])
-    vector = DummyVecEnv([partial(Spaces, size, actions)] * rows)
-    return make_model(replace(settings, parameters=parameters), vector)
+def make_network(settings: TrainingSettings, size: int, actions: int, rows: int = 1) -> Model:
+    """Returns a MaskablePPO for vectors (size,), a number of actions, and a number of rows per step."""
+    vector = DummyVecEnv([partial(SpacesOnlyEnv, size, actions)] * rows)
+    return make_model(with_fitting_batches(settings, rows), vector)
 
 
 class Learner:
-    """MaskablePPO for the players of some rows.
+    """MaskablePPO for one or more roles in some environments.
 
     Attributes:
-        name: of the role, or "all".
-        roles: those that it plays, as places in `AGENT_ROLES`.
-        players: of each row the environment and the role (n, 2).
-        size: numbers that the network takes in.
-        actions: of the network.
-        model: of sb3-contrib.
-        cloned: whether it began with what others did; then its actor waits for its critic.
+        name: name of the role, or "all".
+        roles: roles that it plays, as indices in `AGENT_ROLES`.
+        players: environment and role of each row that it learns from (n, 2).
+        padded: whether it plays several roles, whose vectors and masks are then padded.
+        size: length of the network's input.
+        actions: number of the network's actions.
+        model: the MaskablePPO.
+        cloned: whether it starts from behaviour cloning; the actor is then frozen at first, see `freeze_actor`.
     """
 
     def __init__(
         self,
         name: str,
         settings: TrainingSettings,
-        table: RoleLayout,
-        places: Mapping[int, Sequence[int]],
+        layout: RoleLayout,
+        environments: Mapping[int, Sequence[int]],
         log: Path | None,
     ) -> None:
         """Prepares an untrained learner.
 
         Args:
-            name: of the role, or "all".
-            settings: of the network and of MaskablePPO.
-            table: sizes of what the roles take in.
-            places: the environments that it learns in, by role; the network is shared where there are several roles.
+            name: name of the role, or "all".
+            settings: settings of the network and of MaskablePPO.
+            layout: layout of the rows.
+            environments: environments that it learns in, by role; several roles share the network.
             log: folder for TensorBoard, or None.
         """
-        self.name, self.roles = name, tuple(places)
-        self._table, self.padded = table, len(places) > 1
-        self._envs = {role: np.array(envs) for role, envs in places.items()}
-        self.players: Rows = np.array([(env, role) for role, envs in places.items() for env in envs])
-        self.size = table.padded_size if self.padded else table.sizes[self.roles[0]]
-        self.actions = table.padded_actions if self.padded else table.actions[self.roles[0]]
+        self.name, self.roles = name, tuple(environments)
+        self._layout, self.padded = layout, len(environments) > 1
+        self._envs = {role: np.array(envs) for role, envs in environments.items()}
+        self.players: NDArray[np.int64] = np.array(
+            [(env, role) for role, envs in environments.items() for env in envs]
+        )  # fmt: skip
+        self.size = layout.padded_size if self.padded else layout.sizes[self.roles[0]]
+        self.actions = layout.padded_actions if self.padded else layout.actions[self.roles[0]]
         self.model = make_network(settings, self.size, self.actions, len(self.players))
         self.model.set_logger(Logger(None, []) if log is None else configure(str(log), ["tensorboard"]))
         self.cloned = False
@@ -90,10 +84,10 @@ class Learner:
         self._chosen: tuple[torch.Tensor, torch.Tensor, torch.Tensor]
 
     def act(self, rows: Vector) -> NDArray[np.int64]:
-        """Chooses an action for each of `players` (n,) in rows of the table, and keeps what it learns from later."""
-        self._vectors = self._own(rows)
+        """Samples an action for each of `players` (n,) from rows of the layout; `store` needs the same choice."""
+        self._vectors = self._inputs(rows)
         self._masks = np.concatenate(
-            [self._table.masks(rows[envs], role, padded=self.padded) for role, envs in self._envs.items()]
+            [self._layout.masks(rows[envs], role, padded=self.padded) for role, envs in self._envs.items()]
         )
         self.model.policy.set_training_mode(False)
         with torch.no_grad():
@@ -101,50 +95,50 @@ class Learner:
         actions: NDArray[np.int64] = self._chosen[0].numpy()
         return actions
 
-    def look_beyond(self, rewards: NDArray[np.float32], ends: Vector, cut: NDArray[np.bool_]) -> None:
-        """Adds what would still have come to the rewards of sessions that time has cut off.
+    def bootstrap(self, rewards: NDArray[np.float32], ends: Vector, truncated: NDArray[np.bool_]) -> None:
+        """Adds the estimated value of the last state to the rewards of truncated sessions.
 
         Args:
-            rewards: of all environments and roles (N, 3); is changed.
-            ends: the last row of each environment.
-            cut: which environments were cut off (N,).
+            rewards: rewards of all environments and roles (N, 3); changed in place.
+            ends: last row of each environment.
+            truncated: whether an environment was truncated (N,).
         """
-        envs, roles = self.players[cut[self.players[:, 0]]].T
-        beyond = self.values(ends).numpy()[cut[self.players[:, 0]]]
-        rewards[envs, roles] += self.model.gamma * beyond
+        own = truncated[self.players[:, 0]]
+        envs, roles = self.players[own].T
+        rewards[envs, roles] += self.model.gamma * self.values(ends).numpy()[own]
 
-    def learn_from(self, rewards: NDArray[np.float32], starts: NDArray[np.bool_]) -> None:
-        """Stores the last choice with its result.
+    def store(self, rewards: NDArray[np.float32], starts: NDArray[np.bool_]) -> None:
+        """Adds the last choice of `act` and its rewards to the rollout.
 
         Args:
-            rewards: of all environments and roles (N, 3).
+            rewards: rewards of all environments and roles (N, 3).
             starts: whether the choice was the first of a session (N,).
         """
-        actions, values, likely = self._chosen
+        actions, values, log_likelihoods = self._chosen
         envs, roles = self.players.T
         self.model.rollout_buffer.add(
-            self._vectors, actions.numpy().reshape(-1, 1), rewards[envs, roles], starts[envs], values, likely,
+            self._vectors, actions.numpy().reshape(-1, 1), rewards[envs, roles], starts[envs], values, log_likelihoods,
             action_masks=self._masks,
         )  # fmt: skip
 
     def values(self, rows: Vector) -> torch.Tensor:
         """Returns the estimated values for each of `players` (n,)."""
         with torch.no_grad():
-            found: torch.Tensor = self.model.policy.predict_values(torch.from_numpy(self._own(rows))).flatten()
+            found: torch.Tensor = self.model.policy.predict_values(torch.from_numpy(self._inputs(rows))).flatten()
         return found
 
     def update(self, rows: Vector, starts: NDArray[np.bool_], steps: int, total: int) -> None:
-        """Learns from what was kept, and forgets it.
+        """Learns from the rollout, and clears it.
 
         Args:
-            rows: what comes next in all environments.
-            starts: whether that is the first of a session (N,).
-            steps: done so far; `total` in the end.
-            total: see `steps`.
+            rows: rows after the rollout, of all environments.
+            starts: whether these are the first of a session (N,).
+            steps: number of steps done so far.
+            total: number of steps of the whole training.
         """
         model = self.model
         if self.cloned:
-            hold_actor(model.policy, steps)
+            freeze_actor(model.policy, steps)
         model.rollout_buffer.compute_returns_and_advantage(self.values(rows), starts[self.players[:, 0]])
         model.num_timesteps = steps
         model._update_current_progress_remaining(steps, total)
@@ -153,18 +147,19 @@ class Learner:
 
     def clone(
         self,
-        shown: Mapping[int, Demonstrations],
+        training: Mapping[int, Demonstrations],
         held_out: Mapping[int, Demonstrations],
         seed: int,
-        tell: ReportProgress,
+        on_stage: OnStage,
     ) -> CloningResult:
-        """Learns what others did in its roles: lessons by role, some to learn from and some that are held out."""
-        return clone(self.model, self._merged(shown), self._merged(held_out), seed, tell)
+        """Clones the decisions of its roles, see `behaviour_cloning.clone`; both mappings hold decisions by role."""
+        return clone(self.model, self._merged(training), self._merged(held_out), seed, on_stage)
 
-    def _merged(self, lessons: Mapping[int, Demonstrations]) -> Demonstrations:
+    def _merged(self, by_role: Mapping[int, Demonstrations]) -> Demonstrations:
+        """Returns the decisions of its roles, padded if there are several."""
         if not self.padded:
-            return lessons[self.roles[0]]
-        own = [lessons[role] for role in self.roles]
+            return by_role[self.roles[0]]
+        own = [by_role[role] for role in self.roles]
         vectors = [
             pad_vectors(part.observations.numpy(), role, self.size) for role, part in zip(self.roles, own, strict=True)
         ]
@@ -174,13 +169,14 @@ class Learner:
             torch.cat([part.actions for part in own]),
         )  # fmt: skip
 
-    def _own(self, rows: Vector) -> Vector:
-        parts = [self._table.vectors(rows[envs], role, padded=self.padded) for role, envs in self._envs.items()]
+    def _inputs(self, rows: Vector) -> Vector:
+        """Returns the input vectors of `players` (n, size)."""
+        parts = [self._layout.vectors(rows[envs], role, padded=self.padded) for role, envs in self._envs.items()]
         return np.concatenate(parts)
 
 
-def draw(model: Any, vectors: Vector, masks: Mask, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Draws actions (n,) from what a network takes for good, for vectors (n, m) and masks (n, k)."""
+def sample_actions(model: Model, vectors: Vector, masks: Mask, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Samples actions (n,) from a network's distribution for vectors (n, m) and masks (n, k)."""
     model.policy.set_training_mode(False)
     with torch.no_grad():
         distribution = model.policy.get_distribution(torch.from_numpy(vectors), action_masks=masks)

@@ -1,89 +1,147 @@
-"""The game that learners play with one another: sessions in lockstep, everybody's choices at once."""
+"""Rollouts of self-play: sessions in lockstep, the learners that play them, and past Ad-Wizards as opponents."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import Final
 
-import gymnasium as gym
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
 from stable_baselines3.common.utils import set_random_seed
 
-from dorothie_gym.baselines.rl.environments import shared_out
-from dorothie_gym.baselines.selfplay.env import SelfPlayEnv
-from dorothie_gym.baselines.selfplay.learner import Learner, draw, make_network
-from dorothie_gym.baselines.selfplay.opponent_pool import OpponentPool
-from dorothie_gym.baselines.selfplay.role_layout import RoleLayout
-from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
+from dorothie_gym.baselines.rl.checkpoint import Model
+from dorothie_gym.baselines.rl.settings import Arguments, SelfPlaySettings
+from dorothie_gym.baselines.rl.vector_env import make_vector_env
+from dorothie_gym.baselines.selfplay.env import RoleLayout, SelfPlayEnv
+from dorothie_gym.baselines.selfplay.learner import Learner, make_network, sample_actions
+from dorothie_gym.errors import ModelFileError
 from dorothie_gym.ontology import AGENT_ROLES, Role
 
-AD_WIZARD = AGENT_ROLES.index(Role.AD_WIZARD)
-TEAM = (Role.CO_WIZARD, Role.PARTICIPANT)
-ALL = "all"
+AD_WIZARD: Final = AGENT_ROLES.index(Role.AD_WIZARD)
+TEAM: Final = (Role.CO_WIZARD, Role.PARTICIPANT)
+
+ALL_ROLES: Final = "all"
 """Name of the learner that plays all roles."""
 
 
-class SelfPlayEnvFactory:
-    """Makes an environment of a run; can be sent to another process."""
+# --- Opponents --------------------------------------------------------------------------------------------------------
 
-    def __init__(self, settings: Mapping[str, Any], scripted: Collection[Role] = ()) -> None:
+POOL_FILE: Final = "past.safetensors"
+
+POOL_SIZE: Final = 5
+"""Largest number of checkpoints in the pool; the latest are kept."""
+
+
+class OpponentPool:
+    """Past Ad-Wizard checkpoints, against overfitting to the present one."""
+
+    def __init__(self) -> None:
+        self._weights: list[dict[str, torch.Tensor]] = []
+
+    def __len__(self) -> int:
+        return len(self._weights)
+
+    def add(self, model: Model) -> None:
+        """Adds the present weights of a model."""
+        weights = {name: value.detach().clone() for name, value in model.policy.state_dict().items()}
+        self._weights = [*self._weights, weights][-POOL_SIZE:]
+
+    def load_random(self, model: Model, rng: np.random.Generator) -> None:
+        """Loads a random member of the pool, which must not be empty, into a model."""
+        model.policy.load_state_dict(self._weights[int(rng.integers(len(self._weights)))])
+
+    def save(self, folder: Path) -> None:
+        """Writes the pool into a folder."""
+        flat = {
+            f"{k}/{name}": value.contiguous()
+            for k, weights in enumerate(self._weights)
+            for name, value in weights.items()
+        }
+        save_file(flat, folder / POOL_FILE)
+
+    def load(self, folder: Path) -> None:
+        """Reads a saved pool; raises `ModelFileError` if it cannot be read."""
+        path = folder / POOL_FILE
+        try:
+            tensors = load_file(path)
+        except (SafetensorError, OSError) as error:
+            raise ModelFileError(f"{path}: cannot be read ({error})") from None
+        self._weights = [{} for _ in {name.split("/", 1)[0] for name in tensors}]
+        for name, value in tensors.items():
+            number, key = name.split("/", 1)
+            self._weights[int(number)][key] = value
+
+
+# --- Rollouts ---------------------------------------------------------------------------------------------------------
+
+
+class SelfPlayEnvFactory:
+    """Picklable factory of a `SelfPlayEnv`."""
+
+    def __init__(self, settings: Arguments, scripted: Collection[Role] = ()) -> None:
         self._settings, self._scripted = dict(settings), tuple(scripted)
 
-    def __call__(self) -> gym.Env[Any, Any]:
+    def __call__(self) -> SelfPlayEnv:
         """Returns a new environment."""
         return SelfPlayEnv(**self._settings, scripted=self._scripted)
 
 
 class MultiAgentRollout:
-    """Sessions, the learners in them, and past Ad-Wizards.
+    """Collects rollouts of all roles, and updates the learners with them.
 
     Attributes:
-        table: what is at the seats.
+        layout: layout of the rows.
         learners: one for each role, or one for all.
-        past: earlier Ad-Wizards, which play in the last few environments.
-        returns: sums of rewards of the sessions without scripted roles that have ended since `begin`, by role (n, 3).
+        opponents: past Ad-Wizards, which play in the last few environments.
+        returns: sums of rewards of the sessions without scripted roles that ended since `reset`, by role (n, 3).
     """
 
     def __init__(self, settings: SelfPlaySettings, log: Path | None, ray: str | None = None) -> None:
-        """Prepares a game; raises `SettingsError` where nothing can be played with the settings.
+        """Prepares environments and learners; raises `SettingsError` if the settings are invalid.
 
         Args:
-            settings: what is played, and with which networks.
+            settings: settings of the training.
             log: folder for TensorBoard, or None.
-            ray: address of a Ray cluster that steps the sessions; None: this machine does.
+            ray: address of a Ray cluster that steps the sessions; None for this machine.
         """
         self._settings = settings
         count = settings.environments
-        maker = SelfPlayEnvFactory(settings.env_settings)
-        template = SelfPlayEnv(**settings.env_settings)  # says in this process what is wrong with the settings
-        self.table: RoleLayout = template.table
+        template = SelfPlayEnv(**settings.env_settings)  # reports invalid settings in this process
+        self.layout: RoleLayout = template.layout
         coached = _coached(settings)
-        self._together = np.array([env not in coached for env in range(count)])
-        places = {
+        self._unscripted = np.array([env not in coached for env in range(count)])
+        environments = {
             k: [env for env in range(count) if role not in coached.get(env, ())] for k, role in enumerate(AGENT_ROLES)
         }
-        del places[AD_WIZARD][len(places[AD_WIZARD]) - settings.past_environments :]
-        shares = {ALL: places} if settings.shared else {str(AGENT_ROLES[k]): {k: envs} for k, envs in places.items()}
+        del environments[AD_WIZARD][len(environments[AD_WIZARD]) - settings.past_environments :]
+        by_learner = (
+            {ALL_ROLES: environments}
+            if settings.shared
+            else {str(AGENT_ROLES[k]): {k: envs} for k, envs in environments.items()}
+        )
         self.learners = [
-            Learner(name, settings.learner(settings.seed + k), self.table, own, None if log is None else log / name)
-            for k, (name, own) in enumerate(shares.items())
+            Learner(name, settings.learner(settings.seed + k), self.layout, own, None if log is None else log / name)
+            for k, (name, own) in enumerate(by_learner.items())
         ]
         for learner in self.learners:
             learner.cloned = settings.warm_start is not None
-        self.past = OpponentPool()
-        against = self.learners[-1]
-        self._opponent = make_network(settings.learner(), against.size, against.actions)
-        self._old = np.arange(count - settings.past_environments, count)  # where past Ad-Wizards play
-        self._vector = shared_out(maker, count, settings.workers, ray)
+        self.opponents = OpponentPool()
+        ad_wizard = self.learners[-1]
+        self._opponent = make_network(settings.learner(), ad_wizard.size, ad_wizard.actions)
+        self._opponent_envs = np.arange(count - settings.past_environments, count)
+        make = SelfPlayEnvFactory(settings.env_settings)
+        self._vector = make_vector_env(make, count, settings.workers, ray)
         for env, scripted in coached.items():
             self._vector.set_attr("scripted", scripted, indices=[env])
         self._rng = np.random.default_rng()
         self.returns: list[NDArray[np.float64]] = []
 
-    def begin(self, steps: int) -> None:
-        """Begins new sessions in all environments; all chance from here on follows from the seed and from `steps`."""
+    def reset(self, steps: int) -> None:
+        """Starts new sessions in all environments, and seeds all random streams from the seed and `steps`."""
         source = np.random.SeedSequence([self._settings.seed, steps])
         learning, playing, opposing = (int(word) >> 2 for word in source.generate_state(3))
         set_random_seed(learning)
@@ -95,16 +153,16 @@ class MultiAgentRollout:
         self.returns = []
 
     def play(self, steps: int) -> int:
-        """Plays a rollout and lets everybody learn from it.
+        """Plays a rollout and updates all learners with it.
 
         Args:
-            steps: done before.
+            steps: number of steps done before.
 
         Returns:
-            The steps done then.
+            The number of steps done after the rollout.
         """
-        if len(self.past):
-            self.past.revive(self._opponent, self._rng)
+        if len(self.opponents):
+            self.opponents.load_random(self._opponent, self._rng)
         length = int(self.learners[0].model.n_steps)
         for _ in range(length):
             self._step()
@@ -115,11 +173,11 @@ class MultiAgentRollout:
         return steps
 
     def close(self) -> None:
-        """Ends the environments."""
+        """Closes the environments."""
         self._vector.close()
 
-    def actor(self, role: int) -> Learner:
-        """Returns the learner of a role, given by its place in `AGENT_ROLES`."""
+    def learner_of(self, role: int) -> Learner:
+        """Returns the learner of a role, given by its index in `AGENT_ROLES`."""
         return next(learner for learner in self.learners if role in learner.roles)
 
     def _step(self) -> None:
@@ -127,30 +185,31 @@ class MultiAgentRollout:
         for learner in self.learners:
             envs, roles = learner.players.T
             actions[envs, roles] = learner.act(self._rows)
-        if len(self._old):
-            actions[self._old, AD_WIZARD] = self._play_past()
-        self._rows, _, dones, infos = self._vector.step(actions)
+        if len(self._opponent_envs):
+            actions[self._opponent_envs, AD_WIZARD] = self._opponent_actions()
+        rows, _, dones, infos = self._vector.step(actions)
+        self._rows = np.asarray(rows)
         rewards = np.stack([info["rewards"] for info in infos])
         self._sums += rewards
-        cut = np.array([bool(info.get("TimeLimit.truncated", False)) for info in infos])
-        if cut.any():
+        truncated = np.array([bool(info.get("TimeLimit.truncated", False)) for info in infos])
+        if truncated.any():
             ends = self._rows.copy()
-            for k in np.flatnonzero(cut):
+            for k in np.flatnonzero(truncated):
                 ends[k] = infos[k]["terminal_observation"]
             for learner in self.learners:
-                learner.look_beyond(rewards, ends, cut)
+                learner.bootstrap(rewards, ends, truncated)
         for learner in self.learners:
-            learner.learn_from(rewards, self._starts)
-        self.returns += list(self._sums[dones & self._together])
+            learner.store(rewards, self._starts)
+        self.returns += list(self._sums[dones & self._unscripted])
         self._sums[dones] = 0.0
         self._starts = dones
 
-    def _play_past(self) -> NDArray[np.int64]:
-        """Returns the actions of past Ad-Wizards; random ones before the pool has a member."""
+    def _opponent_actions(self) -> NDArray[np.int64]:
+        """Returns the actions of past Ad-Wizards; those of an untrained network while the pool is empty."""
         padded = self._settings.shared
-        rows = self._rows[self._old]
-        vectors = self.table.vectors(rows, AD_WIZARD, padded=padded)
-        return draw(self._opponent, vectors, self.table.masks(rows, AD_WIZARD, padded=padded), self._rng)
+        rows = self._rows[self._opponent_envs]
+        vectors = self.layout.vectors(rows, AD_WIZARD, padded=padded)
+        return sample_actions(self._opponent, vectors, self.layout.masks(rows, AD_WIZARD, padded=padded), self._rng)
 
     def _log(self, learner: Learner, steps: int) -> None:
         logger = learner.model.logger

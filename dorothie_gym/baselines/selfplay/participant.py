@@ -5,21 +5,24 @@ from __future__ import annotations
 import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from dorothie_gym.baselines.selfplay.role_interface import Mask, RoleInterface, one_hot
-from dorothie_gym.baselines.selfplay.utterance_memory import HeardRemark, listen
+from dorothie_gym.baselines.selfplay.role_interface import (
+    LastUtterance,
+    Mask,
+    RoleInterface,
+    last_utterance,
+    one_hot,
+)
 from dorothie_gym.dialogue import Direction, load_lexicon, understand
 from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
+from dorothie_gym.policies.navigation.observation_vector import CLOSE_UNIT, DISTANCE_UNIT, TOWN_UNIT
 from dorothie_gym.policies.observation_parser import read_landmarks, read_subgoals, scalar
 from dorothie_gym.policies.route_progress import RouteProgress
-from dorothie_gym.spaces import ParticipantAction, Speech
-
-ACROSS, FAR, CLOSE = 500.0, 100.0, 10.0
-"""Scales of distances [m]."""
+from dorothie_gym.spaces import ActionMapping, ObservationMapping, ParticipantAction, Speech
 
 _DIRECTIONS = tuple(Direction)
 _ENTRIES = (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT, LaneEntry.U_TURN)
@@ -38,7 +41,7 @@ class ParticipantPhrase(enum.IntEnum):
     STOP = 7
     GO_ON = 8
     NAME_GOAL = 9
-    """Names the next place to go to."""
+    """Names the landmark of the current subgoal."""
     YES = 10
     NO = 11
 
@@ -73,23 +76,30 @@ _PHRASES: Mapping[tuple[ActionValue, Direction | None], ParticipantPhrase] = {
 
 @dataclass(frozen=True, kw_only=True)
 class SubgoalRoute:
-    """The way to the subgoal that is next; `goal` is a row of the landmarks."""
+    """Current subgoal and the route to it.
+
+    Attributes:
+        subgoal: row of the subgoal in `subgoals`.
+        landmark: row of its landmark in `landmarks`.
+        name: name of the landmark.
+        route: route to the landmark and the progress on it.
+    """
 
     subgoal: int
-    goal: int
+    landmark: int
     name: LandmarkName
-    journey: RouteProgress
+    route: RouteProgress
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParticipantMemory:
-    """Memory of the participant: the Co-Wizard's last utterance, and the route to the current subgoal."""
+    """Memory of the participant: the Co-Wizard's last utterance, and the current subgoal with its route."""
 
-    heard: HeardRemark | None = None
-    errand: SubgoalRoute | None = None
+    heard: LastUtterance | None = None
+    target: SubgoalRoute | None = None
 
 
-class ParticipantInterface(RoleInterface[ParticipantMemory]):
+class ParticipantInterface(RoleInterface[ParticipantMemory, ParticipantAction]):
     """Interface of the participant; `ParticipantPhrase` lists its utterances."""
 
     role = Role.PARTICIPANT
@@ -98,58 +108,57 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
     actions = len(ParticipantPhrase)
     own_size: ClassVar[int] = 4 + 2 + len(Direction) + 1 + len(_ENTRIES)
 
-    def begin(self) -> ParticipantMemory:
+    def initial_memory(self) -> ParticipantMemory:
         """Returns an empty memory."""
         return ParticipantMemory()
 
-    def notice(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> ParticipantMemory:
-        """Takes the first errand that may be done now, and follows the way to it."""
-        heard = listen(observation, Role.CO_WIZARD, memory.heard)
+    def update(self, observation: ObservationMapping, memory: ParticipantMemory) -> ParticipantMemory:
+        """Stores the last utterance, and follows the route to the first subgoal that is open and allowed."""
+        heard = last_utterance(observation, Role.CO_WIZARD, memory.heard)
         place = int(observation["lane"]), scalar(observation, "station")
-        return ParticipantMemory(heard=heard, errand=self._errand(observation, place, memory.errand))
+        return ParticipantMemory(heard=heard, target=self._target(observation, place, memory.target))
 
-    def remarks(self, memory: ParticipantMemory) -> tuple[HeardRemark | None, ...]:
+    def utterances(self, memory: ParticipantMemory) -> tuple[LastUtterance | None, ...]:
         """Returns the Co-Wizard's last utterance."""
         return (memory.heard,)
 
-    def own(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> list[float]:
+    def own_features(self, observation: ObservationMapping, memory: ParticipantMemory) -> list[float]:
         """Returns the remaining distance, the direction of the next turn, and the next lane change or U-turn."""
-        errand = memory.errand
-        if errand is None:
+        if memory.target is None:
             return [0.0] * self.own_size
-        station, journey = scalar(observation, "station"), errand.journey
-        left = journey.left(station)
-        crossing, manoeuvre = journey.next_crossing(self.town, station), journey.next_manoeuvre(station)
+        station, route = scalar(observation, "station"), memory.target.route
+        left = route.left(station)
+        crossing, manoeuvre = route.next_crossing(self.town, station), route.next_manoeuvre(station)
         turn = None if crossing is None else _DIRECTIONS.index(crossing.direction)
         entry = None if manoeuvre is None or manoeuvre[0] not in _ENTRIES else _ENTRIES.index(manoeuvre[0])
         return [
-            1.0, _share(left, ACROSS), _share(left, FAR), _share(left, CLOSE),
-            float(crossing is not None), 0.0 if crossing is None else _share(crossing.distance, FAR),
+            1.0, _scaled(left, TOWN_UNIT), _scaled(left, DISTANCE_UNIT), _scaled(left, CLOSE_UNIT),
+            float(crossing is not None), 0.0 if crossing is None else _scaled(crossing.distance, DISTANCE_UNIT),
             *one_hot(turn, len(_DIRECTIONS)),
-            0.0 if manoeuvre is None else _share(manoeuvre[1], FAR), *one_hot(entry, len(_ENTRIES)),
+            0.0 if manoeuvre is None else _scaled(manoeuvre[1], DISTANCE_UNIT), *one_hot(entry, len(_ENTRIES)),
         ]  # fmt: skip
 
-    def mask(self, observation: Mapping[str, Any], memory: ParticipantMemory) -> Mask:
-        """Returns the possible utterances: none while speaking; naming a goal only if there is one."""
+    def mask(self, observation: ObservationMapping, memory: ParticipantMemory) -> Mask:
+        """Returns the possible utterances: none while speaking; the name of a landmark only if there is a subgoal."""
         mask = np.full(self.actions, scalar(observation, "speaking") <= 0.0)
         mask[ParticipantPhrase.NOTHING] = True
-        mask[ParticipantPhrase.NAME_GOAL] &= memory.errand is not None
+        mask[ParticipantPhrase.NAME_GOAL] &= memory.target is not None
         return mask
 
-    def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
+    def permitted(self, observation: ObservationMapping, masks: ActionMapping) -> Mask:
         """Returns all actions: the environment never masks speech."""
         return np.ones(self.actions, dtype=np.bool_)
 
     def act(
-        self, choice: int, observation: Mapping[str, Any], memory: ParticipantMemory
+        self, choice: int, observation: ObservationMapping, memory: ParticipantMemory
     ) -> tuple[ParticipantAction, ParticipantMemory]:  # fmt: skip
-        """Says a phrase."""
-        return ParticipantAction(speech=_speech(ParticipantPhrase(choice), memory.errand)), memory
+        """Returns the action that says a phrase."""
+        return ParticipantAction(speech=_speech(ParticipantPhrase(choice), memory.target)), memory
 
     def choice_of(
-        self, action: ParticipantAction, observation: Mapping[str, Any], memory: ParticipantMemory
+        self, action: ParticipantAction, observation: ObservationMapping, memory: ParticipantMemory
     ) -> int:  # fmt: skip
-        """Returns the utterance with the same act and direction; a named place must be the next one."""
+        """Returns the phrase with the same act and direction; a landmark must be that of the current subgoal."""
         speech = action.speech
         if speech is None:
             return ParticipantPhrase.NOTHING
@@ -160,37 +169,42 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
         for value in actions:
             if phrase := _PHRASES.get((value, direction)) or _PHRASES.get((value, None)):
                 return phrase
-        named = memory.errand is not None and memory.errand.name in speech.act.slots
+        named = memory.target is not None and memory.target.name in speech.act.slots
         return ParticipantPhrase.NAME_GOAL if named else ParticipantPhrase.NOTHING
 
-    def _errand(self, observation: Mapping[str, Any], place: Place, errand: SubgoalRoute | None) -> SubgoalRoute | None:
+    def _target(
+        self, observation: ObservationMapping, place: Place, previous: SubgoalRoute | None
+    ) -> SubgoalRoute | None:
+        """Returns the previous target while its subgoal is open, else the first open subgoal; None without one."""
         subgoals = read_subgoals(observation)
-        if errand is not None:
-            now = subgoals[errand.subgoal]
-            if now.open and now.allowed and now.landmark == errand.goal:
-                return replace(errand, journey=self._followed(errand.journey, place))
+        if previous is not None:
+            now = subgoals[previous.subgoal]
+            if now.open and now.allowed and now.landmark == previous.landmark:
+                return replace(previous, route=self._followed(previous.route, place))
         landmarks = {mark.row: mark for mark in read_landmarks(observation, self.town)}
         for subgoal in subgoals:
             mark = landmarks.get(subgoal.landmark)
             if subgoal.open and subgoal.allowed and mark is not None:
-                journey = RouteProgress.plan(self.town, place, mark.place)
-                return SubgoalRoute(subgoal=subgoal.index, goal=mark.row, name=mark.name, journey=journey)
+                route = RouteProgress.plan(self.town, place, mark.place)
+                return SubgoalRoute(subgoal=subgoal.index, landmark=mark.row, name=mark.name, route=route)
         return None
 
-    def _followed(self, journey: RouteProgress, place: Place) -> RouteProgress:
-        journey = journey.followed(self.town, *place)
-        return journey.replanned(self.town, place) if journey.lost(place[1]) else journey
+    def _followed(self, route: RouteProgress, place: Place) -> RouteProgress:
+        """Returns the progress on a route at a place; plans another route where the car has left it."""
+        route = route.followed(self.town, *place)
+        return route.replanned(self.town, place) if route.lost(place[1]) else route
 
 
-def _speech(phrase: ParticipantPhrase, errand: SubgoalRoute | None) -> Speech | None:
+def _speech(phrase: ParticipantPhrase, target: SubgoalRoute | None) -> Speech | None:
     if phrase in _INSTRUCTIONS:
         action, text = _INSTRUCTIONS[phrase]
         return Speech(act=DialogueAct.of(DialogueMove.INSTRUCT, action), text=text)
-    if phrase is ParticipantPhrase.NAME_GOAL and errand is not None:
-        name = load_lexicon().forms(errand.name, "say")[0]
-        return Speech(act=DialogueAct.of(DialogueMove.INSTRUCT, errand.name), text=f"We need to go to {name}.")
+    if phrase is ParticipantPhrase.NAME_GOAL and target is not None:
+        name = load_lexicon().forms(target.name, "say")[0]
+        return Speech(act=DialogueAct.of(DialogueMove.INSTRUCT, target.name), text=f"We need to go to {name}.")
     return _ANSWERS.get(phrase)
 
 
-def _share(metres: float, of: float) -> float:
-    return max(min(metres / of, 1.0), -1.0)
+def _scaled(metres: float, unit: float) -> float:
+    """Returns a distance in a unit, limited to -1..1."""
+    return max(min(metres / unit, 1.0), -1.0)

@@ -4,42 +4,108 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.baselines.selfplay.utterance_memory import HEARD_SIZE, HeardRemark
+from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies.observation_parser import scalar
-from dorothie_gym.spaces import RoleAction, SpaceLimits, observation_space
+from dorothie_gym.ontology import LABELS, DialogueAct, DialogueMove, LandmarkName, Role
+from dorothie_gym.policies.navigation.observation_vector import Vector
+from dorothie_gym.policies.observation_parser import heard_utterance, scalar
+from dorothie_gym.spaces import (
+    ActionMapping,
+    Observation,
+    ObservationMapping,
+    RoleAction,
+    SpaceLimits,
+    observation_space,
+)
 from dorothie_gym.wrappers.flatten import FlatObservations
 
-Vector: TypeAlias = NDArray[np.float32]
 Mask: TypeAlias = NDArray[np.bool_]
 Memory = TypeVar("Memory")
+Action = TypeVar("Action", bound=RoleAction)
 
-FAR = 1000.0
-"""Quantity that the logarithmic squashing maps to 1."""
+SQUASH_LIMIT: Final = 1000.0
+"""Magnitude that `squashed` maps to 1."""
 
-_PLACES: Final = {"landmarks": 1, "objects": 1, "guesses": 1, "props": 1, "waypoints": 0}
-"""Tables with places, and the column of x; that of y is the next."""
+UTTERANCE_AGE_UNIT: Final = 20.0
+"""Age of an utterance at which its age feature reaches 1 [s]."""
+
+UTTERANCE_SIZE: Final = len(DialogueMove) + len(LABELS) + len(Direction) + 1
+"""Size of the features of an utterance: one-hot move, slots, one-hot direction, age."""
+
+_POSITION_COLUMNS: Final = {"landmarks": 1, "objects": 1, "guesses": 1, "props": 1, "waypoints": 0}
+"""Tables with positions, and the column of x in each; the column of y is the next."""
 
 
-class RoleInterface(ABC, Generic[Memory]):
+@dataclass(frozen=True, kw_only=True)
+class LastUtterance:
+    """Last utterance that a role heard from a speaker.
+
+    Attributes:
+        act: last dialogue act of the utterance.
+        direction: direction that the words mention, or None.
+        time: time at which it was heard [s].
+    """
+
+    act: DialogueAct
+    direction: Direction | None
+    time: float
+
+    @property
+    def landmark(self) -> LandmarkName | None:
+        """Landmark that the utterance names."""
+        found = (value for value in self.act.ordered if isinstance(value, LandmarkName))
+        return next((name for name in found if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED)), None)
+
+    def features(self, now: float) -> Vector:
+        """Returns the features of the utterance (UTTERANCE_SIZE,) in 0..1, at a time [s]."""
+        values = self._content.copy()
+        values[-1] = min((now - self.time) / UTTERANCE_AGE_UNIT, 1.0)
+        return values
+
+    @cached_property
+    def _content(self) -> Vector:
+        """Features without the age."""
+        move = [float(int(self.act.move) == k) for k in range(len(DialogueMove))]
+        direction = [float(self.direction is known) for known in Direction]
+        return np.array([*move, *self.act.vector, *direction, 0.0], dtype=np.float32)
+
+
+def last_utterance(
+    observation: ObservationMapping, speaker: Role, previous: LastUtterance | None
+) -> LastUtterance | None:
+    """Returns the last utterance of a speaker: an utterance is observed for one decision only.
+
+    Args:
+        observation: observation of the listener.
+        speaker: role that speaks.
+        previous: last utterance before this observation.
+    """
+    said = heard_utterance(observation, speaker)
+    if said is None or not said.acts:
+        return previous
+    return LastUtterance(act=said.acts[-1], direction=said.words.direction, time=scalar(observation, "time"))
+
+
+class RoleInterface(ABC, Generic[Memory, Action]):
     """Input vector and discrete actions of a role in a town.
 
-    The vector has numbers of the role's observation (`FlatObservations`) with places in the car's own frame (ahead
-    and to the right), squashed; then the last remarks that it heard; then what the role makes of it all. Seats are
-    stateless: what a role remembers is handed over and back.
+    The input vector has three parts: fields of the role's observation (`FlatObservations`), squashed, with positions in
+    the frame of the car (ahead, right); the last utterances that the role heard; and features that the role computes
+    itself. Interfaces are stateless: the memory of a role is passed in and handed back.
 
     Attributes:
         role: the role.
-        actions: how many there are; 0 does nothing.
-        size: numbers of the vector.
+        actions: number of actions; action 0 does nothing.
+        size: length of the input vector.
     """
 
     role: ClassVar[Role]
@@ -47,11 +113,11 @@ class RoleInterface(ABC, Generic[Memory]):
     """Roles that the role hears."""
 
     fields: ClassVar[tuple[str, ...]]
-    """Fields of the observation whose numbers are taken in as they are."""
+    """Fields of the observation that enter the input vector."""
 
     actions: ClassVar[int]
     own_size: ClassVar[int]
-    """Numbers that `own` returns."""
+    """Length of `own_features`."""
 
     def __init__(self, town: Town, limits: SpaceLimits) -> None:
         self.town, self.limits = town, limits
@@ -60,8 +126,8 @@ class RoleInterface(ABC, Generic[Memory]):
 
     @classmethod
     def size_for(cls, limits: SpaceLimits) -> int:
-        """Numbers of the vector, in whatever town."""
-        return len(cls._flat_for(limits).low) + HEARD_SIZE * len(cls.speakers) + cls.own_size
+        """Returns the length of the input vector, which does not depend on the town."""
+        return len(cls._flat_for(limits).low) + UTTERANCE_SIZE * len(cls.speakers) + cls.own_size
 
     @classmethod
     def _flat_for(cls, limits: SpaceLimits) -> FlatObservations:
@@ -69,56 +135,60 @@ class RoleInterface(ABC, Generic[Memory]):
         return FlatObservations(spaces.Dict({name: whole[name] for name in cls.fields}))
 
     @abstractmethod
-    def begin(self) -> Memory:
+    def initial_memory(self) -> Memory:
         """Returns the memory before the first decision."""
 
     @abstractmethod
-    def notice(self, observation: Mapping[str, Any], memory: Memory) -> Memory:
+    def update(self, observation: ObservationMapping, memory: Memory) -> Memory:
         """Returns the memory after an observation."""
 
     @abstractmethod
-    def remarks(self, memory: Memory) -> tuple[HeardRemark | None, ...]:
+    def utterances(self, memory: Memory) -> tuple[LastUtterance | None, ...]:
         """Returns the last utterance of each of `speakers`."""
 
     @abstractmethod
-    def own(self, observation: Mapping[str, Any], memory: Memory) -> list[float]:
-        """Returns the role's own features (own_size,), each in -1..1."""
+    def own_features(self, observation: ObservationMapping, memory: Memory) -> list[float]:
+        """Returns the features that the role computes itself (own_size,), each in -1..1."""
 
     @abstractmethod
-    def mask(self, observation: Mapping[str, Any], memory: Memory) -> Mask:
-        """Returns the actions that the role's own observation suggests to be possible (actions,)."""
+    def mask(self, observation: ObservationMapping, memory: Memory) -> Mask:
+        """Returns the actions that are feasible and useful as far as the role can infer (actions,)."""
 
     @abstractmethod
-    def allowed(self, observation: Mapping[str, Any], masks: Mapping[str, Any]) -> Mask:
-        """Returns the actions that `info["action_mask"]` allows (actions,)."""
+    def permitted(self, observation: ObservationMapping, masks: ActionMapping) -> Mask:
+        """Returns the actions that `info["action_mask"]` permits (actions,)."""
 
     @abstractmethod
-    def act(self, choice: int, observation: Mapping[str, Any], memory: Memory) -> tuple[RoleAction, Memory]:
-        """Returns the action of a number, and the memory after it."""
+    def act(self, choice: int, observation: ObservationMapping, memory: Memory) -> tuple[Action, Memory]:
+        """Returns the environment action for the number of an action, and the memory after it."""
 
     @abstractmethod
-    def choice_of(self, action: Any, observation: Mapping[str, Any], memory: Memory) -> int:
-        """Returns the number of the most similar action to a recorded one of the role; 0 for none."""
+    def choice_of(self, action: Action, observation: ObservationMapping, memory: Memory) -> int:
+        """Returns the number of the action that is closest to an environment action; 0 if none is similar."""
 
-    def vector(self, observation: Mapping[str, Any], memory: Memory) -> Vector:
-        """Returns the input vector (size,), each in -1..1; `memory` is that of `notice`."""
+    def vector(self, observation: ObservationMapping, memory: Memory) -> Vector:
+        """Returns the input vector (size,), each in -1..1; `memory` is the result of `update`."""
         now = scalar(observation, "time")
-        flat = self._flat.vector(in_own_frame(observation, self.fields))
+        flat = self._flat.vector(in_car_frame(observation, self.fields))
         heard = [
-            np.zeros(HEARD_SIZE, dtype=np.float32) if remark is None else remark.vector(now)
-            for remark in self.remarks(memory)
+            np.zeros(UTTERANCE_SIZE, dtype=np.float32) if utterance is None else utterance.features(now)
+            for utterance in self.utterances(memory)
         ]
-        own = np.array(self.own(observation, memory), dtype=np.float32)
+        own = np.array(self.own_features(observation, memory), dtype=np.float32)
         whole: Vector = np.clip(np.concatenate([squashed(flat), *heard, own]), -1.0, 1.0)
         return whole
 
 
-def in_own_frame(observation: Mapping[str, Any], fields: Iterable[str]) -> dict[str, Any]:
-    """Fields with the places of their tables as metres ahead of the car and to its right; unused rows stay 0."""
+AnyRoleInterface: TypeAlias = RoleInterface[Any, Any]
+"""Interface of a role that is not known statically."""
+
+
+def in_car_frame(observation: ObservationMapping, fields: Iterable[str]) -> Observation:
+    """Returns fields of an observation, with positions as metres ahead and right of the car; unused rows stay 0."""
     x, y, heading = observation["pose"].tolist()
     sine, cosine = math.sin(heading), math.cos(heading)
     turned = {name: observation[name] for name in fields}
-    for name, column in _PLACES.items():
+    for name, column in _POSITION_COLUMNS.items():
         if name not in turned:
             continue
         table = np.array(turned[name], dtype=np.float64)
@@ -130,10 +200,10 @@ def in_own_frame(observation: Mapping[str, Any], fields: Iterable[str]) -> dict[
 
 
 def squashed(values: Vector) -> Vector:
-    """Returns sign(x) log(1 + |x|) of each number x, which brings metres, shares and seconds to similar sizes."""
-    return np.asarray(np.sign(values) * np.log1p(np.abs(values)) / math.log1p(FAR), dtype=np.float32)
+    """Returns sign(x) log(1 + |x|) of each number x, scaled: metres, shares and seconds get similar magnitudes."""
+    return np.asarray(np.sign(values) * np.log1p(np.abs(values)) / math.log1p(SQUASH_LIMIT), dtype=np.float32)
 
 
-def one_hot(at: int | None, size: int) -> list[float]:
-    """Returns zeros with a 1 at a place; None for zeros alone."""
-    return [float(k == at) for k in range(size)]
+def one_hot(index: int | None, size: int) -> list[float]:
+    """Returns `size` numbers, 1 at `index` and 0 elsewhere; all 0 for None."""
+    return [float(k == index) for k in range(size)]

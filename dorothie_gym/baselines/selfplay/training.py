@@ -1,54 +1,56 @@
-"""Resumable self-play training in a folder, with evaluations, checkpoints and a learning curve."""
+"""Self-play as a resumable run in a folder."""
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.learning_curves import draw_selfplay_curve
-from dorothie_gym.baselines.rl.behaviour_cloning import ReportProgress, silent
-from dorothie_gym.baselines.rl.checkpoint import DESCRIPTION, read_description, restore, save_model
-from dorothie_gym.baselines.rl.evaluation import SEEDS_FROM, Act, EpisodeStatistics, evaluate_policy
-from dorothie_gym.baselines.rl.training import CLONED, CURVE, PROGRESS, OnProgress, TrainingResult, check_same
-from dorothie_gym.baselines.selfplay.demonstrations import read_lessons
-from dorothie_gym.baselines.selfplay.learner import draw
+from dorothie_gym.baselines.rl.checkpoint import read_description, restore, save_model
+from dorothie_gym.baselines.rl.evaluation import FIRST_SEED, Act, EpisodeStatistics, evaluate_policy
+from dorothie_gym.baselines.rl.run import (
+    CURVE,
+    OnProgress,
+    OnStage,
+    Run,
+    RunEvaluation,
+    TrainingResult,
+    ignore_stage,
+)
+from dorothie_gym.baselines.rl.settings import SELFPLAY, SelfPlaySettings
+from dorothie_gym.baselines.selfplay.demonstrations import read_demonstrations
+from dorothie_gym.baselines.selfplay.learner import sample_actions
 from dorothie_gym.baselines.selfplay.multi_agent_rollout import AD_WIZARD, MultiAgentRollout, SelfPlayEnvFactory
-from dorothie_gym.baselines.selfplay.settings import SELFPLAY, SelfPlaySettings
 from dorothie_gym.errors import ModelFileError
 from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.policies.navigation.observation_vector import Vector
+from dorothie_gym.policies.policy_loader import DESCRIPTION
 from dorothie_gym.recording import Fold
 
-OPPONENTS = ("scripted", "learned")
+OPPONENTS: Final = ("scripted", "learned")
 """Ad-Wizards of the team's evaluations."""
 
-STRETCH = 16
+ROLLOUTS_PER_CHECKPOINT: Final = 16
 """Rollouts between checkpoints. Sessions restart at a checkpoint, so that a resumed training is exact."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class SelfPlayEvaluation:
-    """Evaluation of self-play after some training.
+class SelfPlayEvaluation(RunEvaluation):
+    """Evaluation of self-play.
 
     Attributes:
-        steps: done.
-        seconds: of training, evaluations left out [s].
-        scripted: what the team came to against the scripted Ad-Wizard.
-        learned: the same against the one that was learning, too.
-        returns: mean sum of rewards of each role in the sessions of training without scripted roles that ended since
-            the row before; None where none did.
+        scripted: statistics of the team against the scripted Ad-Wizard.
+        learned: statistics of the team against the learned Ad-Wizard.
+        returns: mean sum of rewards of each role in the training sessions without scripted roles that ended since the
+            previous evaluation; None if there were none.
     """
 
-    steps: int
-    seconds: float
     scripted: EpisodeStatistics
     learned: EpisodeStatistics
     returns: Mapping[str, float | None]
@@ -58,68 +60,65 @@ class SelfPlayEvaluation:
         return asdict(self)
 
     @classmethod
-    def from_json(cls, found: Mapping[str, Any]) -> SelfPlayEvaluation:
+    def from_json(cls, page: Mapping[str, Any]) -> SelfPlayEvaluation:
         """Reads the output of `as_json`."""
-        outcomes = {name: EpisodeStatistics(**found[name]) for name in OPPONENTS}
-        return cls(steps=found["steps"], seconds=found["seconds"], returns=found["returns"], **outcomes)
+        outcomes = {name: EpisodeStatistics(**page[name]) for name in OPPONENTS}
+        return cls(steps=page["steps"], seconds=page["seconds"], returns=page["returns"], **outcomes)
 
 
-class SelfPlayTraining:
-    """Training; `go` trains until all steps are done or Ctrl-C is pressed.
+class SelfPlayTraining(Run[SelfPlayEvaluation]):
+    """Training of all three roles; `run` trains until all steps are done or Ctrl-C is pressed.
+
+    The folder of the run holds a folder with the model of each role.
 
     Attributes:
-        settings: what is trained.
-        folder: gets a folder with a model for each role, `progress.jsonl` and `curve.png`.
-        game: sessions and learners.
-        rows: evaluations so far.
+        settings: settings of the training.
+        rollout: sessions and learners.
+        steps: number of steps done.
     """
 
     def __init__(
         self,
         settings: SelfPlaySettings,
         folder: Path,
-        watch: OnProgress[SelfPlayEvaluation] | None = None,
+        on_progress: OnProgress[SelfPlayEvaluation] | None = None,
         ray: str | None = None,
-        tell: ReportProgress = silent,
+        on_stage: OnStage = ignore_stage,
     ) -> None:
         """Prepares a training, or resumes the one in the folder.
 
         Args:
-            settings: what is trained.
-            folder: where all is written.
-            watch: callback for the progress.
-            ray: address of a Ray cluster that steps the environments; None: this machine does.
-            tell: callback for the progress of a warm start.
+            settings: settings of the training.
+            folder: output folder.
+            on_progress: callback for the progress.
+            ray: address of a Ray cluster that steps the environments; None for this machine.
+            on_stage: callback for the progress of a warm start.
 
         Raises:
-            SettingsError: the folder has a run with other settings, or nothing can be trained with these.
+            SettingsError: the folder holds a run with other settings, or the settings are invalid.
             ProcessError: Ray is not installed, or there is no cluster at the address.
-            SessionError: the corpus of the warm start cannot be read or played again.
+            SessionError: the corpus of the warm start cannot be read or replayed.
             ModelFileError: the run in the folder is damaged.
         """
-        self.settings, self.folder = settings, folder
-        self._watch, self._tell = watch or (lambda done, total, row: None), tell
-        self.rows: list[SelfPlayEvaluation] = []
-        self.seconds, self.steps = 0.0, 0
-        self._tally = _tally([])  # of the sessions of training since the last row
+        super().__init__(folder, on_progress, on_stage)
+        self.settings, self.steps = settings, 0
+        self._totals = _totals([])  # of the training sessions since the last evaluation
         begun = (folder / AGENT_ROLES[AD_WIZARD] / DESCRIPTION).is_file()
         if begun:
-            found = read_description(folder / AGENT_ROLES[AD_WIZARD])
-            check_same(settings, SelfPlaySettings(**found["settings"]), folder)
+            page = read_description(folder / AGENT_ROLES[AD_WIZARD])
+            settings.check_resumable(SelfPlaySettings(**page["settings"]), folder)
         folder.mkdir(parents=True, exist_ok=True)
-        torch.set_num_threads(1)  # small networks: more threads only wait for one another
-        log = folder / "tensorboard" if find_spec("tensorboard") is not None else None
-        self.game = MultiAgentRollout(settings, log, ray)
+        self.rollout = MultiAgentRollout(settings, self._log_folder(), ray)
         try:
             if begun:
-                self._take_up()
+                self._resume()
             elif settings.warm_start is not None:
-                self._learn_from(Path(settings.warm_start))
+                self._warm_start(Path(settings.warm_start))
         except Exception:
-            self.game.close()
+            self.rollout.close()
             raise
 
-    def go(self) -> TrainingResult[SelfPlayEvaluation]:
+    def run(self) -> TrainingResult[SelfPlayEvaluation]:
         """Trains.
 
         Returns:
@@ -128,87 +127,87 @@ class SelfPlayTraining:
         finished = False
         try:
             while self.steps < self.settings.steps:
-                self._go_on()
+                self._train_to_checkpoint()
             finished = True
         except KeyboardInterrupt:
-            pass  # what was done since the last stretch ended will be done again
+            pass  # the rollouts since the last checkpoint are repeated when the run is resumed
         finally:
-            self.game.close()
-        return TrainingResult(
-            folder=self.folder, rows=tuple(self.rows), steps=self.steps, seconds=self.seconds, finished=finished
-        )
+            self.rollout.close()
+        return self._result(self.steps, finished=finished)
 
-    def _learn_from(self, corpus: Path) -> None:
-        """Begins with what the roles of a corpus did; the first row of the progress is what that is worth."""
+    def _warm_start(self, corpus: Path) -> None:
+        """Clones the roles of a corpus; the first evaluation of the run is that of the clones."""
         since = time.perf_counter()
-        shown, held_out = (read_lessons(corpus, fold, self._tell) for fold in (Fold.TRAIN, Fold.VAL))
+        training, held_out = (read_demonstrations(corpus, fold, self._on_stage) for fold in (Fold.TRAIN, Fold.VAL))
         cloned = {
-            learner.name: asdict(learner.clone(shown, held_out, self.settings.seed, self._tell))
-            for learner in self.game.learners
+            learner.name: asdict(learner.clone(training, held_out, self.settings.seed, self._on_stage))
+            for learner in self.rollout.learners
         }
-        (self.folder / CLONED).write_text(json.dumps(cloned, indent=1) + "\n", encoding="utf-8")
+        self._write_cloned(cloned)
         self.seconds = time.perf_counter() - since
-        self._keep(0, self.seconds, self._tally, self._evaluate(0, self.seconds, self._tally))
+        self._checkpoint(0, self.seconds, self._totals, self._evaluate(0, self.seconds, self._totals))
 
-    def _go_on(self) -> None:
-        """Trains for a stretch; evaluates where it is time."""
-        settings, game, steps = self.settings, self.game, self.steps
+    def _train_to_checkpoint(self) -> None:
+        """Trains until the next checkpoint, and evaluates if an evaluation is due."""
+        settings, rollout, steps = self.settings, self.rollout, self.steps
         due = min((steps // settings.evaluate_every + 1) * settings.evaluate_every, settings.steps)
-        begun = time.perf_counter()
-        game.begin(steps)
-        for _ in range(STRETCH):
-            steps = game.play(steps)
-            self._watch(steps, settings.steps, None)
+        since = time.perf_counter()
+        rollout.reset(steps)
+        for _ in range(ROLLOUTS_PER_CHECKPOINT):
+            steps = rollout.play(steps)
+            self._on_progress(steps, settings.steps, None)
             if steps >= due:
                 break
-        seconds = self.seconds + time.perf_counter() - begun
-        tally = self._tally + _tally(game.returns)
-        row = self._evaluate(steps, seconds, tally) if steps >= due else None
-        # from here on nothing takes time: Ctrl-C finds all of the stretch done, or none
-        game.past.keep(game.actor(AD_WIZARD).model)
-        self._keep(steps, seconds, tally, row)
+        seconds = self.seconds + time.perf_counter() - since
+        totals = self._totals + _totals(rollout.returns)
+        row = self._evaluate(steps, seconds, totals) if steps >= due else None
+        # From here on nothing takes long: after Ctrl-C, the checkpoint exists whole or not at all.
+        rollout.opponents.add(rollout.learner_of(AD_WIZARD).model)
+        self._checkpoint(steps, seconds, totals, row)
 
-    def _keep(self, steps: int, seconds: float, tally: NDArray[np.float64], row: SelfPlayEvaluation | None) -> None:
-        """Writes everything as it is after so many steps."""
-        self.steps, self.seconds, self._tally = steps, seconds, tally
+    def _checkpoint(
+        self, steps: int, seconds: float, totals: NDArray[np.float64], row: SelfPlayEvaluation | None
+    ) -> None:
+        """Writes the state after a number of steps into the folder."""
+        self.steps, self.seconds, self._totals = steps, seconds, totals
         if row is not None:
             self.rows.append(row)
-            self._tally = _tally([])
+            self._totals = _totals([])
         self._save()
         if row is not None:
             draw_selfplay_curve([row.as_json() for row in self.rows], _title(self.settings), self.folder / CURVE)
-            self._watch(steps, self.settings.steps, row)
+            self._on_progress(steps, self.settings.steps, row)
 
-    def _evaluate(self, steps: int, seconds: float, tally: NDArray[np.float64]) -> SelfPlayEvaluation:
-        """Plays the evaluation's sessions."""
+    def _evaluate(self, steps: int, seconds: float, totals: NDArray[np.float64]) -> SelfPlayEvaluation:
+        """Plays the sessions of an evaluation."""
         outcomes = {name: self._outcome(name) for name in OPPONENTS}
-        row = SelfPlayEvaluation(
-            steps=steps, seconds=round(seconds, 2), returns=_means(tally),
-            scripted=outcomes["scripted"], learned=outcomes["learned"],
-        )  # fmt: skip
+        row = SelfPlayEvaluation(steps=steps, seconds=round(seconds, 2), returns=_means(totals), **outcomes)
         self._log(row)
         return row
 
     def _outcome(self, ad_wizard: str) -> EpisodeStatistics:
-        maker = SelfPlayEnvFactory(self.settings.env_settings, (Role.AD_WIZARD,) if ad_wizard == "scripted" else ())
-        return evaluate_policy(maker, self.act_with(SEEDS_FROM), self.settings.episodes, SEEDS_FROM)
+        scripted = (Role.AD_WIZARD,) if ad_wizard == "scripted" else ()
+        make = SelfPlayEnvFactory(self.settings.env_settings, scripted)
+        return evaluate_policy(make, self.sampling_policy(FIRST_SEED), self.settings.episodes)
 
-    def act_with(self, seed: int) -> Act:
+    def sampling_policy(self, seed: int) -> Act:
         """Returns the present policy of all roles on rows of the layout; it samples with a seed."""
-        game, rng = self.game, np.random.default_rng(seed)
+        rollout, rng = self.rollout, np.random.default_rng(seed)
+        layout = rollout.layout
 
-        def act(rows: NDArray[Any], masks: NDArray[np.bool_] | None) -> Sequence[Any]:
+        def act(rows: Vector, masks: NDArray[np.bool_] | None) -> Sequence[NDArray[np.int64]]:
             chosen = []
             for role in range(len(AGENT_ROLES)):
-                learner = game.actor(role)
-                vectors = game.table.vectors(rows, role, padded=learner.padded)
-                chosen.append(draw(learner.model, vectors, game.table.masks(rows, role, padded=learner.padded), rng))
+                learner = rollout.learner_of(role)
+                vectors = layout.vectors(rows, role, padded=learner.padded)
+                role_masks = layout.masks(rows, role, padded=learner.padded)
+                chosen.append(sample_actions(learner.model, vectors, role_masks, rng))
             return list(np.stack(chosen, axis=1))
 
         return act
 
     def _log(self, row: SelfPlayEvaluation) -> None:
-        logger = self.game.learners[0].model.logger
+        logger = self.rollout.learners[0].model.logger
         for name, outcome in (("scripted", row.scripted), ("learned", row.learned)):
             logger.record(f"eval/success_against_{name}", outcome.success)
             logger.record(f"eval/reward_against_{name}", outcome.reward)
@@ -216,46 +215,42 @@ class SelfPlayTraining:
         logger.dump(row.steps)
 
     def _save(self) -> None:
-        settings, table = self.settings, self.game.table
+        layout = self.rollout.layout
         for k, role in enumerate(AGENT_ROLES):
-            learner = self.game.actor(k)
-            about = {
-                "kind": SELFPLAY, "role": str(role), "size": table.sizes[k], "actions": table.actions[k],
-                "padded": [learner.size, learner.actions] if learner.padded else None, "tally": self._tally.tolist(),
+            learner = self.rollout.learner_of(k)
+            fields = {
+                "kind": SELFPLAY, "role": str(role), "size": layout.sizes[k], "actions": layout.actions[k],
+                "padded": [learner.size, learner.actions] if learner.padded else None, "tally": self._totals.tolist(),
             }  # fmt: skip
-            save_model(learner.model, settings, self.folder / role, self.seconds, about)
-        self.game.past.save(self.folder)
-        lines = "".join(json.dumps(row.as_json()) + "\n" for row in self.rows)
-        (self.folder / PROGRESS).write_text(lines, encoding="utf-8")
+            save_model(learner.model, self.settings, self.folder / role, self.seconds, fields)
+        self.rollout.opponents.save(self.folder)
+        self._write_rows()
 
-    def _take_up(self) -> None:
-        """Goes back to what is in the folder."""
-        found = {role: read_description(self.folder / role) for role in AGENT_ROLES}
-        steps = {int(description["steps"]) for description in found.values()}
+    def _resume(self) -> None:
+        """Restores the state of the last checkpoint in the folder."""
+        pages = {role: read_description(self.folder / role) for role in AGENT_ROLES}
+        steps = {int(page["steps"]) for page in pages.values()}
         if len(steps) > 1:
             raise ModelFileError(
                 f"{self.folder}: the models are of different steps ({sorted(steps)}); start a new training"
             )
-        for learner in self.game.learners:
+        for learner in self.rollout.learners:
             restore(learner.model, self.folder / AGENT_ROLES[learner.roles[0]])
-        self.game.past.load(self.folder)
-        lines = (self.folder / PROGRESS).read_text(encoding="utf-8").splitlines()
+        self.rollout.opponents.load(self.folder)
         self.steps = steps.pop()
-        self.rows = [
-            row for row in map(SelfPlayEvaluation.from_json, map(json.loads, lines)) if row.steps <= self.steps
-        ]
-        about = found[AGENT_ROLES[AD_WIZARD]]
-        self.seconds, self._tally = float(about["seconds"]), np.array(about["tally"], dtype=np.float64)
+        self.rows = [row for row in self._read_rows(SelfPlayEvaluation) if row.steps <= self.steps]
+        page = pages[AGENT_ROLES[AD_WIZARD]]
+        self.seconds, self._totals = float(page["seconds"]), np.array(page["tally"], dtype=np.float64)
 
 
-def _tally(returns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _totals(returns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Returns the number of sessions and the sums of their rewards by role (4,)."""
     sums: NDArray[np.float64] = np.sum(np.reshape(returns, (-1, len(AGENT_ROLES))), axis=0)
     return np.concatenate(([float(len(returns))], sums))
 
 
-def _means(tally: NDArray[np.float64]) -> dict[str, float | None]:
-    sessions, *sums = tally.tolist()
+def _means(totals: NDArray[np.float64]) -> dict[str, float | None]:
+    sessions, *sums = totals.tolist()
     return {
         str(role): round(total / sessions, 4) if sessions else None
         for role, total in zip(AGENT_ROLES, sums, strict=True)

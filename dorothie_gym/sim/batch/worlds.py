@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from typing import Protocol
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import WITHOUT_COUNTS, concurrent
 from dorothie_gym.maps.model import Array
+from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.threads import ThreadPool, take, turns_of
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays
@@ -195,10 +195,3 @@ class VectorWorld:
     def close(self) -> None:
         """Ends the threads; the worlds cannot be stepped any more."""
         self._pool.close()
-
-
-def available_processors() -> int:
-    """Returns the number of processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

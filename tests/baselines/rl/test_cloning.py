@@ -11,7 +11,7 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines.rl import Training, TrainingSettings, tuned_settings
-from dorothie_gym.baselines.rl.behaviour_cloning import clone, read_lessons
+from dorothie_gym.baselines.rl.behaviour_cloning import clone, read_demonstrations
 from dorothie_gym.baselines.rl.checkpoint import make_model
 from dorothie_gym.baselines.rl.environments import make_env
 from dorothie_gym.engine.config import EnvConfig
@@ -27,7 +27,7 @@ SMALL = {"n_steps": 16, "batch_size": 32, "n_epochs": 1}
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Fourteen sessions of the scripted three, two of them held out."""
+    """Fourteen sessions of the scripted roles, two of them held out."""
     root = tmp_path_factory.mktemp("corpus")
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=300.0))
     policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
@@ -37,17 +37,17 @@ def corpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     return root
 
 
-def test_what_co_wizards_did_is_learned_and_holds_for_other_sessions(corpus: Path) -> None:
-    shown, held_out = read_lessons(corpus, "train"), read_lessons(corpus, "val")
-    assert shown.observations.shape == (len(shown), 161) and shown.masks.shape == (len(shown), 18)
+def test_cloning_generalises_to_held_out_sessions(corpus: Path) -> None:
+    training, held_out = read_demonstrations(corpus, "train"), read_demonstrations(corpus, "val")
+    assert training.observations.shape == (len(training), 161) and training.masks.shape == (len(training), 18)
     settings = tuned_settings("maskable_ppo", NAVIGATION, parameters=SMALL | {"batch_size": 16})
-    cloned = clone(make_model(settings, make_env(NAVIGATION)), shown, held_out, seed=0)
+    cloned = clone(make_model(settings, make_env(NAVIGATION)), training, held_out, seed=0)
     assert cloned.losses[1] < 0.2 * cloned.losses[0]
     assert cloned.agreement > cloned.majority
-    assert cloned.deeds > 0.25
+    assert cloned.action_agreement > 0.25
 
 
-def test_a_run_with_a_warm_start_is_evaluated_before_it_goes_on(corpus: Path, tmp_path: Path) -> None:
+def test_warm_start_is_evaluated_before_training(corpus: Path, tmp_path: Path) -> None:
     small = tmp_path / "corpus"
     for session in ("train/0000", "val/seen/0012"):
         shutil.copytree(corpus / session, small / session)
@@ -55,14 +55,14 @@ def test_a_run_with_a_warm_start_is_evaluated_before_it_goes_on(corpus: Path, tm
         algorithm="ppo", env=NAVIGATION, steps=32, environments=2, evaluate_every=32, episodes=1, network=(8,),
         parameters=SMALL, env_settings={"max_seconds": 10.0, "traffic": "none"}, warm_start=str(small),
     )  # fmt: skip
-    run = Training(settings, tmp_path / "run").go()
-    assert [row.steps for row in run.rows] == [0, 32]  # the first is what cloning alone is worth
-    told = json.loads((tmp_path / "run" / "cloned.json").read_text())
-    assert told["losses"][1] < told["losses"][0] and told["lessons"] > 200
-    assert Training(settings, tmp_path / "run").cloned is None  # what has been begun is not begun anew
+    run = Training(settings, tmp_path / "run").run()
+    assert [row.steps for row in run.rows] == [0, 32]  # the first is that of the clone
+    cloned = json.loads((tmp_path / "run" / "cloned.json").read_text())
+    assert cloned["losses"][1] < cloned["losses"][0] and cloned["decisions"] > 200
+    assert Training(settings, tmp_path / "run").cloned is None  # a resumed run is not cloned again
 
 
-def test_who_cannot_learn_from_a_corpus_is_told(tmp_path: Path) -> None:
+def test_warm_start_of_other_algorithms_and_environments_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="warm_start.*dqn"):
         tuned_settings("dqn", NAVIGATION, warm_start=str(tmp_path))
     with pytest.raises(SettingsError, match="warm_start.*CoWizard"):

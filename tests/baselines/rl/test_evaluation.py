@@ -12,22 +12,22 @@ from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from tests.envs.navigation_drivers import follow_lane, obey
 
 
-def test_wilson_s_interval_is_that_of_the_textbook() -> None:
+def test_wilson_interval_equals_that_of_the_textbook() -> None:
     assert wilson(0, 10) == pytest.approx((0.0, 0.278), abs=1e-3)
     assert wilson(8, 10) == pytest.approx((0.490, 0.943), abs=1e-3)
     assert wilson(10, 10)[1] == 1.0
 
 
-def test_episodes_have_the_same_seeds_however_many_play_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_do_not_depend_on_the_number_of_parallel_episodes(monkeypatch: pytest.MonkeyPatch) -> None:
     def act(observations: Any, masks: Any) -> list[int]:
         return [obey(observation, mask) for observation, mask in zip(observations, masks, strict=True)]
 
-    at_once = evaluate_policy(lambda: NavigationEnv(traffic="none", max_seconds=60.0), act, 5, seed=3)
-    monkeypatch.setattr("dorothie_gym.baselines.rl.evaluation.AT_ONCE", 1)
+    in_parallel = evaluate_policy(lambda: NavigationEnv(traffic="none", max_seconds=60.0), act, 5, seed=3)
+    monkeypatch.setattr("dorothie_gym.baselines.rl.evaluation.PARALLEL_EPISODES", 1)
     one_by_one = evaluate_policy(lambda: NavigationEnv(traffic="none", max_seconds=60.0), act, 5, seed=3)
-    assert at_once == one_by_one and at_once.episodes == 5
+    assert in_parallel == one_by_one and in_parallel.episodes == 5
 
 
-def test_who_follows_the_lane_has_no_success() -> None:
+def test_following_the_lane_has_no_success() -> None:
     outcome = evaluate_policy(lambda: NavigationEnv(patience=10.0), lambda o, m: [follow_lane(o, m)] * len(o), 3)
     assert outcome.success == 0.0 and outcome.low == 0.0 and outcome.high > 0.5

@@ -30,11 +30,11 @@ def train(folder: Path, algorithm: str = "ppo", **changes: Any) -> None:
             "parameters": {"n_steps": 16, "batch_size": 32, "n_epochs": 1}, **changes,
         }
     )  # fmt: skip
-    Training(settings, folder).go()
+    Training(settings, folder).run()
 
 
 @pytest.mark.parametrize("algorithm", ["ppo", "maskable_ppo"])
-def test_what_was_learned_plays_the_co_wizard(algorithm: str, tmp_path: Path) -> None:
+def test_trained_model_plays_the_co_wizard(algorithm: str, tmp_path: Path) -> None:
     train(tmp_path / "run", algorithm)
     player = find_player(str(tmp_path / "run" / "best"), Role.CO_WIZARD)
     assert player.training["steps"] == 64 and player.training["seconds"] > 0.0
@@ -50,7 +50,7 @@ def test_what_was_learned_plays_the_co_wizard(algorithm: str, tmp_path: Path) ->
     assert any("move" in decision for decision in decisions), "it talks"
 
 
-def test_only_drivers_play_and_only_the_co_wizard(tmp_path: Path) -> None:
+def test_other_roles_and_damaged_models_are_refused(tmp_path: Path) -> None:
     limits = DuoWizardEnv("brookside").limits
     train(tmp_path)
     with pytest.raises(ValueError, match="co_wizard"):
@@ -62,13 +62,13 @@ def test_only_drivers_play_and_only_the_co_wizard(tmp_path: Path) -> None:
         find_player(str(tmp_path), Role.CO_WIZARD).make(Role.CO_WIZARD, limits)
 
 
-def test_a_model_of_another_environment_is_refused(tmp_path: Path) -> None:
+def test_model_of_another_environment_is_refused(tmp_path: Path) -> None:
     train(tmp_path, env="dorothie_gym/CoWizard-v0", env_settings={"max_cycles": 20})
     with pytest.raises(SettingsError, match="CoWizard-v0"):
         find_player(str(tmp_path), Role.CO_WIZARD).make(Role.CO_WIZARD, DuoWizardEnv("brookside").limits)
 
 
-def test_kinds_of_models_and_their_loaders_are_known_without_torch() -> None:
+def test_kinds_of_models_are_known_without_torch() -> None:
     script = (
         "import sys, dorothie_gym.baselines.loaders; from dorothie_gym.policies import loadable_kinds;"
         "sys.exit('torch' in sys.modules or 'dorothie_gym-rl' not in loadable_kinds())"

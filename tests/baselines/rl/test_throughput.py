@@ -14,20 +14,20 @@ from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation.instructor import Instructor
 
 
-def test_shares_of_the_time_add_up() -> None:
+def test_shares_of_the_time_sum_to_one() -> None:
     instruct = Instructor.instruct
     figures = measure(environments=2, workers=0, steps=512)
-    assert Instructor.instruct is instruct  # measuring leaves no trace
+    assert Instructor.instruct is instruct  # the patch is removed
     assert set(figures["shares"]) == set(SHARES)
     assert sum(figures["shares"].values()) == pytest.approx(1.0, abs=0.01)
     assert min(figures["shares"].values()) > 0.0
     assert figures["workers_steps_per_second"] is None
     report = rl_report(figures)
-    assert "environment steps a second" in report.headline and len(report.rows) == 1
+    assert "environment steps per second" in report.headline and len(report.rows) == 1
     json.dumps(figures, allow_nan=False)
 
 
-def test_what_has_no_rollouts_is_refused() -> None:
+def test_off_policy_algorithm_is_refused() -> None:
     with pytest.raises(SettingsError, match="algorithm"):
         measure(algorithm="dqn")
     result = CliRunner().invoke(app, ["bench", "rl", "--algorithm", "dqn"])

@@ -13,7 +13,7 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines.rl import ALGORITHMS, Training, TrainingSettings, load_model, tuned_settings
 from dorothie_gym.baselines.rl import training as training_module
-from dorothie_gym.baselines.rl.environments import make_vector
+from dorothie_gym.baselines.rl.environments import make_training_env
 from dorothie_gym.errors import ModelFileError, SettingsError
 
 DISCRETE = "dorothie_gym/Navigation-v0"
@@ -38,9 +38,9 @@ def settings_for(algorithm: str, **changes: Any) -> TrainingSettings:
 
 
 @pytest.mark.parametrize("algorithm", sorted(ALGORITHMS))
-def test_a_run_leaves_a_model_that_acts_as_the_one_that_learned(algorithm: str, tmp_path: Path) -> None:
+def test_saved_model_acts_like_the_trained_one(algorithm: str, tmp_path: Path) -> None:
     training = Training(settings_for(algorithm), tmp_path)
-    run = training.go()
+    run = training.run()
     assert run.finished and run.steps >= 64 and run.rows[-1].steps == run.steps
     model, settings = load_model(tmp_path)
     assert settings == training.settings and model.num_timesteps == run.steps
@@ -54,9 +54,9 @@ def test_a_run_leaves_a_model_that_acts_as_the_one_that_learned(algorithm: str, 
     assert not list(tmp_path.rglob("*.zip")) and not list(tmp_path.rglob("*.pkl"))
 
 
-def test_a_run_that_goes_on_keeps_weights_optimiser_and_evaluations(tmp_path: Path) -> None:
+def test_resumed_run_keeps_weights_optimiser_and_evaluations(tmp_path: Path) -> None:
     first = Training(settings_for("ppo"), tmp_path)
-    run = first.go()
+    run = first.run()
     second = Training(settings_for("ppo", steps=128), tmp_path)
     for name, state in first.model.get_parameters().items():
         again = second.model.get_parameters()[name]
@@ -67,19 +67,19 @@ def test_a_run_that_goes_on_keeps_weights_optimiser_and_evaluations(tmp_path: Pa
         else:
             for key, value in state.items():
                 np.testing.assert_array_equal(again[key], value)
-    more = second.go()
+    more = second.run()
     assert more.steps >= 128 and more.rows[: len(run.rows)] == run.rows and len(more.rows) > len(run.rows)
     lines = (tmp_path / "progress.jsonl").read_text(encoding="utf-8").splitlines()
     assert [json.loads(line)["steps"] for line in lines] == [row.steps for row in more.rows]
 
 
 @pytest.mark.parametrize(("algorithm", "loss"), [("ppo", "train/value_loss"), ("dqn", "train/loss")])
-def test_tensorboard_gets_rewards_losses_and_success(
+def test_tensorboard_logs_rewards_losses_and_success(
     algorithm: str, loss: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(training_module, "LOGGED_STEPS", 32)
     accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
-    Training(settings_for(algorithm, steps=128, env_settings={"max_seconds": 5.0, "traffic": "none"}), tmp_path).go()
+    Training(settings_for(algorithm, steps=128, env_settings={"max_seconds": 5.0, "traffic": "none"}), tmp_path).run()
     (folder,) = (tmp_path / "tensorboard").iterdir()
     events = accumulator.EventAccumulator(str(folder))
     events.Reload()
@@ -87,36 +87,37 @@ def test_tensorboard_gets_rewards_losses_and_success(
     assert wanted <= set(events.Tags()["scalars"])
 
 
-def test_a_finished_run_is_not_trained_again(tmp_path: Path) -> None:
-    Training(settings_for("ppo"), tmp_path).go()
-    again = Training(settings_for("ppo"), tmp_path).go()
+def test_finished_run_is_not_trained_again(tmp_path: Path) -> None:
+    Training(settings_for("ppo"), tmp_path).run()
+    again = Training(settings_for("ppo"), tmp_path).run()
     assert again.finished and again.steps == 64 and len(again.rows) == 1
 
 
-def test_ctrl_c_keeps_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_saves_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(self: Any, seconds: float, steps: int) -> None:
         if steps >= 64:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(training_module.Training, "note", interrupted)
-    run = Training(settings_for("ppo", steps=1000), tmp_path).go()
+    monkeypatch.setattr(training_module.Training, "add_time", interrupted)
+    run = Training(settings_for("ppo", steps=1000), tmp_path).run()
     assert not run.finished and run.steps == 64
     monkeypatch.undo()
-    assert Training(settings_for("ppo", steps=128), tmp_path).go().steps == 128
+    assert Training(settings_for("ppo", steps=128), tmp_path).run().steps == 128
 
 
-def test_a_folder_with_another_run_is_left_alone(tmp_path: Path) -> None:
-    Training(settings_for("ppo"), tmp_path).go()
+def test_folder_with_another_run_is_refused(tmp_path: Path) -> None:
+    Training(settings_for("ppo"), tmp_path).run()
     with pytest.raises(SettingsError, match="another seed"):
         Training(settings_for("ppo", seed=1), tmp_path)
 
 
-def test_processes_change_nothing_but_the_time() -> None:
-    here, there = (make_vector(settings_for("maskable_ppo", environments=3, workers=workers)) for workers in (0, 2))
+def test_worker_processes_do_not_change_results() -> None:
+    settings = settings_for("maskable_ppo", environments=3)
+    here, there = (make_training_env(replace(settings, workers=workers)) for workers in (0, 2))
     rng = np.random.default_rng(0)
     try:
         np.testing.assert_array_equal(here.reset(), there.reset())
-        for _ in range(30):  # episodes of 20 decisions: each begins anew
+        for _ in range(30):  # episodes of 20 decisions: each restarts
             masks = np.stack(here.env_method("action_masks"))
             np.testing.assert_array_equal(masks, np.stack(there.env_method("action_masks")))
             actions = np.array([rng.choice(np.flatnonzero(mask)) for mask in masks])
@@ -140,12 +141,12 @@ def test_processes_change_nothing_but_the_time() -> None:
         ({"seed": -1}, "seed"), ({"episodes": 0}, "episodes"),
     ],
 )  # fmt: skip
-def test_bad_settings_are_named(changes: dict[str, Any], named: str) -> None:
+def test_invalid_settings_are_named(changes: dict[str, Any], named: str) -> None:
     with pytest.raises(SettingsError, match=named):
         replace(settings_for("ppo"), **changes)
 
 
-def test_what_cannot_be_trained_is_told(tmp_path: Path) -> None:
+def test_untrainable_settings_are_reported(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="sac on dorothie_gym/Navigation-v0"):
         Training(replace(settings_for("sac"), env=DISCRETE), tmp_path)
     with pytest.raises(SettingsError, match="guidance"):
@@ -155,16 +156,16 @@ def test_what_cannot_be_trained_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("algorithm", sorted(ALGORITHMS))
-def test_tuned_settings_can_be_read(algorithm: str) -> None:
+def test_tuned_settings_survive_json(algorithm: str) -> None:
     settings = tuned_settings(algorithm, DISCRETE, steps=7, episodes=None)
     assert settings.steps == 7 and settings.parameters and settings.network
     assert TrainingSettings(**json.loads(json.dumps(settings.as_json()))) == settings
 
 
-def test_damaged_models_are_told(tmp_path: Path) -> None:
+def test_damaged_models_are_reported(tmp_path: Path) -> None:
     with pytest.raises(ModelFileError, match=r"model\.json: does not exist"):
         load_model(tmp_path)
-    Training(settings_for("ppo"), tmp_path).go()
+    Training(settings_for("ppo"), tmp_path).run()
     (tmp_path / "model.safetensors").write_bytes(b"nothing")
     with pytest.raises(ModelFileError, match="model.safetensors"):
         load_model(tmp_path)
@@ -174,9 +175,9 @@ def test_damaged_models_are_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["CoWizard", "Participant"])
-def test_other_roles_become_vectors(name: str, tmp_path: Path) -> None:
+def test_other_roles_can_be_trained(name: str, tmp_path: Path) -> None:
     settings = settings_for(
         "ppo", env=f"dorothie_gym/{name}-v0", env_settings={"max_cycles": 20}, environments=1, steps=16,
         parameters={"n_steps": 16, "batch_size": 16, "n_epochs": 1},
     )  # fmt: skip
-    assert Training(settings, tmp_path).go().finished
+    assert Training(settings, tmp_path).run().finished

@@ -8,9 +8,9 @@ import pytest
 
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
-from dorothie_gym.baselines.selfplay.demonstrations import lessons_of, read_lessons
+from dorothie_gym.baselines.rl.settings import SelfPlaySettings
+from dorothie_gym.baselines.selfplay.demonstrations import decisions_of, read_demonstrations
 from dorothie_gym.baselines.selfplay.participant import ParticipantPhrase
-from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings
 from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
@@ -27,7 +27,7 @@ PARTICIPANT, CO_WIZARD, AD_WIZARD = range(3)
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four sessions of the scripted three, one of them held out."""
+    """Four sessions of the scripted roles, one of them held out."""
     root = tmp_path_factory.mktemp("corpus")
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=120.0))
     policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
@@ -36,55 +36,55 @@ def corpus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-def test_what_all_roles_did_is_read_from_sessions(corpus: Path) -> None:
+def test_decisions_of_all_roles_are_read_from_sessions(corpus: Path) -> None:
     town = load_town("brookside")
     done = [Counter[int](), Counter[int](), Counter[int]()]
     for entry in Corpus.load(corpus).filter(fold="train").entries:
-        for role, lessons in lessons_of(entry.load(), town).items():
-            assert all(mask[choice] for _, mask, choice in lessons)
-            done[role].update(choice for *_, choice in lessons)
+        for role, decisions in decisions_of(entry.load(), town).items():
+            assert all(mask[choice] for _, mask, choice in decisions)
+            done[role].update(choice for *_, choice in decisions)
     assert done[PARTICIPANT][ParticipantPhrase.NAME_GOAL] >= 3  # a goal or more a session
     assert sum(done[CO_WIZARD][NavigationAction.turn(sector)] for sector in range(8)) >= 4
     assert done[CO_WIZARD][NavigationAction.STOP] >= 3
-    assert sum(count for caper, count in done[AD_WIZARD].items() if caper) >= 3
+    assert sum(count for macro, count in done[AD_WIZARD].items() if macro) >= 3
 
 
 @pytest.mark.parametrize("shared", [False, True])
-def test_a_warm_start_learns_what_was_done_and_is_evaluated_first(shared: bool, corpus: Path, tmp_path: Path) -> None:
+def test_warm_start_clones_all_roles_and_is_evaluated_first(shared: bool, corpus: Path, tmp_path: Path) -> None:
     settings = SelfPlaySettings(
         steps=16, environments=2, evaluate_every=16, episodes=1, network=(16,), traffic="none", max_seconds=10.0,
         parameters={"n_steps": 8, "batch_size": 16, "n_epochs": 1}, shared=shared, warm_start=str(corpus),
     )  # fmt: skip
-    run = SelfPlayTraining(settings, tmp_path).go()
+    run = SelfPlayTraining(settings, tmp_path).run()
     assert [row.steps for row in run.rows] == [0, 16] and run.rows[0].seconds > 0.0
-    told = json.loads((tmp_path / "cloned.json").read_text(encoding="utf-8"))
-    assert set(told) == ({"all"} if shared else set(AGENT_ROLES))
-    for cloned in told.values():
-        assert cloned["losses"][1] < 0.5 * cloned["losses"][0] and cloned["lessons"] > 600
-    again = SelfPlayTraining(settings, tmp_path).go()
-    assert again.rows == run.rows  # what has been begun is not begun anew
+    results = json.loads((tmp_path / "cloned.json").read_text(encoding="utf-8"))
+    assert set(results) == ({"all"} if shared else set(AGENT_ROLES))
+    for cloned in results.values():
+        assert cloned["losses"][1] < 0.5 * cloned["losses"][0] and cloned["decisions"] > 600
+    again = SelfPlayTraining(settings, tmp_path).run()
+    assert again.rows == run.rows  # a resumed run is not cloned again
 
 
-def test_the_actor_waits_for_its_critic(corpus: Path, tmp_path: Path) -> None:
+def test_cloned_actor_is_frozen_at_first(corpus: Path, tmp_path: Path) -> None:
     settings = SelfPlaySettings(
         steps=16, environments=2, evaluate_every=16, episodes=1, network=(8,), traffic="none", max_seconds=10.0,
         parameters={"n_steps": 8, "batch_size": 16, "n_epochs": 1}, warm_start=str(corpus),
     )  # fmt: skip
     play = SelfPlayTraining(settings, tmp_path)
-    before = [{k: v.clone() for k, v in each.model.policy.state_dict().items()} for each in play.game.learners]
-    play.go()
-    for learner, old in zip(play.game.learners, before, strict=True):
+    before = [{k: v.clone() for k, v in each.model.policy.state_dict().items()} for each in play.rollout.learners]
+    play.run()
+    for learner, old in zip(play.rollout.learners, before, strict=True):
         for name, value in learner.model.policy.state_dict().items():
             acts = name.startswith(("action_net", "mlp_extractor.policy_net"))
             assert bool((value == old[name]).all()) is acts, name
 
 
-def test_how_far_the_reading_of_a_corpus_is_can_be_followed(corpus: Path) -> None:
-    told: list[tuple[str, int, int]] = []
-    read_lessons(corpus, "train", lambda *so_far: told.append(so_far))
-    assert told == [("Sessions of train", k, 3) for k in range(3)]
+def test_progress_of_reading_a_corpus_is_reported(corpus: Path) -> None:
+    reported: list[tuple[str, int, int]] = []
+    read_demonstrations(corpus, "train", lambda *so_far: reported.append(so_far))
+    assert reported == [("Sessions of train", k, 3) for k in range(3)]
 
 
-def test_a_corpus_without_sessions_is_told(tmp_path: Path) -> None:
+def test_corpus_without_sessions_is_reported(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="no session"):
-        read_lessons(tmp_path, "train")
+        read_demonstrations(tmp_path, "train")

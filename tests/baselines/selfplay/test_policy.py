@@ -20,11 +20,11 @@ from tests.baselines.selfplay.test_training import settings_for
 @pytest.fixture(scope="module", params=[False, True], ids=["independent", "shared"])
 def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
-    SelfPlayTraining(settings_for(shared=request.param, steps=32), folder).go()
+    SelfPlayTraining(settings_for(shared=request.param, steps=32), folder).run()
     return folder
 
 
-def test_learned_roles_play_in_brookside(folder: Path) -> None:
+def test_learned_roles_play_reproducibly(folder: Path) -> None:
     def play() -> list[object]:
         env = DuoWizardEnv("brookside", max_cycles=40)
         cast = {role: find_player(str(folder / role), role).make(role, env.limits) for role in AGENT_ROLES}
@@ -37,30 +37,30 @@ def test_learned_roles_play_in_brookside(folder: Path) -> None:
     assert len(first) > 5 and first == play()
 
 
-def test_a_policy_takes_in_what_was_taken_in_while_learning(folder: Path) -> None:
+def test_policy_input_equals_that_of_training(folder: Path) -> None:
     env = SelfPlayEnv(traffic="none", max_seconds=10.0)
     row, _ = env.reset(seed=0)
     policies = [read_policy(folder / role, role, env.duo.limits) for role in AGENT_ROLES]
     states = [policy.initial_state(0, env.duo.town) for policy in policies]
     for _ in range(10):
         for k, (role, policy) in enumerate(zip(AGENT_ROLES, policies, strict=True)):
-            seat, memory = states[k].seat, states[k].memory
-            seen = env._seen[role]
-            vector = seat.vector(seen, seat.notice(seen, memory))
-            np.testing.assert_array_equal(vector, env.table.vectors(row[None], k, padded=False)[0])
+            interface, memory = states[k].interface, states[k].memory
+            seen = env._observations[role]
+            vector = interface.vector(seen, interface.update(seen, memory))
+            np.testing.assert_array_equal(vector, env.layout.vectors(row[None], k, padded=False)[0])
             _, states[k] = policy.step(seen, states[k])
         env._memories = [state.memory for state in states]
         row, *_ = env.step(np.zeros(3, dtype=np.int64))
 
 
-def test_models_of_another_role_are_told(folder: Path) -> None:
+def test_models_of_another_role_or_version_are_refused(folder: Path) -> None:
     with pytest.raises(ValueError, match="plays participant, not co_wizard"):
         read_policy(folder / "participant", Role.CO_WIZARD, DuoWizardEnv().limits)
     description = folder / "ad_wizard" / "model.json"
     description.write_text(
         description.read_text(encoding="utf-8").replace('"size": 484', '"size": 488'), encoding="utf-8"
     )
-    with pytest.raises(ValueError, match="takes in 488 numbers .* another version"):
+    with pytest.raises(ValueError, match="takes 488 numbers .* another version"):
         read_policy(folder / "ad_wizard", Role.AD_WIZARD, DuoWizardEnv().limits)
     (folder / "participant" / "model.json").write_text('{"format": 1, "kind": "selfplay"}', encoding="utf-8")
     with pytest.raises(ValueError, match="no model of self-play"):

@@ -12,9 +12,9 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 import torch
 from safetensors.torch import load_file
 
+from dorothie_gym.baselines.rl.settings import SelfPlaySettings, selfplay_settings
 from dorothie_gym.baselines.selfplay import training as training_module
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv
-from dorothie_gym.baselines.selfplay.settings import SelfPlaySettings, selfplay_settings
 from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
 from dorothie_gym.errors import ModelFileError, SettingsError
 from dorothie_gym.ontology import AGENT_ROLES, Role
@@ -30,8 +30,8 @@ def settings_for(**changes: Any) -> SelfPlaySettings:
 
 
 @pytest.fixture(autouse=True)
-def _short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(training_module, "STRETCH", 2)
+def _frequent_checkpoints(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training_module, "ROLLOUTS_PER_CHECKPOINT", 2)
 
 
 def weights(folder: Path) -> dict[str, torch.Tensor]:
@@ -51,17 +51,17 @@ def assert_same(one: Path, two: Path) -> None:
 
 
 @pytest.mark.parametrize("shared", [False, True])
-def test_networks_learn_and_lie_in_folders(shared: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(training_module, "STRETCH", 16)  # the Ad-Wizard has nothing to choose from at first
+def test_networks_learn_and_are_saved(shared: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training_module, "ROLLOUTS_PER_CHECKPOINT", 16)  # the Ad-Wizard may only wait at first
     play = SelfPlayTraining(settings_for(shared=shared, max_seconds=30.0), tmp_path)
     before = [
         {name: value.clone() for name, value in learner.model.policy.state_dict().items()}
-        for learner in play.game.learners
+        for learner in play.rollout.learners
     ]
-    run = play.go()
+    run = play.run()
     assert run.finished and run.steps == 128 and [row.steps for row in run.rows] == [128]
-    assert len(play.game.learners) == (1 if shared else 3)
-    for learner, old in zip(play.game.learners, before, strict=True):
+    assert len(play.rollout.learners) == (1 if shared else 3)
+    for learner, old in zip(play.rollout.learners, before, strict=True):
         assert all(not torch.equal(value, old[name]) for name, value in learner.model.policy.state_dict().items())
     assert run.rows[-1].returns["co_wizard"] == run.rows[-1].returns["participant"] is not None
     assert run.rows[-1].returns["ad_wizard"] != run.rows[-1].returns["co_wizard"]
@@ -72,68 +72,68 @@ def test_networks_learn_and_lie_in_folders(shared: bool, tmp_path: Path, monkeyp
 
 
 @pytest.mark.parametrize("shared", [False, True])
-def test_what_was_interrupted_goes_on_to_the_same_weights(shared: bool, tmp_path: Path) -> None:
+def test_resumed_run_ends_with_the_same_weights(shared: bool, tmp_path: Path) -> None:
     settings = settings_for(shared=shared, max_seconds=5.0)
-    SelfPlayTraining(settings, tmp_path / "whole").go()
+    SelfPlayTraining(settings, tmp_path / "whole").run()
 
     def press_ctrl_c(done: int, total: int, row: Any) -> None:
         if done == 80:
             raise KeyboardInterrupt
 
-    cut = SelfPlayTraining(settings, tmp_path / "cut", press_ctrl_c).go()
+    cut = SelfPlayTraining(settings, tmp_path / "cut", press_ctrl_c).run()
     assert not cut.finished and cut.steps == 64
-    again = SelfPlayTraining(settings, tmp_path / "cut").go()
+    again = SelfPlayTraining(settings, tmp_path / "cut").run()
     assert again.finished and again.steps == 128
     assert_same(tmp_path / "whole", tmp_path / "cut")
     rows = [json.loads((tmp_path / name / "progress.jsonl").read_text(encoding="utf-8")) for name in ("whole", "cut")]
     assert {**rows[0], "seconds": 0} == {**rows[1], "seconds": 0}
 
 
-def test_the_same_seed_learns_the_same_with_worker_processes(tmp_path: Path) -> None:
+def test_worker_processes_do_not_change_the_weights(tmp_path: Path) -> None:
     more = {"steps": 64, "environments": 4, "coached_environments": 2}
-    SelfPlayTraining(settings_for(**more), tmp_path / "here").go()
-    SelfPlayTraining(settings_for(**more, workers=2), tmp_path / "there").go()
+    SelfPlayTraining(settings_for(**more), tmp_path / "here").run()
+    SelfPlayTraining(settings_for(**more, workers=2), tmp_path / "there").run()
     assert_same(tmp_path / "here", tmp_path / "there")
-    SelfPlayTraining(settings_for(**more, seed=1), tmp_path / "other").go()
+    SelfPlayTraining(settings_for(**more, seed=1), tmp_path / "other").run()
     name = "co_wizard/policy/action_net.weight"
     assert not torch.equal(weights(tmp_path / "here")[name], weights(tmp_path / "other")[name])
 
 
 @pytest.mark.parametrize("shared", [False, True])
-def test_who_is_coached_learns_beside_scripted_roles(shared: bool, tmp_path: Path) -> None:
+def test_coached_roles_learn_beside_scripted_ones(shared: bool, tmp_path: Path) -> None:
     settings = settings_for(environments=4, coached_environments=2, shared=shared)
-    game = SelfPlayTraining(settings, tmp_path).game
+    rollout = SelfPlayTraining(settings, tmp_path).rollout
     learns = {
-        env: {AGENT_ROLES[role] for learner in game.learners for k, role in learner.players.tolist() if k == env}
+        env: {AGENT_ROLES[role] for learner in rollout.learners for k, role in learner.players.tolist() if k == env}
         for env in range(4)
     }
     team = {Role.PARTICIPANT, Role.CO_WIZARD}
     assert learns == {0: {Role.CO_WIZARD}, 1: {Role.PARTICIPANT}, 2: {*AGENT_ROLES}, 3: team}
-    assert [set(env.scripted) for env in game._vector.envs] == [{*AGENT_ROLES} - learns[k] for k in range(2)] + [
+    assert [set(env.scripted) for env in rollout._vector.envs] == [{*AGENT_ROLES} - learns[k] for k in range(2)] + [
         set()
     ] * 2
-    game.close()
+    rollout.close()
 
 
 @pytest.mark.parametrize("shared", [False, True])
-def test_nobody_does_what_is_masked(shared: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_masked_actions_are_never_chosen(shared: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     step, seen = SelfPlayEnv.step, []
 
     def watched(self: SelfPlayEnv, action: Any) -> Any:
-        for k, (role, seat) in enumerate(zip(AGENT_ROLES, self._seats, strict=True)):
-            observation, masks = self._seen[role], self.duo.session.masks.mask(role)
-            allowed = seat.mask(observation, self._memories[k]) & seat.allowed(observation, masks)
+        for k, (role, interface) in enumerate(zip(AGENT_ROLES, self._interfaces, strict=True)):
+            observation, masks = self._observations[role], self.duo.session.masks.mask(role)
+            allowed = interface.mask(observation, self._memories[k]) & interface.permitted(observation, masks)
             seen.append(bool(allowed[action[k]]))
         return step(self, action)
 
     monkeypatch.setattr(SelfPlayEnv, "step", watched)
-    SelfPlayTraining(settings_for(shared=shared, max_seconds=60.0), tmp_path).go()
+    SelfPlayTraining(settings_for(shared=shared, max_seconds=60.0), tmp_path).run()
     assert len(seen) > 3 * 128 and all(seen)
 
 
-def test_tensorboard_gets_rewards_losses_and_success(tmp_path: Path) -> None:
+def test_tensorboard_logs_rewards_losses_and_success(tmp_path: Path) -> None:
     accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
-    SelfPlayTraining(settings_for(steps=32, max_seconds=5.0), tmp_path).go()
+    SelfPlayTraining(settings_for(steps=32, max_seconds=5.0), tmp_path).run()
     tags = set()
     for folder in (tmp_path / "tensorboard").iterdir():
         events = accumulator.EventAccumulator(str(folder))
@@ -144,8 +144,8 @@ def test_tensorboard_gets_rewards_losses_and_success(tmp_path: Path) -> None:
     assert ("participant", "eval/success_against_scripted") in tags
 
 
-def test_runs_of_other_settings_and_damaged_ones_are_left_alone(tmp_path: Path) -> None:
-    SelfPlayTraining(settings_for(), tmp_path).go()
+def test_runs_with_other_settings_and_damaged_runs_are_refused(tmp_path: Path) -> None:
+    SelfPlayTraining(settings_for(), tmp_path).run()
     with pytest.raises(SettingsError, match="another shared"):
         SelfPlayTraining(settings_for(shared=True), tmp_path)
     (tmp_path / "past.safetensors").write_bytes(b"nothing")
@@ -162,12 +162,12 @@ def test_runs_of_other_settings_and_damaged_ones_are_left_alone(tmp_path: Path) 
         ({"past_environments": 4, "coached_environments": 12}, "coached_environments"),
     ],
 )
-def test_bad_settings_are_named(given: dict[str, Any], named: str) -> None:
+def test_invalid_settings_are_named(given: dict[str, Any], named: str) -> None:
     with pytest.raises(SettingsError, match=named):
         selfplay_settings(given)
 
 
-def test_few_environments_have_fewer_in_which_not_all_learn() -> None:
+def test_numbers_of_partial_environments_scale_with_environments() -> None:
     one, eight = selfplay_settings(environments=1), selfplay_settings(environments=8)
     assert (one.past_environments, one.coached_environments) == (0, 0)
     assert (eight.past_environments, eight.coached_environments) == (2, 4)

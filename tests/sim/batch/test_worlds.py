@@ -7,7 +7,8 @@ import functools
 import numpy as np
 import pytest
 
-from dorothie_gym.sim.batch.worlds import VectorWorld, available_processors
+from dorothie_gym.processors import available_processors
+from dorothie_gym.sim.batch.worlds import VectorWorld
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle, populate
 from dorothie_gym.sim.state.codes import Kind

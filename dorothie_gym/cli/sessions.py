@@ -1,4 +1,4 @@
-"""`dorothie-gym replay`: playback and replay check of recorded sessions."""
+"""`dorothie-gym replay`, `compare` and `show`: playback, comparison and transcripts of recorded sessions."""
 
 from __future__ import annotations
 
@@ -14,19 +14,23 @@ from dorothie_gym.cli.output import (
     check_video,
     fail,
     print_json,
-    processors,
     reporting_errors,
     stderr,
     stdout,
     video_writer,
 )
+from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
+    from dorothie_gym.recording import Difference
     from dorothie_gym.rendering.playback import Playback
     from dorothie_gym.rollout.replay import ReplayCheck, ReplaySources
 
-_DIFFERENT = 1
-"""Exit code where a session differs from its replay."""
+DIFFERENT = 1
+"""Exit code where a session differs from its replay, or from another session."""
+
+
+# --- Playback and replay check ----------------------------------------------------------------------------------------
 
 
 def replay(
@@ -68,7 +72,7 @@ def replay(
             if check:
                 _check(path, sources, workers, as_json=as_json)
             else:
-                _show(path, sources, fps, video, as_json=as_json)
+                _play_back(path, sources, fps, video, as_json=as_json)
     except KeyboardInterrupt:
         stderr().print("Interrupted.")
         raise typer.Exit(INTERRUPTED) from None
@@ -79,20 +83,22 @@ def _check(path: Path, sources: ReplaySources, workers: int | None, *, as_json: 
     from dorothie_gym.rollout.replay import check_replays
 
     checks = []
-    for check in check_replays(Corpus.load(path, maps=sources.maps).entries, sources, workers=workers or processors()):
+    for check in check_replays(
+        Corpus.load(path, maps=sources.maps).entries, sources, workers=workers or available_processors()
+    ):
         checks.append(check)
         if not as_json:
-            stdout().print(_in_words(check), markup=False, soft_wrap=True)
+            stdout().print(_check_line(check), markup=False, soft_wrap=True)
     equal = all(check.equal for check in checks)
     if as_json:
         print_json({"checked": len(checks), "equal": equal, "sessions": [check.to_json() for check in checks]})
     elif len(checks) > 1:
         stdout().print(f"{sum(check.equal for check in checks)} of {len(checks)} replays are equal")
     if not equal:
-        raise typer.Exit(_DIFFERENT)
+        raise typer.Exit(DIFFERENT)
 
 
-def _in_words(check: ReplayCheck) -> str:
+def _check_line(check: ReplayCheck) -> str:
     from dorothie_gym._version import __version__
 
     found = check.difference
@@ -108,7 +114,7 @@ def _in_words(check: ReplayCheck) -> str:
     return text
 
 
-def _show(path: Path, sources: ReplaySources, fps: float, video: Path | None, *, as_json: bool) -> None:
+def _play_back(path: Path, sources: ReplaySources, fps: float, video: Path | None, *, as_json: bool) -> None:
     from dorothie_gym.recording import read_session
     from dorothie_gym.rendering.playback import Playback
 
@@ -162,7 +168,7 @@ def _show_window(playback: Playback, fps: float) -> int:
         fail("no window can be opened here; write a video instead: --video FILE.mp4")
     shown = 0
     try:
-        if _is_invisible():
+        if _is_window_invisible():
             fail("there is no screen to open a window on; write a video instead: --video FILE.mp4")
         for scene in playback.scenes(fps):
             window.show(renderer.draw(scene), fps)
@@ -174,8 +180,80 @@ def _show_window(playback: Playback, fps: float) -> int:
     return shown
 
 
-def _is_invisible() -> bool:
+def _is_window_invisible() -> bool:
     """Returns whether SDL opened an invisible window although the user did not choose its driver."""
     import pygame
 
     return pygame.display.get_driver() in ("offscreen", "dummy") and "SDL_VIDEODRIVER" not in os.environ
+
+
+# --- Comparison -------------------------------------------------------------------------------------------------------
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="A", help="A session, or a folder of sessions (corpus, rollout).")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="The session or folder to compare it with.")],
+    as_json: AsJson = False,
+) -> None:
+    """Compare two sessions, or two folders of sessions, event by event and frame by frame.
+
+    Sessions of folders are compared with those of the same path. The exit code is 1 if any of them differs.
+    """
+    from dorothie_gym.recording import compare_folders
+
+    rows: list[tuple[str, Difference | None]] = []
+    with reporting_errors():
+        for name, difference in compare_folders(first, second):
+            rows.append((name, difference))
+            if not as_json:
+                stdout().print(f"{name}: {_difference_line(difference)}", markup=False, soft_wrap=True)
+    equal = sum(difference is None for _, difference in rows)
+    if as_json:
+        sessions = [
+            {"session": name, "equal": found is None, "difference": _difference_page(found)} for name, found in rows
+        ]
+        print_json({"compared": len(rows), "equal": equal == len(rows), "sessions": sessions})
+    elif len(rows) > 1:
+        stdout().print(f"{equal} of {len(rows)} sessions are equal")
+    if equal < len(rows):
+        raise typer.Exit(DIFFERENT)
+
+
+def _difference_line(difference: Difference | None) -> str:
+    if difference is None:
+        return "equal"
+    if difference.field == "session":  # one of the two folders has no such session
+        return f"first: {difference.recorded}, second: {difference.replayed}"
+    when = "before it begins" if difference.frame < 0 else f"at frame {difference.frame}"
+    return f"differs first {when}, {difference.field}: {difference.recorded} and {difference.replayed}"
+
+
+def _difference_page(difference: Difference | None) -> dict[str, int | str] | None:
+    if difference is None:
+        return None
+    return {
+        "frame": difference.frame,
+        "field": difference.field,
+        "first": difference.recorded,
+        "second": difference.replayed,
+    }
+
+
+# --- Transcripts ------------------------------------------------------------------------------------------------------
+
+
+def show(
+    session: Annotated[list[Path], typer.Argument(metavar="SESSION...", help="Sessions of any layout.")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE.md", help="File to write; default standard output.")] = None,
+    maps: Maps = None,
+) -> None:
+    """Write annotated transcripts as Markdown: utterances, dialogue acts, exchanges, transactions and other events."""
+    with reporting_errors():
+        from dorothie_gym.analysis.transcript import markdown
+        from dorothie_gym.recording import read_session
+
+        page = "\n".join(markdown(read_session(path, maps=maps)) for path in session)
+        if out is not None:
+            out.write_text(page, encoding="utf-8", newline="\n")
+        else:
+            typer.echo(page, nl=False)
