@@ -51,14 +51,14 @@ NEARER = 1.0
 """Decrease of the cost to go that counts as progress for `patience` [m]."""
 
 LEFT_ROAD_DISTANCE = 15.0
-"""Distance from the path beyond which the car has left the road for good [m]."""
+"""Distance from the path beyond which the ego counts as having left the road [m]."""
 
 _RULES = tuple(kind.value for kind in INFRACTION_KINDS if kind is not WorldEventKind.COLLISION)
 _SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
 
 
 class DrivingSession:
-    """Session in progress.
+    """Session in progress in which the agent only drives: instructor, Ad-Wizard, rewards and end of the episode.
 
     Attributes:
         session: the session.

@@ -168,7 +168,7 @@ END = 2.0
 """Distance to the end of the path within which a new one is planned [m]."""
 
 PREPARED_UNTIL = 5.0
-"""Distance behind its planned place from which on a manoeuvre is no longer prepared [m]."""
+"""Distance behind its planned place beyond which a manoeuvre is no longer prepared [m]."""
 
 CONTROL_SPECS = (
     signal("throttle", 1, meaning="share of full throttle; negative values count as 0"),
