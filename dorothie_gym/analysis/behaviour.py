@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ MAX_UNDEFINED_SHARE: Final = 0.5
 _HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
 _ENV, _TASK, _NONE = Handled.ENVIRONMENTAL, Handled.TASK, Handled.NONE
 
-Key: TypeAlias = tuple[Any, ...]
+Key: TypeAlias = tuple[object, ...]
 
 
 class Tally:
@@ -133,7 +133,7 @@ class BehaviourVerdict:
         """Whether the interval is above zero."""
         return self.low is not None and self.low > 0.0
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Returns `name`, `title`, `difference`, `low`, `high` and `holds`."""
         names = ("difference", "low", "high", "holds")
         return {"name": self.claim.name, "title": self.claim.title, **{name: getattr(self, name) for name in names}}

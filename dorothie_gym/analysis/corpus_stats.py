@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NotRequired, TypedDict
 
 from dorothie_gym.analysis.agreement import inconsistencies
 from dorothie_gym.analysis.diversity import has_language_models, plain, repetition, trigram_perplexity, words_of
@@ -189,6 +189,17 @@ ANCHOR_TOLERANCE = 0.08
 """Accepted difference from the shares in seen towns."""
 
 
+class AnchorRow(TypedDict):
+    """Share of a label in a corpus and in the paper; fields as of `Anchors.to_json`."""
+
+    label: NotRequired[str | None]
+    share: float | None
+    points: int
+    paper: float
+    paper_unseen: float
+    within: bool | None
+
+
 @dataclass
 class Anchors:
     """Counts of the labels of the three tasks: flagged moves of both speakers, flagged navigation actions."""
@@ -209,28 +220,29 @@ class Anchors:
             if action.flagged and action.source is Role.CO_WIZARD and action.action in NAVIGATION_ACTIONS:
                 self.actions[action.action.label] += 1
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, AnchorRow]:
         """Returns for each anchor `share` and `points` (and `label` of the most frequent class), `paper`, `within`.
 
         `paper` is the share in seen towns, `within` whether the corpus differs by at most `ANCHOR_TOLERANCE`. Share and
         `within` are None without a point.
         """
         human, car = self.moves[Role.PARTICIPANT], self.moves[Role.CO_WIZARD]
-        rows = {
-            "commonest_human_move": _commonest(human),
-            "commonest_car_move": _commonest(car),
-            "commonest_navigation_action": _commonest(self.actions),
-            "human_moves_without_slot": _share(self.without_slot[Role.PARTICIPANT], human.total()),
-            "car_moves_without_slot": _share(self.without_slot[Role.CO_WIZARD], car.total()),
+        commonest = {
+            "commonest_human_move": human,
+            "commonest_car_move": car,
+            "commonest_navigation_action": self.actions,
         }
-        for name, row in rows.items():
-            row["paper"], row["paper_unseen"] = SEEN_SHARES[name], UNSEEN_SHARES[name]
-            share = row["share"]
-            row["within"] = None if share is None else abs(share - SEEN_SHARES[name]) <= ANCHOR_TOLERANCE
-        return rows
+        without_slot = (
+            ("human_moves_without_slot", Role.PARTICIPANT, human),
+            ("car_moves_without_slot", Role.CO_WIZARD, car),
+        )
+        return {
+            **{key: _commonest(key, counts) for key, counts in commonest.items()},
+            **{key: _share(key, self.without_slot[role], counts.total()) for key, role, counts in without_slot},
+        }
 
 
-def anchors_of(sessions: Iterable[Session]) -> dict[str, Any]:
+def anchors_of(sessions: Iterable[Session]) -> dict[str, AnchorRow]:
     """Returns the anchors of sessions in the form of `Anchors.to_json`."""
     anchors = Anchors()
     for session in sessions:
@@ -238,13 +250,20 @@ def anchors_of(sessions: Iterable[Session]) -> dict[str, Any]:
     return anchors.to_json()
 
 
-def _commonest(counts: Counter[str]) -> dict[str, Any]:
+def _commonest(name: str, counts: Counter[str]) -> AnchorRow:
     label, count = min(counts.items(), key=lambda item: (-item[1], item[0])) if counts else (None, 0)
-    return {"label": label, **_share(count, counts.total())}
+    return {"label": label, **_share(name, count, counts.total())}
 
 
-def _share(count: int, points: int) -> dict[str, Any]:
-    return {"share": count / points if points else None, "points": points}
+def _share(name: str, count: int, points: int) -> AnchorRow:
+    share = count / points if points else None
+    return {
+        "share": share,
+        "points": points,
+        "paper": SEEN_SHARES[name],
+        "paper_unseen": UNSEEN_SHARES[name],
+        "within": None if share is None else abs(share - SEEN_SHARES[name]) <= ANCHOR_TOLERANCE,
+    }
 
 
 # --- Statistics of a corpus ------------------------------------------------------------------------------------------
@@ -280,7 +299,7 @@ class CorpusStats:
         if not session.complete:
             self.incomplete.append(session.name)
 
-    def diversity(self) -> dict[str, Any]:
+    def diversity(self) -> dict[str, object]:
         """Returns measures of lexical diversity.
 
         Returns:
@@ -306,7 +325,21 @@ def corpus_stats_of(corpus: Corpus) -> CorpusStats:
     return census
 
 
-def phenomena_of(sessions: Iterable[Session]) -> list[dict[str, Any]]:
+class PhenomenonRow(TypedDict):
+    """Counts of a phenomenon, see `phenomena_of`."""
+
+    number: int
+    title: str
+    cause: str
+    sessions: int
+    occurs: int
+    share: float | None
+    findings: int
+    forms: dict[str, int]
+    example: dict[str, object] | None
+
+
+def phenomena_of(sessions: Iterable[Session]) -> list[PhenomenonRow]:
     """Returns counts of the 24 phenomena.
 
     Returns:
@@ -350,7 +383,7 @@ class _Row:
             turn = findings[0].turn
             self.example = {"session": talk.session.name, "time": round(turn.start, 1), "text": turn.text}
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> PhenomenonRow:
         return {
             "number": self.phenomenon.number,
             "title": self.phenomenon.title,

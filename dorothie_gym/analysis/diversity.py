@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
-from typing import Any
+from typing import Protocol, TypedDict
 
 _WORD = re.compile(r"[^\W_]+(?:['’\-][^\W_]+)*")
 
@@ -28,7 +28,15 @@ ORDER = 3
 UNKNOWN = "<unk>"
 
 
-def repetition(texts: Counter[str]) -> dict[str, Any]:
+class Repetition(TypedDict):
+    """Measures of the repetition of utterances; None without utterances."""
+
+    distinct_utterance_ratio: float | None
+    commonest_utterance: str | None
+    commonest_utterance_share: float | None
+
+
+def repetition(texts: Counter[str]) -> Repetition:
     """Returns measures of the repetition of utterances.
 
     Args:
@@ -39,7 +47,7 @@ def repetition(texts: Counter[str]) -> dict[str, Any]:
         utterances.
     """
     if not texts:
-        return dict.fromkeys(("distinct_utterance_ratio", "commonest_utterance", "commonest_utterance_share"))
+        return Repetition(distinct_utterance_ratio=None, commonest_utterance=None, commonest_utterance_share=None)
     text, count = min(texts.items(), key=lambda item: (-item[1], item[0]))
     total = texts.total()
     return {
@@ -100,13 +108,18 @@ def _padded(words: Sequence[str]) -> list[str]:
     return ["<s>"] * (ORDER - 1) + list(words) + ["</s>"]
 
 
-def _fitted(sentences: Sequence[Sequence[str]]) -> Any:
+class _LanguageModel(Protocol):
+    def unmasked_score(self, word: str, context: tuple[str, ...]) -> float:
+        """Returns the probability of a word after its context."""
+
+
+def _fitted(sentences: Sequence[Sequence[str]]) -> _LanguageModel:
     """Returns nltk's model of the sentences with an estimator that counts continuations once, not for every score."""
     from nltk.lm.models import InterpolatedLanguageModel
     from nltk.lm.smoothing import KneserNey
     from nltk.util import everygrams
 
-    class Remembering(KneserNey):  # type: ignore[misc]
+    class Remembering(KneserNey):  # type: ignore[misc]  # nltk has no types
         """Kneser-Ney with precomputed sums over contexts; nltk's own takes seconds for a hundred scores."""
 
         tables: dict[tuple[str, ...], tuple[Counter[str], int]]
@@ -129,4 +142,5 @@ def _fitted(sentences: Sequence[Sequence[str]]) -> Any:
     model = InterpolatedLanguageModel(Remembering, ORDER, params={"discount": 0.1, "order": ORDER})
     padded = [_padded(words) for words in sentences]
     model.fit((everygrams(words, max_len=ORDER) for words in padded), [word for words in padded for word in words])
-    return model
+    fitted: _LanguageModel = model
+    return fitted

@@ -144,12 +144,12 @@ def leaderboard(
         picture = draw_leaderboard(entries, out.with_suffix(".png"))
         out.write_text(leaderboard_page(entries, picture.name), encoding="utf-8")
     if as_json:
-        rows = [{"policy": entry.policy, "towns": entry.part, **entry.page} for entry in entries]
+        rows = [{"policy": entry.policy, "towns": entry.part, **entry.table.to_json()} for entry in entries]
         print_json({"page": str(out), "picture": str(picture), "rows": rows})
         return
     console = stdout()
     for entry in entries:
-        success = entry.page["success"]["mean"]
+        success = entry.table.figures["success"]["mean"]
         share = "-" if success is None else f"{100 * success:.1f} %"
         console.print(f"{entry.part:7} {entry.policy}: success {share}", markup=False, soft_wrap=True)
     console.print(f"Written: {out}, {picture}", style="dim", markup=False, soft_wrap=True)

@@ -224,7 +224,7 @@ def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
         shown.add_column(title, justify="left" if title in ("phenomenon", "forms") else "right")
     for row in rows:
         forms = ", ".join(f"{form} {count}" for form, count in row["forms"].items())
-        style = "yellow" if row["sessions"] and row["share"] < 0.05 else ""
+        style = "yellow" if row["share"] is not None and row["share"] < 0.05 else ""
         counts = (str(row["sessions"]), str(row["occurs"]), _percent(row["share"]))
         shown.add_row(str(row["number"]), row["title"], *counts, forms, style=style)
     stdout().print(shown)

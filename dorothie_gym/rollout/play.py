@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import Policy
-from dorothie_gym.policies.policy import policy_inputs, policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.recording import SessionWriter
+from dorothie_gym.spaces import ActionMapping
 
 
 class SessionHost(Protocol):
@@ -26,13 +26,13 @@ class SessionHost(Protocol):
     def reset(self, seed: int | None = None) -> object:
         """Begins a session."""
 
-    def step(self, actions: Mapping[str, Mapping[str, Any]]) -> object:
+    def step(self, actions: Mapping[str, ActionMapping]) -> object:
         """Plays one decision with an action for each agent."""
 
 
 def play_session(
     host: SessionHost,
-    policies: Mapping[Role, Policy[Any]],
+    policies: Mapping[Role, AnyPolicy],
     *,
     seed: int,
     folder: Path | str | None = None,

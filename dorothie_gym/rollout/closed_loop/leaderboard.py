@@ -6,15 +6,26 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.errors import RolloutError
 from dorothie_gym.ontology import Role
 from dorothie_gym.rendering.charts import INK, dress_percent_axes, empty_figure
 from dorothie_gym.rollout.closed_loop.metrics import ClosedLoopMetric, RecoverySeconds
-from dorothie_gym.rollout.closed_loop.results import ALL_METRICS, RESULT_FILE, RolloutResult, figure_text, read_result
+from dorothie_gym.rollout.closed_loop.results import (
+    ALL_METRICS,
+    RESULT_FILE,
+    RolloutResult,
+    RolloutTable,
+    figure_text,
+    read_result,
+)
 from dorothie_gym.rollout.closed_loop.running import command_of, fold_of_towns
 from dorothie_gym.rollout.runner import COST_FILE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 OTHER: Final = "other"
 """Part of the leaderboard for rollouts in towns of both folds, or of neither."""
@@ -36,13 +47,13 @@ class LeaderboardEntry:
     Attributes:
         folder: folder of the rollout.
         result: result of the rollout.
-        page: table of the result (`RolloutResult.table`).
+        table: table of the result.
         cost: `wall_seconds`, `cpu_seconds` and `workers` of the rollout; empty if unknown.
     """
 
     folder: Path
     result: RolloutResult
-    page: Mapping[str, Any]
+    table: RolloutTable
     cost: Mapping[str, float]
 
     @property
@@ -67,7 +78,7 @@ class LeaderboardEntry:
     @property
     def rank(self) -> tuple[float, float, str]:
         """Sort key: success, then driving score, best first; then the name."""
-        success, score = (self.page[key]["mean"] for key in ("success", "driving_score"))
+        success, score = (self.table.figures[key]["mean"] for key in ("success", "driving_score"))
         return -(success or 0.0), -(score or 0.0), self.policy
 
 
@@ -123,9 +134,9 @@ def _figures(entries: Sequence[LeaderboardEntry]) -> list[str]:
     ]
     rows = [["Co-Wizard", "sessions", "errored", *(metric.title for metric in columns)]]
     for entry in entries:
-        cells = [figure_text(metric, entry.page[metric.key]) for metric in columns]
+        cells = [figure_text(metric, entry.table.figures[metric.key]) for metric in columns]
         part = "" if entry.result.complete else f" of {entry.result.settings['sessions_planned']}"
-        rows.append([entry.policy, f"{entry.page['sessions']}{part}", str(entry.page["errored"]), *cells])
+        rows.append([entry.policy, f"{entry.table.sessions}{part}", str(entry.table.errored), *cells])
     return _table(rows)
 
 
@@ -140,7 +151,7 @@ def _costs(entries: Sequence[LeaderboardEntry]) -> list[str]:
                 entry.part,
                 f"{training['steps']:,.0f}" if "steps" in training else "-",
                 _time(training.get("seconds")),
-                f"{entry.page['decisions']:,}",
+                f"{entry.table.decisions:,}",
                 _time(entry.cost.get("wall_seconds")) + (f" by {workers:g}" if workers else ""),
                 _time(entry.cost.get("cpu_seconds")),
             ]
@@ -176,7 +187,7 @@ def _read(folder: Path) -> LeaderboardEntry:
         cost = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
     except ValueError as error:
         raise RolloutError(f"{file}: is not valid JSON ({error}); remove it, and run the rollout again") from None
-    return LeaderboardEntry(folder=folder, result=result, page=result.table(), cost=cost)
+    return LeaderboardEntry(folder=folder, result=result, table=result.table(), cost=cost)
 
 
 # --- picture ----------------------------------------------------------------------------------------------------------
@@ -216,22 +227,23 @@ def draw_leaderboard(entries: Sequence[LeaderboardEntry], path: Path | str) -> P
     return Path(path)
 
 
-def _panel(axes: Any, entries: Sequence[LeaderboardEntry], names: Sequence[str], key: str) -> None:
+def _panel(axes: Axes, entries: Sequence[LeaderboardEntry], names: Sequence[str], key: str) -> None:
     parts = [part for part in PART_TITLES if any(entry.part == part for entry in entries)]
     for entry in entries:
-        figure = entry.page[key]
-        if figure["mean"] is None:
+        figure = entry.table.figures[key]
+        mean, low, high = figure["mean"], figure["low"], figure["high"]
+        if mean is None:
             continue
         at = names.index(entry.policy) + (parts.index(entry.part) - (len(parts) - 1) / 2) * 0.3
         colour = _COLOURS[entry.part]
-        if figure["low"] is not None:
-            axes.plot([100 * figure["low"], 100 * figure["high"]], [at, at], color=colour, linewidth=1.4, zorder=2)
-        axes.plot([100 * figure["mean"]], [at], "o", markersize=5.5, color=colour, zorder=3)
+        if low is not None and high is not None:
+            axes.plot([100 * low, 100 * high], [at, at], color=colour, linewidth=1.4, zorder=2)
+        axes.plot([100 * mean], [at], "o", markersize=5.5, color=colour, zorder=3)
     title = next(metric.title for metric in ALL_METRICS if metric.key == key)
     dress_percent_axes(axes, title, len(names), margin=3)
 
 
-def _legend(figure: Any, entries: Sequence[LeaderboardEntry], height: float) -> None:
+def _legend(figure: Figure, entries: Sequence[LeaderboardEntry], height: float) -> None:
     from matplotlib.lines import Line2D
 
     handles = [

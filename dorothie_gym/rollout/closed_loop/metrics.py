@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import ClassVar, Final
+from typing import ClassVar, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,7 @@ class Success(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Success, and 1."""
+        """Returns 1 for a success, else 0; and 1."""
         return float(record.success), 1.0
 
 
@@ -75,7 +75,7 @@ class GoalConditionSuccess(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """The share, and 1."""
+        """Returns the share, and 1."""
         return (record.reached / record.live, 1.0) if record.live else (0.0, 0.0)
 
 
@@ -88,7 +88,7 @@ class SPL(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """The product, and 1."""
+        """Returns the product, and 1."""
         if not record.success:
             return 0.0, 1.0
         if record.shortest is None:
@@ -106,7 +106,7 @@ class RouteCompletion(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """The share, and 1."""
+        """Returns the share, and 1."""
         return (0.0, 0.0) if record.completion is None else (record.completion, 1.0)
 
 
@@ -124,7 +124,7 @@ class InfractionScore(ClosedLoopMetric):
     penalties: Mapping[str, float] = field(default_factory=lambda: PENALTIES)
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """The product, and 1."""
+        """Returns the product, and 1."""
         product = 1.0
         for name, count in record.infractions.items():
             product *= self.penalties.get(name, 1.0) ** count
@@ -140,7 +140,7 @@ class Infractions(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Their number, and 1."""
+        """Returns their number, and 1."""
         return float(sum(count for name, count in record.infractions.items() if name in PENALTIES)), 1.0
 
 
@@ -153,7 +153,7 @@ class DrivingScore(ClosedLoopMetric):
     worst: ClassVar[float | None] = 0.0
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """The product, and 1."""
+        """Returns the product, and 1."""
         share, counts = RouteCompletion().parts(record)
         return share * InfractionScore().parts(record)[0], counts
 
@@ -167,7 +167,7 @@ class Seconds(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """The time, and 1."""
+        """Returns the time, and 1."""
         return record.seconds, 1.0
 
 
@@ -180,7 +180,7 @@ class ExchangesPerSubgoal(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Exchanges, and live subgoals."""
+        """Returns exchanges, and live subgoals."""
         return record.talk.exchanges, record.live
 
 
@@ -193,7 +193,7 @@ class UtterancesPerSubgoal(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Utterances, and live subgoals."""
+        """Returns utterances, and live subgoals."""
         return record.talk.utterances, record.live
 
 
@@ -205,7 +205,7 @@ class AbandonedExchanges(ClosedLoopMetric):
     title: ClassVar[str] = "exchanges abandoned"
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Abandoned exchanges, and all exchanges."""
+        """Returns abandoned exchanges, and all exchanges."""
         return record.talk.abandoned, record.talk.exchanges
 
 
@@ -218,7 +218,7 @@ class ClarificationRate(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Such moves, and exchanges."""
+        """Returns such moves, and exchanges."""
         return record.talk.clarifications, record.talk.exchanges
 
 
@@ -231,7 +231,7 @@ class ExceptionsMet(ClosedLoopMetric):
     is_share: ClassVar[bool] = False
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Their number, and 1."""
+        """Returns their number, and 1."""
         return float(sum(each.met is not None for each in record.exceptions)), 1.0
 
 
@@ -243,7 +243,7 @@ class ExceptionsRecovered(ClosedLoopMetric):
     title: ClassVar[str] = "recovered"
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
-        """Exceptions recovered from, and exceptions met."""
+        """Returns exceptions recovered from, and exceptions met."""
         met = [each for each in record.exceptions if each.met is not None]
         return float(sum(each.seconds is not None for each in met)), float(len(met))
 
@@ -276,7 +276,7 @@ class RecoverySeconds:
     is_share: ClassVar[bool] = False
 
     def values(self, record: SessionRecord) -> tuple[float, ...]:
-        """The times of one session."""
+        """Returns the times of one session."""
         return tuple(each.seconds for each in record.exceptions if each.seconds is not None)
 
     def of(self, records: Iterable[SessionRecord]) -> float | None:
@@ -289,6 +289,10 @@ class RecoverySeconds:
 
 BOOTSTRAP_SEED: Final = 0
 """Seed of the bootstrap samples: equal sessions give equal intervals."""
+
+
+FigurePage: TypeAlias = dict[str, float | None]
+"""Metric over sessions in JSON types: `mean`, `low` and `high`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -305,7 +309,7 @@ class MetricInterval:
     low: float | None = None
     high: float | None = None
 
-    def to_json(self) -> dict[str, float | None]:
+    def to_json(self) -> FigurePage:
         """Returns `mean`, `low` and `high`, rounded to 6 decimals, which do not depend on the machine."""
         return {name: None if value is None else round(value, 6) for name, value in vars(self).items()}
 

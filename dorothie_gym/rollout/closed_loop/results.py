@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +18,7 @@ from dorothie_gym.rollout.closed_loop.metrics import (
     BOOTSTRAP_SEED,
     METRICS,
     ClosedLoopMetric,
+    FigurePage,
     MetricInterval,
     RecoverySeconds,
     figures_of,
@@ -51,10 +52,42 @@ class RolloutRow:
     record: SessionRecord | None = None
     error: str | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Returns the fields in JSON types."""
         record = None if self.record is None else self.record.to_json()
         return {"number": self.number, "town": self.town, "seed": self.seed, "error": self.error, "record": record}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RolloutTable:
+    """Metrics over some sessions of a rollout.
+
+    Attributes:
+        sessions: number of sessions.
+        errored: number of sessions that ended in an error.
+        decisions: number of decisions of the agents.
+        figures: each metric by key.
+    """
+
+    sessions: int
+    errored: int
+    decisions: int
+    figures: Mapping[str, FigurePage]
+
+    @classmethod
+    def of(cls, rows: Sequence[RolloutRow]) -> RolloutTable:
+        """Returns the table of some rows."""
+        records = [row.record for row in rows if row.record is not None]
+        return cls(
+            sessions=len(rows),
+            errored=len(rows) - len(records),
+            decisions=sum(record.decisions for record in records),
+            figures={key: figure.to_json() for key, figure in _figures(rows).items()},
+        )
+
+    def to_json(self) -> dict[str, object]:
+        """Returns `sessions`, `errored`, `decisions`, and each metric, in JSON types."""
+        return {"sessions": self.sessions, "errored": self.errored, "decisions": self.decisions, **self.figures}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,39 +116,41 @@ class RolloutResult:
         """Returns every metric over all sessions, by key."""
         return _figures(self.rows)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Returns the table and the rows in JSON types; they do not depend on the number of workers."""
         return {
             "version": RESULT_VERSION,
             "settings": dict(self.settings),
             "complete": self.complete,
-            **self.table(),
-            "per_town": self._parts(dict.fromkeys(row.town for row in self.rows), lambda row, town: row.town == town),
-            "per_exception": self.per_exception(),
+            **self.table().to_json(),
+            "per_town": {town: table.to_json() for town, table in self.per_town().items()},
+            "per_exception": {kind: table.to_json() for kind, table in self.per_exception().items()},
             "seeds": [row.seed for row in self.rows],
             "interval": {"share": CONFIDENCE, "resamples": RESAMPLES, "seed": BOOTSTRAP_SEED},
             "rows": [row.to_json() for row in self.rows],
         }
 
-    def table(self) -> dict[str, Any]:
-        """Returns `sessions`, `errored`, `decisions`, and each metric as mean, low and high."""
-        return _table(self.rows)
+    def table(self) -> RolloutTable:
+        """Returns the table of all sessions."""
+        return RolloutTable.of(self.rows)
 
-    def per_exception(self) -> dict[str, Any]:
+    def per_town(self) -> dict[str, RolloutTable]:
+        """Returns the table of each town, in the order of their first sessions."""
+        towns = dict.fromkeys(row.town for row in self.rows)
+        return {town: RolloutTable.of([row for row in self.rows if row.town == town]) for town in towns}
+
+    def per_exception(self) -> dict[str, RolloutTable]:
         """Returns a table for the sessions with each kind of exception, and one for sessions without exceptions.
 
         Exceptions met and recovered from are those of that kind only.
         """
-        found: dict[str, Any] = {}
+        found: dict[str, RolloutTable] = {}
         for kind in ExceptionKind:
             rows = [_only(row, kind) for row in self.rows if kind in _kinds(row)]
             if rows:
-                found[kind.name.lower()] = _table(rows)
+                found[kind.name.lower()] = RolloutTable.of(rows)
         free = [row for row in self.rows if row.record is not None and not row.record.exceptions]
-        return {**found, NO_EXCEPTION: _table(free)} if free else found
-
-    def _parts(self, names: Iterable[str], belongs: Callable[[RolloutRow, str], bool]) -> dict[str, Any]:
-        return {name: _table([row for row in self.rows if belongs(row, name)]) for name in names}
+        return {**found, NO_EXCEPTION: RolloutTable.of(free)} if free else found
 
 
 def result_from_json(page: Any, where: str) -> RolloutResult:
@@ -162,19 +197,7 @@ def read_result(path: Path | str) -> RolloutResult:
     return result_from_json(page, str(file))
 
 
-def _table(rows: Iterable[RolloutRow]) -> dict[str, Any]:
-    rows = list(rows)
-    records = [row.record for row in rows if row.record is not None]
-    return {
-        "sessions": len(rows),
-        "errored": len(rows) - len(records),
-        "decisions": sum(record.decisions for record in records),
-        **{key: figure.to_json() for key, figure in _figures(rows).items()},
-    }
-
-
-def _figures(rows: Iterable[RolloutRow]) -> dict[str, MetricInterval]:
-    rows = list(rows)
+def _figures(rows: Sequence[RolloutRow]) -> dict[str, MetricInterval]:
     records = [row.record for row in rows if row.record is not None]
     return figures_of(records, len(rows) - len(records))
 
@@ -214,14 +237,13 @@ MAX_PRINTED_SEEDS: Final = 20
 
 def print_result(result: RolloutResult, console: Console) -> None:
     """Prints the tables of a rollout, its seeds, and its errors."""
-    page = result.to_json()
-    settings = page["settings"]
+    table, settings = result.table(), result.settings
     cast = ", ".join(f"{role} {settings[str(role)]}" for role in AGENT_ROLES)
-    errors = f", {page['errored']} of them ended in an error" if page["errored"] else ""
-    console.print(f"{page['sessions']} sessions{errors}: {cast}", markup=False, soft_wrap=True)
-    console.print(_overall(page))
-    console.print(_parts("town", page["per_town"], TOWN_METRICS))
-    console.print(_parts("exception", page["per_exception"], EXCEPTION_METRICS))
+    errors = f", {table.errored} of them ended in an error" if table.errored else ""
+    console.print(f"{table.sessions} sessions{errors}: {cast}", markup=False, soft_wrap=True)
+    console.print(_overall(table))
+    console.print(_parts("town", result.per_town(), TOWN_METRICS))
+    console.print(_parts("exception", result.per_exception(), EXCEPTION_METRICS))
     seeds = [str(row.seed) for row in result.rows]
     more = "" if len(seeds) <= MAX_PRINTED_SEEDS else f", ... ({len(seeds)} in all, see --json)"
     console.print(f"Seeds (of --seed {settings['seed']}): {', '.join(seeds[:MAX_PRINTED_SEEDS])}{more}", soft_wrap=True)
@@ -230,7 +252,7 @@ def print_result(result: RolloutResult, console: Console) -> None:
             console.print(f"Session {row.number} ({row.town}, seed {row.seed}): {row.error}", markup=False)
 
 
-def figure_text(metric: ClosedLoopMetric | RecoverySeconds, figure: Mapping[str, float | None]) -> str:
+def figure_text(metric: ClosedLoopMetric | RecoverySeconds, figure: FigurePage) -> str:
     """Returns a figure with its interval: "95.0 [92.1, 97.4] %" for a share, "-" if it is undefined."""
     mean, low, high = figure["mean"], figure["low"], figure["high"]
     if mean is None:
@@ -242,17 +264,17 @@ def figure_text(metric: ClosedLoopMetric | RecoverySeconds, figure: Mapping[str,
     return text + (" %" if metric.is_share else "")
 
 
-def _overall(page: Mapping[str, Any]) -> Table:
+def _overall(page: RolloutTable) -> Table:
     table = Table("metric", "mean [95 % interval]", title="Closed loop")
     for metric in ALL_METRICS:
-        table.add_row(metric.title, figure_text(metric, page[metric.key]))
+        table.add_row(metric.title, figure_text(metric, page.figures[metric.key]))
     return table
 
 
-def _parts(name: str, parts: Mapping[str, Mapping[str, Any]], keys: tuple[str, ...]) -> Table:
+def _parts(name: str, parts: Mapping[str, RolloutTable], keys: tuple[str, ...]) -> Table:
     chosen = [metric for metric in ALL_METRICS if metric.key in keys]
     table = Table(name, "sessions", "errored", *(metric.title for metric in chosen), title=f"By {name}")
-    for part, figures in parts.items():
-        cells = (figure_text(metric, figures[metric.key]).replace(" [", "\n[") for metric in chosen)
-        table.add_row(part.replace("_", " "), str(figures["sessions"]), str(figures["errored"]), *cells)
+    for part, page in parts.items():
+        cells = (figure_text(metric, page.figures[metric.key]).replace(" [", "\n[") for metric in chosen)
+        table.add_row(part.replace("_", " "), str(page.sessions), str(page.errored), *cells)
     return table

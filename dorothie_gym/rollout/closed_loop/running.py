@@ -89,7 +89,7 @@ class RolloutSettings:
             for number in range(self.sessions)
         )
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Returns the settings in JSON types, with SHA-256 and training cost of learned players."""
         return {
             **{str(role): self.cast[role].name for role in AGENT_ROLES},

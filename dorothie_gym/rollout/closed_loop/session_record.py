@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, Final
+from typing import Final, TypedDict
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from dorothie_gym.ontology import DialogueMove, ExceptionKind, ObjectClass
 from dorothie_gym.recording import FRAME_RATE, Event, EventType, Session
 from dorothie_gym.rollout.closed_loop.task_progress import (
     TaskRecord,
-    TaskWay,
+    TaskRoutes,
     driven_length,
     is_arrival,
     places_of,
@@ -29,7 +29,7 @@ from dorothie_gym.rollout.closed_loop.task_progress import (
 )
 
 CLARIFICATIONS: Final = frozenset({DialogueMove.CONFUSE, DialogueMove.CLARIFY, DialogueMove.CHECK})
-"""Moves that repair or make sure (spec: metrics)."""
+"""Moves that repair or check understanding (spec: metrics)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +37,10 @@ class TalkRecord:
     """Counts of a session's dialogue.
 
     Attributes:
-        utterances: of participant and Co-Wizard.
-        exchanges: found anew by the rule (`dialogue.ExchangeTracker`).
-        abandoned: of these, those that were given up without an answer.
-        clarifications: moves of `CLARIFICATIONS`.
+        utterances: number of utterances of participant and Co-Wizard.
+        exchanges: number of exchanges, derived by the rule of `dialogue.exchanges`.
+        abandoned: number of exchanges that were abandoned without an answer.
+        clarifications: number of moves of `CLARIFICATIONS`.
     """
 
     utterances: int = 0
@@ -48,13 +48,13 @@ class TalkRecord:
     abandoned: int = 0
     clarifications: int = 0
 
-    def to_json(self) -> dict[str, Any]:
-        """Returns the fields."""
+    def to_json(self) -> dict[str, int]:
+        """Returns the fields in JSON types."""
         return asdict(self)
 
     @classmethod
-    def from_json(cls, row: Mapping[str, Any]) -> TalkRecord:
-        """Reads what `to_json` returned."""
+    def from_json(cls, row: Mapping[str, int]) -> TalkRecord:
+        """Parses the output of `to_json`."""
         return cls(**row)
 
 
@@ -74,42 +74,50 @@ def talk_of(session: Session) -> TalkRecord:
 # --- Exceptions and recovery ------------------------------------------------------------------------------------------
 
 MIN_PROGRESS: Final = 10.0
-"""The car has come forward when so much less is left [m at 40 km/h]: a cell of the router's, its accuracy."""
+"""Decrease of the remaining route that counts as progress [m at 40 km/h]: a cell, thus the accuracy, of the router."""
 
 PROBE_PERIOD: Final = 1.0
-"""The car's place is looked at so often [s]."""
+"""Period at which the remaining route is computed [s]."""
+
+
+class MetExceptionPage(TypedDict):
+    """Exception in JSON types; fields as of `MetException`."""
+
+    kind: str
+    met: float | None
+    seconds: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class MetException:
-    """An exception, and what became of it.
+    """Exception of a session, with the times of meeting it and of recovery.
 
     Attributes:
-        kind: of the exception.
-        met: when it was met [s]; None if never.
-        seconds: from then until it was recovered from; None if it was not.
+        kind: kind of the exception.
+        met: time at which it was met [s]; None if never.
+        seconds: time from then until recovery [s]; None without recovery.
     """
 
     kind: ExceptionKind
     met: float | None = None
     seconds: float | None = None
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> MetExceptionPage:
         """Returns `kind` (lower-case name), `met` and `seconds`."""
         return {"kind": self.kind.name.lower(), "met": self.met, "seconds": self.seconds}
 
     @classmethod
-    def from_json(cls, row: Mapping[str, Any]) -> MetException:
-        """Reads what `to_json` returned."""
+    def from_json(cls, row: MetExceptionPage) -> MetException:
+        """Parses the output of `to_json`."""
         return cls(kind=ExceptionKind[row["kind"].upper()], met=row["met"], seconds=row["seconds"])
 
 
 def met_exceptions(session: Session, town: Town) -> tuple[MetException, ...]:
-    """Returns the exceptions of a session, in order, those left out that take something away again.
+    """Returns the exceptions of a session in order, without those that remove a prop or end a sensor fault.
 
     Args:
         session: a recorded session.
-        town: its map.
+        town: its town.
     """
     found = []
     for index, event in enumerate(session.events):
@@ -126,7 +134,11 @@ def met_exceptions(session: Session, town: Town) -> tuple[MetException, ...]:
 
 
 def when_met(session: Session, event: Event, kind: ExceptionKind) -> float:
-    """Returns when an exception was met [s], infinity if never; see the module."""
+    """Returns the time at which an exception was met [s]; infinity if never.
+
+    An object on the road is met when the car comes within `MEETING_DISTANCE` of it, spawned actors when the car comes
+    that near to their square, and any other exception when it takes effect.
+    """
     if kind.is_plan_level:
         return time_met(session, event)
     if kind not in (ExceptionKind.SPAWN_VEHICLES, ExceptionKind.SPAWN_PEDESTRIANS):
@@ -148,6 +160,14 @@ def _takes_away(kind: ExceptionKind, event: Event) -> bool:
 
 
 def _seconds_to_recovery(session: Session, town: Town, index: int, met: float) -> float:
+    """Returns the time from meeting an exception to recovery [s]; infinity without recovery.
+
+    Args:
+        session: a recorded session.
+        town: its town.
+        index: number of the exception's event.
+        met: time at which it was met [s].
+    """
     frame = round(met * FRAME_RATE)
     known = max(index + 1, sum(event.frame <= frame for event in session.events))
     task = task_after(session, known)
@@ -160,9 +180,9 @@ def _seconds_to_recovery(session: Session, town: Town, index: int, met: float) -
     frames = range(frame, step, round(PROBE_PERIOD * FRAME_RATE))
     places = places_of(session, town, frames)
     if not places or len(places) < len(frames):
-        return at_step  # the recording does not know its lanes
-    way = TaskWay(town, task, _on_road(session, known))
-    left = [way.left(place) for place in places]
+        return at_step  # the lanes were not recorded
+    way = TaskRoutes(town, task, _on_road(session, known))
+    left = [way.remaining(place) for place in places]
     if not math.isfinite(left[0]):
         return at_step
     behind = max(k for k, metres in enumerate(left) if left[0] - metres < MIN_PROGRESS)
@@ -190,10 +210,10 @@ def _on_road(session: Session, events: int) -> tuple[Place, ...]:
 
 TIMEOUT: Final = "timeout"
 HIT_BY_OTHERS: Final = "hit_by_others"
-"""Name of the collisions that are not of the car's own making: they are counted, and cost nothing."""
+"""Name of the collisions that others caused; they are counted and have no penalty."""
 
 OUT_OF_TIME: Final = "out of time"
-"""Reason of an `End` that cut the session off."""
+"""Reason of the `End` event of a truncated session."""
 
 _RULES: Final = {
     EventType.RED_LIGHT: "red_light",
@@ -204,23 +224,39 @@ _RULES: Final = {
 _TOUCHED: Final = {ObjectClass.PEDESTRIAN: "pedestrian", ObjectClass.VEHICLES: "vehicle"}
 
 
+class SessionRecordPage(TypedDict):
+    """Measures of one session in JSON types; fields as of `SessionRecord`."""
+
+    live: int
+    reached: int
+    success: bool
+    shortest: float | None
+    driven: float
+    completion: float | None
+    seconds: float
+    decisions: int
+    infractions: dict[str, int]
+    talk: dict[str, int]
+    exceptions: list[MetExceptionPage]
+
+
 @dataclass(frozen=True, kw_only=True)
 class SessionRecord:
-    """The measures of one session.
+    """Measures of one session.
 
     Attributes:
         live: number of live subgoals at the end.
-        reached: how many of them were reached.
-        success: whether all were, the destination last, without a collision of the car's own making.
-        shortest: length of the shortest way through all live subgoals [m]; None where there is none.
-        driven: length of the way that was driven [m].
-        completion: share of the way that was done, in [0, 1]; None where no way leads to what is left.
-        seconds: simulated time.
-        decisions: of the agents.
-        infractions: how often each kind happened ("pedestrian", "vehicle", "static", "red_light", "stop_sign",
+        reached: number of live subgoals that were reached.
+        success: whether all live subgoals were reached, the destination last, without a collision caused by the car.
+        shortest: length of the shortest route through all live subgoals [m]; None without a route.
+        driven: distance driven [m].
+        completion: completed share of the route, in [0, 1]; None if no route leads to the remaining subgoals.
+        seconds: simulated time [s].
+        decisions: number of decisions of the agents.
+        infractions: number of infractions of each kind ("pedestrian", "vehicle", "static", "red_light", "stop_sign",
             "timeout", "off_road", "wrong_way", "hit_by_others").
         talk: counts of the dialogue.
-        exceptions: those that happened.
+        exceptions: exceptions of the session.
     """
 
     live: int
@@ -235,41 +271,52 @@ class SessionRecord:
     talk: TalkRecord = field(default_factory=TalkRecord)
     exceptions: tuple[MetException, ...] = ()
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> SessionRecordPage:
         """Returns the fields in JSON types."""
         return {
-            **{name: getattr(self, name) for name in _PLAIN},
+            "live": self.live,
+            "reached": self.reached,
+            "success": self.success,
+            "shortest": self.shortest,
+            "driven": self.driven,
+            "completion": self.completion,
+            "seconds": self.seconds,
+            "decisions": self.decisions,
             "infractions": dict(self.infractions),
             "talk": self.talk.to_json(),
             "exceptions": [each.to_json() for each in self.exceptions],
         }
 
     @classmethod
-    def from_json(cls, row: Mapping[str, Any]) -> SessionRecord:
-        """Reads what `to_json` returned; raises `KeyError` or `TypeError` where it is something else."""
+    def from_json(cls, row: SessionRecordPage) -> SessionRecord:
+        """Parses the output of `to_json`; raises `KeyError` or `TypeError` for other input."""
         return cls(
-            **{name: row[name] for name in _PLAIN},
+            live=row["live"],
+            reached=row["reached"],
+            success=row["success"],
+            shortest=row["shortest"],
+            driven=row["driven"],
+            completion=row["completion"],
+            seconds=row["seconds"],
+            decisions=row["decisions"],
             infractions=dict(row["infractions"]),
             talk=TalkRecord.from_json(row["talk"]),
             exceptions=tuple(MetException.from_json(each) for each in row["exceptions"]),
         )
 
 
-_PLAIN: Final = ("live", "reached", "success", "shortest", "driven", "completion", "seconds", "decisions")
-
-
 def measure(session: Session, town: Town) -> SessionRecord:
     """Returns the measures of a recorded session.
 
     Args:
-        session: one that was played to its end, or as far as it goes.
-        town: its map.
+        session: a complete or an interrupted session.
+        town: its town.
     """
     task = task_at_end(session)
     infractions = count_infractions(session)
     own = sum(infractions.get(name, 0) for name in ("pedestrian", "vehicle", "static"))
     start = session.header.departure
-    shortest = TaskWay(town, without_reached(task)).shortest(start)
+    shortest = TaskRoutes(town, without_reached(task)).shortest(start)
     return SessionRecord(
         live=len(task.live),
         reached=len(task.reached),
@@ -286,10 +333,10 @@ def measure(session: Session, town: Town) -> SessionRecord:
 
 
 def count_infractions(session: Session) -> dict[str, int]:
-    """Returns how often each kind of infraction happened; kinds that did not are left out.
+    """Returns the number of infractions of each kind; kinds without infractions are left out.
 
-    A collision counts by what was hit: pedestrian, vehicle, or anything else ("static"). One that others caused, while
-    the car stood or was run into from behind (`own_fault` of the event), counts as "hit_by_others".
+    Collisions are classified by the counterpart: pedestrian, vehicle, or anything else ("static"). Collisions that
+    others caused (`own_fault` is false: the car stood or was hit from behind) count as "hit_by_others".
     """
     counts: Counter[str] = Counter()
     for each in session.infractions:
@@ -305,23 +352,23 @@ def count_infractions(session: Session) -> dict[str, int]:
 
 
 def route_completion(session: Session, town: Town, task: TaskRecord) -> float | None:
-    """Returns the share of the way through the live subgoals that was done, in [0, 1].
+    """Returns the completed share of the route through the live subgoals, in [0, 1].
 
-    1 - (what was left where the car was nearest to the end) / (what there was from the departure), both the router's
-    cost in the best order that is allowed. As the leaderboard's it does not fall when the car drives away again: the
-    nearest place since the last arrival counts, looked at every two seconds.
+    It is 1 - remaining / total, both the router's cost in the best allowed order. As in the CARLA leaderboard, it does
+    not fall when the car drives away again: the smallest remaining cost since the last arrival counts, computed every
+    two seconds.
 
     Returns:
-        The share; None where no way leads to what is left.
+        The share; None if no route leads to the remaining subgoals.
     """
     if task.done:
         return 1.0
-    whole = TaskWay(town, without_reached(task)).left(session.header.departure)
+    whole = TaskRoutes(town, without_reached(task)).remaining(session.header.departure)
     if math.isinf(whole) or whole <= 0.0:
         return None
-    way = TaskWay(town, task)
+    way = TaskRoutes(town, task)
     last = max((event.frame for event in session.events if is_arrival(event)), default=0)
     end = round(session.duration * FRAME_RATE)
     places = places_of(session, town, [*range(last, end, 2 * FRAME_RATE), end]) or [session.header.departure]
-    left = min(way.left(place) for place in places)
+    left = min(way.remaining(place) for place in places)
     return None if math.isinf(left) else round(min(max(1.0 - left / whole, 0.0), 1.0), 6)

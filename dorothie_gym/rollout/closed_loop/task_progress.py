@@ -1,4 +1,4 @@
-"""The task of a recorded session: what was live, reached and where, found anew from header and events."""
+"""Task of a recorded session, reconstructed from header and events, and the remaining route through its subgoals."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from dorothie_gym.recording import NO_LANE, Event, EventType, LandmarkRow, Sessi
 
 @dataclass(frozen=True, kw_only=True)
 class TaskRecord:
-    """The task as it stood at a moment.
+    """State of the task at one moment.
 
     Attributes:
-        places: lane and station [m] of each live subgoal, by number, in the storyboard's order.
-        after: numbers of the subgoals that come before each, live or not.
+        places: lane and station [m] of each live subgoal, by number, in the order of the storyboard.
+        after: for each subgoal, the numbers of the subgoals that must be reached before it, live or not.
         reached: live subgoals that have been reached.
     """
 
@@ -47,9 +47,9 @@ class TaskRecord:
         return bool(self.live) and not self.left
 
     def may_be_next(self, goal: int, reached: frozenset[int]) -> bool:
-        """Returns whether the rules allow to reach a live subgoal when some have been reached (as `tasks.TaskState`).
+        """Returns whether a live subgoal may be reached next, given the reached ones (as `tasks.TaskState`).
 
-        The destination comes after all others; what a subgoal comes after binds only where it is live.
+        The destination comes after all other subgoals. Of the subgoals in `after`, only live ones count.
         """
         if goal in reached:
             return False
@@ -58,12 +58,12 @@ class TaskRecord:
 
 
 def task_at_end(session: Session) -> TaskRecord:
-    """Returns the task as it stood when the session was over."""
+    """Returns the task at the end of a session."""
     return task_after(session, len(session.events))
 
 
 def task_after(session: Session, events: int) -> TaskRecord:
-    """Returns the task as it stood after the first so many events."""
+    """Returns the task after the first `events` events."""
     rows = session.header.subgoals
     live = {number: not row["trigger"] for number, row in enumerate(rows)}
     places = {number: _place(session.header.landmarks[row["landmark"]]) for number, row in enumerate(rows)}
@@ -88,12 +88,12 @@ def task_after(session: Session, events: int) -> TaskRecord:
 
 
 def without_reached(task: TaskRecord) -> TaskRecord:
-    """Returns the same task with nothing reached yet."""
+    """Returns the task with no subgoal reached."""
     return replace(task, reached=frozenset())
 
 
 def is_arrival(event: Event) -> bool:
-    """Returns whether an event tells that a subgoal was reached."""
+    """Returns whether an event reports that a subgoal was reached."""
     return event.type is EventType.SUBGOAL and event.data.get("status") == GoalStatus.COMPLETE.label
 
 
@@ -107,10 +107,10 @@ def _place(row: LandmarkRow) -> Place:
 
 
 def _place_of_change(session: Session, event: Event, index: int) -> Place:
-    """Where a changed subgoal is.
+    """Returns the place of a changed subgoal.
 
-    Older recordings tell the name of the landmark only; where several have it, it is the one at which the car stood
-    when the subgoal was reached, else the first of them.
+    Older recordings contain only the name of the landmark. If several landmarks have this name, it is the one at which
+    the car stood when the subgoal was reached, or else the first.
     """
     landmarks = session.header.landmarks
     row = event.data.get("row")
@@ -135,13 +135,13 @@ def _arrives(event: Event, change: Event) -> bool:
 # --- Remaining distance through the subgoals --------------------------------------------------------------------------
 
 
-class TaskWay:
-    """Ways through what is left of a task.
+class TaskRoutes:
+    """Lengths of the routes through the subgoals of a task.
 
     Args:
-        town: the map.
+        town: the town.
         task: the task.
-        blocked: places that cannot be passed; where they leave no way, they are ignored.
+        blocked: places that cannot be passed; ignored if they leave no route.
     """
 
     def __init__(self, town: Town, task: TaskRecord, blocked: Sequence[Place] = ()) -> None:
@@ -150,16 +150,16 @@ class TaskWay:
         self._rest: dict[tuple[int, frozenset[int]], float] = {}
 
     def shortest(self, start: Place) -> float:
-        """Returns the length of the shortest way through all live subgoals, reached or not [m]; inf if there is none.
+        """Returns the length of the shortest route through all live subgoals, reached or not [m]; inf without a route.
 
-        Between two places it is the way that the town's router takes, the quickest.
+        Between two places, the town's router gives the quickest route.
         """
         return _best(self._task, start, frozenset(), lambda one, two: self._length(one, two))
 
-    def left(self, place: Place) -> float:
-        """Returns what is left from a place through the subgoals not reached yet [m at 40 km/h]; inf if no way is.
+    def remaining(self, place: Place) -> float:
+        """Returns the cost of the route from a place through the unreached subgoals [m at 40 km/h]; inf without one.
 
-        It is the router's cost, which knows speed limits, turns and lane changes.
+        It is the router's cost, which includes speed limits, turns and lane changes.
         """
         task = self._task
         goals = [goal for goal in task.live if task.may_be_next(goal, task.reached)]
@@ -168,7 +168,7 @@ class TaskWay:
         return min((self._cost(place, goal) + self._after(goal) for goal in goals), default=math.inf)
 
     def _after(self, goal: int) -> float:
-        """Returns the remaining subgoals after a further one has been reached."""
+        """Returns the remaining cost once a further subgoal has been reached."""
         reached = self._task.reached | {goal}
         if (goal, reached) not in self._rest:
             place = self._task.places[goal]
@@ -191,7 +191,7 @@ class TaskWay:
 
 
 def _best(task: TaskRecord, start: Place, reached: frozenset[int], between: Callable[[Place, Place], float]) -> float:
-    """Length of the best way through what is not reached, over all orders that are allowed (Held and Karp, 1962)."""
+    """Returns the length of the best route through the unreached subgoals in any allowed order (Held-Karp, 1962)."""
     known: dict[tuple[Place, frozenset[int]], float] = {}
     lengths: dict[tuple[Place, Place], float] = {}
 
@@ -216,13 +216,13 @@ def _best(task: TaskRecord, start: Place, reached: frozenset[int], between: Call
 
 
 def driven_length(session: Session) -> float:
-    """Returns how far the car drove [m]: the places of all frames, joined."""
+    """Returns the distance driven [m]: the length of the polyline through the positions of all frames."""
     rows = session.trajectory
     return float(np.hypot(np.diff(rows["x"]), np.diff(rows["y"])).sum())
 
 
 def places_of(session: Session, town: Town, frames: Iterable[int]) -> list[Place]:
-    """Returns lane and station [m] of the car at frames; frames without a lane that the town has are left out."""
+    """Returns lane and station [m] of the car at frames; frames without a lane of the town are left out."""
     rows = session.trajectory
     found: list[Place] = []
     if not len(rows):
