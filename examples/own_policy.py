@@ -3,8 +3,8 @@
 A policy is stateless: `initial_state(seed, town)` and `step(observation, state) -> (action, state)`. The example policy
 delegates everything to the scripted Co-Wizard but never changes the cruise speed, and leaves out physical actions that
 the car would refuse; for this it reads the action mask, which its observation contains because of `reads_mask`.
-Sessions are recorded and measured with the metrics of `docs/closed-loop.md`. Three policies with two sessions each take
-about 20 seconds.
+Sessions are recorded and measured with the metrics of `docs/closed-loop.md`.
+Three policies with two sessions each take about 20 seconds.
 
     python examples/own_policy.py --sessions 2 --town brookside
 """
