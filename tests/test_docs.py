@@ -118,6 +118,12 @@ def test_the_examples_of_the_tasks_page_run(tmp_path: Path, monkeypatch: pytest.
     assert set(names["info"]["reward_terms"]) <= {"action", "joint"}
 
 
+def test_the_example_of_the_statistics_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path / "CORPUS" / "train" / "one", talk())
+    monkeypatch.chdir(tmp_path)
+    exec(compile(example("statistics.md", "python"), "statistics.md", "exec"), {})
+
+
 def test_the_tasks_page_names_every_field_of_a_batch() -> None:
     text = (DOCS / "tasks.md").read_text(encoding="utf-8")
     missing = [field.name for field in dataclasses.fields(Batch) if f"`{field.name}`" not in text]

@@ -51,7 +51,7 @@ PHENOMENA: Final[tuple[Phenomenon, ...]] = (
     ),
     Phenomenon(
         number=9,
-        title="roadblock told of and got around",
+        title="roadblock reported and bypassed",
         cause="the car comes near something put on the road",
         has_cause=changes.meets_roadblock,
         find=changes.roadblock,

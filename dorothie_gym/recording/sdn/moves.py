@@ -24,8 +24,8 @@ from dorothie_gym.recording.sdn.files import (
 from dorothie_gym.recording.trajectory import TENTHS
 from dorothie_gym.recording.validation import ReadReport
 
-WORDS_A_SECOND: Final = 2.5
-"""Speech rate for utterances without a recorded duration (spec: design, Time)."""
+SDN_WORDS_PER_SECOND: Final = 2.5
+"""Speech rate of people, for utterances without a recorded duration [words/s] (spec: design, Time)."""
 
 MAX_SPEECH_GAP: Final = 20
 """Frames (10 Hz) between a stretch of speech and a move that belongs to it."""
@@ -172,7 +172,7 @@ class MoveReader:
             return (stretch.start - self._first) / TENTHS, (stretch.end - self._first) / TENTHS
         self._report.repair("times of utterances without audio were guessed from their words")
         over = (frame - self._first) / TENTHS
-        return round(over - max(len(text.split()), 1) / WORDS_A_SECOND, 3), over
+        return round(over - max(len(text.split()), 1) / SDN_WORDS_PER_SECOND, 3), over
 
 
 def read_speech(
