@@ -349,7 +349,7 @@ def _open_pieces(town: Town, tunnels: Sequence[LevelStretch]) -> Iterator[tuple[
 def _layer(
     town: Town, pieces: Iterable[tuple[Lane, float, float]], areas: Sequence[Array], margin: float, colour: Colour
 ) -> Iterator[Shape]:
-    """All roads and junctions, wider by a margin [m] on either side."""
+    """Yields all roads and junctions, wider by a margin [m] on either side."""
     for lane, start, end in pieces:
         wider = _JOINT if lane.in_junction and not margin else 0.0
         yield Shape(ribbon(lane, margin + wider, start, end), colour)

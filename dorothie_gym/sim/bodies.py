@@ -99,7 +99,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
 
     @classmethod
     def create_from(cls, vehicle: IDMVehicle) -> IDMVehicle:
-        """A vehicle of highway-env's own in the same state, which owns it."""
+        """Returns a vehicle of highway-env's own class in the same state, with its own memory."""
         twin = IDMVehicle.create_from(vehicle)
         twin.LENGTH, twin.WIDTH, twin.diagonal = vehicle.LENGTH, vehicle.WIDTH, vehicle.diagonal
         return twin
@@ -186,7 +186,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
         return away / far if far > 0.0 else np.zeros(2)
 
     def on_lane(self) -> tuple[float, float]:
-        """Station and distance to the right on the closest lane [m]."""
+        """Returns the station and distance to the right on the closest lane [m]."""
         return self.station, self.lateral
 
     @property

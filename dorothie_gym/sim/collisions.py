@@ -229,7 +229,7 @@ class OrientedBox(NamedTuple):
 
 
 def boxes_touch(one: OrientedBox, other: OrientedBox) -> bool:
-    """Whether two boxes have a point in common, by the separating axis theorem (Gottschalk et al. 1996, in the plane).
+    """Returns whether two boxes have a point in common (separating axes: Gottschalk et al. 1996, in the plane).
 
     Boxes are convex: they are apart if and only if they are so along one of the four directions of their sides.
     """

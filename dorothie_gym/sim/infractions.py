@@ -110,7 +110,7 @@ class InfractionWatch:
                 self._arrays.last[k] = last
 
     def _at_line(self, line: int, frame: int, pose: Array) -> list[Breach]:
-        """The breach of passing a line, if it is one: at a stop sign without a stand, or at a red light."""
+        """Returns the breach of passing a line, if any: at a stop sign without a stand, or at a red light."""
         kind, signal = self._lines.signals[line]
         lane = self._lines.lanes[line]
         infraction, other = Infraction.STOP_SIGN, ObjectClass.TRAFFIC_SIGN

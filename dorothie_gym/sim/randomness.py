@@ -14,7 +14,7 @@ MASK = 0xFFFFFFFF
 
 @compiled
 def draw(body: RandomBody) -> float:
-    """A number in [0, 1); moves the field `random` of a body on, which is never 0."""
+    """Returns a number in [0, 1) and advances the field `random` of a body, which is never 0."""
     state = int(body.random)
     state ^= (state << 13) & MASK
     state ^= state >> 17
@@ -25,5 +25,5 @@ def draw(body: RandomBody) -> float:
 
 @compiled
 def choose(body: RandomBody, count: int) -> int:
-    """A number of 0, 1, ... count - 1."""
+    """Returns one of the numbers 0, 1, ... count - 1."""
     return int(draw(body) * count)

@@ -47,7 +47,7 @@ class TownRoad(Road):
         record_history: bool = False,
         neighbour_vehicles_connected_lanes: bool = True,
     ) -> None:
-        """Put vehicles and objects on a network.
+        """Puts vehicles and objects on a network.
 
         Args:
             network: lanes of the town.
@@ -76,7 +76,7 @@ class TownRoad(Road):
         return lane_zones(self.network.table)
 
     def height_of(self, thing: RoadObject) -> float:
-        """Height of a vehicle or object [m]: its own `height` if it has one, else its lane's; NaN without a lane."""
+        """Returns the height of a vehicle or object [m]: its own, else its lane's; NaN without a lane."""
         own = getattr(thing, "height", None)
         if own is not None:
             return float(own)
@@ -93,7 +93,7 @@ class TownRoad(Road):
         return not abs(self.height_of(one) - self.height_of(other)) > LEVEL_HEIGHT
 
     def step(self, dt: float) -> None:
-        """Move everything by `dt` [s] and check for collisions.
+        """Moves everything by `dt` [s] and checks for collisions.
 
         Same as highway-env's for things at one height; pairs that its own first check would dismiss are not visited.
         """
@@ -154,7 +154,7 @@ class TownRoad(Road):
     def neighbour_vehicles(
         self, vehicle: Vehicle, lane_index: LaneIndex | None = None
     ) -> tuple[RoadObject | None, RoadObject | None]:
-        """Next thing ahead and behind of a vehicle; see `neighbours`.
+        """Returns the next bodies ahead of and behind a vehicle; see `neighbours`.
 
         Args:
             vehicle: whose neighbours.
@@ -214,7 +214,7 @@ class TownRoad(Road):
         return (front, float(found.front_distance)), (rear, float(found.rear_distance))
 
     def _route(self, vehicle: Vehicle, index: LaneIndex) -> Route | None:
-        """The vehicle's route; without one, the lane it steers for if that follows the lane in question."""
+        """Returns the vehicle's route; without one, the lane it steers for if that follows the given lane."""
         route: Route | None = getattr(vehicle, "route", None)
         target = getattr(vehicle, "target_lane_index", None)
         if route or target is None or target == index:

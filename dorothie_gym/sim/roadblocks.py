@@ -36,7 +36,7 @@ def closed_by(place: Place) -> list[Place]:
 
 
 def crowds(town: Town, place: Place, others: Iterable[Place]) -> bool:
-    """Whether a prop would leave too little room to turn round before one on a lane beside its own, or itself."""
+    """Returns whether a prop would leave too little room for a U-turn before a prop on a lane beside, or itself."""
     lane, station = place
     position = town.lanes[lane].position(station)
     beside = {

@@ -126,7 +126,7 @@ class Weather:
 
 
 def _running_film(rate: float) -> float:
-    """Water that runs off the road in rain of a rate [mm/h], above the road's texture [mm].
+    """Returns the water that runs off the road in rain of a rate [mm/h], above the road's texture [mm].
 
     Gallaway et al. (FHWA-RD-79-31, 1979): 0.01485 t^0.11 L^0.43 i^0.59 / S^0.42 - t.
     """
@@ -171,7 +171,7 @@ class Wind:
         self.phases = tuple(float(phase) for phase in rng.uniform(0.0, 2 * math.pi, len(PERIODS)))
 
     def speed(self, strength: float, time: float) -> float:
-        """Speed of the wind [m/s], never below 0.
+        """Returns the speed of the wind [m/s], never below 0.
 
         Args:
             strength: in [0, 1]; 0 is no wind that matters.

@@ -233,7 +233,7 @@ def _fillet(entry: Pose, exit_: Pose) -> Curve | None:
 
 
 def _biarc(entry: Pose, exit_: Pose) -> Curve:
-    """Two arcs with equal tangent lengths (Bolton, "Biarc curves", Computer-Aided Design 7(2), 1975)."""
+    """Returns two arcs with equal tangent lengths (Bolton, "Biarc curves", Computer-Aided Design 7(2), 1975)."""
     dx, dy = exit_[0] - entry[0], exit_[1] - entry[1]
     tx, ty, ux, uy = math.cos(entry[2]), math.sin(entry[2]), math.cos(exit_[2]), math.sin(exit_[2])
     along, bend, square = dx * (tx + ux) + dy * (ty + uy), 2.0 * (1.0 - tx * ux - ty * uy), dx * dx + dy * dy

@@ -53,7 +53,7 @@ class HelmRecord:
 
 
 def lanes_beside(network: TownNetwork) -> NDArray[np.int32]:
-    """(lanes, 2) the lanes left and right of each one in highway-env's graph; itself at the edge of the road."""
+    """Returns the lanes left and right of each lane (lanes, 2) in highway-env's graph; at the edge the lane itself."""
     beside = np.empty((len(network.town.lanes), 2), dtype=np.int32)
     for start, end, place in network.lanes_dict():
         edge = network.graph[start][end]
@@ -153,7 +153,7 @@ def _follow_road(town: TownArrays, vehicle: VehicleRecord, helm: HelmRecord) -> 
 
 @compiled
 def speed_along(town: TownArrays, vehicle: VehicleRecord) -> float:
-    """Speed along the closest lane [m/s], 0 off the road (`RoadObject.on_road`)."""
+    """Returns the speed along the closest lane [m/s], 0 off the road (`RoadObject.on_road`)."""
     lane, station = town.lanes[vehicle.lane], vehicle.own_station
     if not -CAR_LENGTH <= station < lane.length + CAR_LENGTH:
         return 0.0

@@ -58,7 +58,7 @@ class ThreadPool:
     """
 
     def __init__(self, others: int) -> None:
-        """Start threads.
+        """Starts threads.
 
         Args:
             others: how many beside the caller's own.
@@ -146,7 +146,7 @@ def _change(state: NDArray[np.int64], expected: int, new: int) -> int:
 def _compare_and_swap(
     _context: TypingContext, state: types.Type, expected: types.Type, new: types.Type
 ) -> IntrinsicCode:
-    """Compare-and-swap instruction, which replaces the lock in compiled code."""
+    """Emits a compare-and-swap instruction, which replaces the lock in compiled code."""
 
     def generate(context: BaseContext, builder: IRBuilder, signature: Signature, arguments: Sequence[Value]) -> Value:
         array = context.make_array(signature.args[0])(context, builder, arguments[0])
@@ -220,7 +220,7 @@ def take(turns: NDArray[np.int64], home: int) -> int:
 
 @intrinsic
 def _fetch_and_add(_context: TypingContext, turns: types.Type) -> IntrinsicCode:
-    """Atomic addition, which replaces the lock in compiled code."""
+    """Emits an atomic addition, which replaces the lock in compiled code."""
 
     def generate(context: BaseContext, builder: IRBuilder, signature: Signature, arguments: Sequence[Value]) -> Value:
         array = context.make_array(signature.args[0])(context, builder, arguments[0])

@@ -59,7 +59,7 @@ class Actions:
     """
 
     def __init__(self, config: Mapping[str, object]) -> None:
-        """Read highway-env's setting `action`; raises `ValueError` for what only plain environments can do."""
+        """Reads highway-env's setting `action`; raises `ValueError` for types of plain environments only."""
         if config.get("type") not in ("DiscreteMetaAction", "ContinuousAction"):
             raise _sync_only("action", f"type {config.get('type')!r}")
         self._stock = action_factory(None, dict(config))
@@ -127,7 +127,7 @@ class Kinematics:
     """
 
     def __init__(self, config: Mapping[str, object]) -> None:
-        """Read highway-env's setting `observation`; raises `ValueError` for what only plain environments can do."""
+        """Reads highway-env's setting `observation`; raises `ValueError` for types of plain environments only."""
         if config.get("type") != "Kinematics":
             raise _sync_only("observation", f"type {config.get('type')!r}")
         self._stock = KinematicObservation(None, **config)
@@ -151,7 +151,7 @@ class Kinematics:
         )
 
     def ranges(self, lanes: int) -> Array:
-        """(f, 2) values of each feature that are shown as -1 and 1, NaN where values are shown as they are.
+        """Returns (f, 2) values of each feature that are shown as -1 and 1, NaN where values are not scaled.
 
         Args:
             lanes: how many there are on the road where the ego begins: highway-env's unit of `y`.
@@ -364,7 +364,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], ActionArray, NDArray[np.gener
         return self._worlds.threads
 
     def world(self, number: int) -> WorldArrays:
-        """The world of an environment; its first vehicle is the ego."""
+        """Returns the world of an environment; its first vehicle is the ego."""
         return self._worlds.world(number)
 
     # --- Episodes -----------------------------------------------------------------------------------------------------

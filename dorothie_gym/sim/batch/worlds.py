@@ -22,7 +22,7 @@ INLINED = {**WITHOUT_COUNTS, "forceinline": True}
 
 
 def stacked(world: WorldArrays, count: int) -> WorldArrays:
-    """A batch of copies of a world; its arrays have the shapes (count, ...)."""
+    """Returns a batch of copies of a world; its arrays have the shapes (count, ...)."""
     batch = WorldArrays._make(_room(array, count) for array in world.plain())
     for number in range(count):
         put(batch, number, world)
@@ -48,7 +48,7 @@ def put(batch: WorldArrays, number: int, world: WorldArrays) -> None:
 
 
 def world_of(batch: WorldArrays, number: int) -> WorldArrays:
-    """A world of a batch: views of its arrays, of the same types as those of a world that stands alone."""
+    """Returns a world of a batch: views of its arrays, of the same types as those of a single world."""
     return WorldArrays._make(_rows(batch, number))
 
 
@@ -130,7 +130,7 @@ class VectorWorld:
     """
 
     def __init__(self, town: TownArrays, world: WorldArrays, worlds: int, *, threads: int | None = None) -> None:
-        """Make copies of a world, each to be replaced by `put`.
+        """Makes copies of a world, each to be replaced by `put`.
 
         Args:
             town: arrays of the town.
@@ -154,7 +154,7 @@ class VectorWorld:
         return len(self.arrays.clock)
 
     def world(self, number: int) -> WorldArrays:
-        """A world as views of the arrays of all; raises `IndexError` if there is no such world."""
+        """Returns a world as views of the arrays of all; raises `IndexError` if there is no such world."""
         return world_of(self.arrays, range(len(self))[number])
 
     def put(self, number: int, world: WorldArrays) -> None:

@@ -69,7 +69,7 @@ def has_room_to_switch(room: float) -> bool:
 
 
 def u_turn_braking(speed: float, squared_speed: float = U_TURN_SPEED**2) -> float:
-    """Distance over which the ego brakes to the speed of a U-turn [m].
+    """Returns the distance over which the ego brakes to the speed of a U-turn [m].
 
     Args:
         speed: of the ego [m/s].
@@ -79,7 +79,7 @@ def u_turn_braking(speed: float, squared_speed: float = U_TURN_SPEED**2) -> floa
 
 
 def u_turn_start(station: float, speed: float) -> float:
-    """Station at which a U-turn begins that is asked for at a station [m] and speed [m/s]."""
+    """Returns the station at which a U-turn begins that is requested at a station [m] and speed [m/s]."""
     return station + LEAD * (speed > EGO_MOVING) + u_turn_braking(speed)
 
 

@@ -60,7 +60,7 @@ class LaneChooser:
         return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
 
     def offers_turns(self, lane: int) -> bool:
-        """Whether the junction at the end of a lane offers a turn: from this lane or, as beside a turn lane, others."""
+        """Returns whether the junction at the end of a lane offers a turn, from this lane or from one beside it."""
         if lane not in self._choices:
             ways = [way for beside in self.side_by_side(lane) for way in self._town.exits(beside)]
             turns = [way.angle for way in ways if way.junction_id >= 0]

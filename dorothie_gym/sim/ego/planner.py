@@ -229,7 +229,7 @@ class LocalPlanner:
         )
 
     def may_switch(self, side: LinkType, speed: float = 0.0) -> bool:
-        """Whether a lane switch would be carried out at a speed [m/s]; `side` is one of the two lane-change types."""
+        """Returns whether a lane switch would be carried out at a speed [m/s]; `side` is a lane-change type."""
         return not isinstance(self._plan_switch(side, speed), str)
 
     def _plan_switch(self, side: LinkType, speed: float) -> int | str:

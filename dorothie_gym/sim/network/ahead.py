@@ -121,7 +121,7 @@ class Neighbours(NamedTuple):
 
 
 def lane_zones(table: LaneTable) -> Array:
-    """Least x, least y, greatest x, greatest y [m] that something on each lane can have: (n, 4)."""
+    """Returns least x, least y, greatest x, greatest y [m] of the bodies that count as on each lane: (n, 4)."""
     widest = np.maximum.reduceat(table.points[:, WIDTH], table.offsets[:-1])
     reach = (0.5 * widest + LANE_MARGIN + OVERHANG)[:, None]
     return np.hstack((table.boxes[:, :2] - reach, table.boxes[:, 2:] + reach))
@@ -140,7 +140,7 @@ def neighbours_on(
     heights: Array,
     lanes: IntArray,
 ) -> tuple[int, float, int, float]:
-    """The nearest of many things ahead and behind on a chain of lanes, chosen as highway-env chooses.
+    """Returns the nearest of many bodies ahead and behind on a chain of lanes, by highway-env's rules.
 
     Args:
         points: see `LaneTable`.

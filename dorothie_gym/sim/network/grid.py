@@ -44,7 +44,7 @@ class GridIndex:
     """
 
     def __init__(self, table: LaneTable) -> None:
-        """List the lanes of a table; the rows of the table are the answers."""
+        """Lists the lanes of a table, whose rows are the results of queries."""
         low = table.boxes[:, :2].min(axis=0) - CELL_REACH
         high = table.boxes[:, 2:].max(axis=0) + CELL_REACH
         columns, rows = (int(n) for n in np.ceil((high - low) / GRID_CELL))
@@ -60,7 +60,7 @@ class GridIndex:
         self._arrays: _Arrays = (*table, cells, entries, *self.origin)
 
     def closest(self, x: float, y: float, heading: float | None = None, height: float | None = None) -> int:
-        """Row of the lane with the least distance, the first one of several; see `TownNetwork`."""
+        """Returns the row of the lane with the least distance, the first one of several; see `TownNetwork`."""
         weight = 1.0
         if heading is None:
             heading, weight = 0.0, 0.0
@@ -71,7 +71,7 @@ class GridIndex:
         return int(row)
 
     def closest_place(self, x: float, y: float, heading: float, height: float) -> tuple[int, float]:
-        """The same row for a body that has a heading and a height, and its station on that lane [m].
+        """Returns the same row for a body with a heading and a height, and its station on that lane [m].
 
         Raises:
             ValueError: the place is not a number.
@@ -93,7 +93,7 @@ def _closest_place(arrays: _Arrays, x: float, y: float, heading: float, height: 
 
 @allocating
 def _list_lanes(points: Array, offsets: IntArray, x0: float, y0: float, cursors: IntArray, entries: IntArray) -> None:
-    """Count the lanes of each cell in `cursors`; if there are `entries`, write them where the cursors stand."""
+    """Counts the lanes of each cell in `cursors`; if there are `entries`, writes them where the cursors stand."""
     rows, columns = cursors.shape
     newest = np.full((rows, columns), -1, dtype=np.int64)
     reach = CELL_REACH + GRID_CELL * math.sqrt(0.5) + SLACK  # from the centre of a cell
@@ -128,7 +128,7 @@ def _out_of_question(boxes: Array, lane: int, x: float, y: float, best: float) -
 
 @allocating
 def _closest(arrays: _Arrays, x: float, y: float, heading: float, weight: float, height: float) -> int:
-    """Row of the closest lane (-1: none at this height); a height of NaN asks for none."""
+    """Returns the row of the closest lane (-1: none at this height); a height of NaN matches all lanes."""
     points, offsets, ends, boxes, cells, entries, x0, y0 = arrays
     best, found = np.inf, -1
     anywhere = math.isnan(height)

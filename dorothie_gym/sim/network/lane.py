@@ -70,7 +70,7 @@ class PolylineLane(AbstractLane):
         forbidden: bool = False,
         priority: int = 0,
     ) -> None:
-        """Build a lane that measures with a table of its own; `TownNetwork` makes it share the network's.
+        """Builds a lane with a table of its own; `TownNetwork` makes it share the network's.
 
         Args:
             town_lane: lane of a town, or the dict that `to_config` wrote for one.
@@ -90,7 +90,7 @@ class PolylineLane(AbstractLane):
         self.share(LaneTable.of([lane]), 0)
 
     def share(self, table: LaneTable, row: int) -> None:
-        """Measure with a row of a table that other lanes use, too."""
+        """Measures with a row of a table that other lanes use, too."""
         self.row = row
         self._points, self._offsets, self._ends = table.points, table.offsets, table.ends
         shape = self._points, self._offsets, self._ends, row
@@ -104,39 +104,39 @@ class PolylineLane(AbstractLane):
         return self
 
     def position(self, longitudinal: float, lateral: float = 0.0) -> Array:
-        """World position (2,) [m] at a station and a distance to the right."""
+        """Returns the world position (2,) [m] at a station and a distance to the right."""
         return np.array(self._place(float(longitudinal), float(lateral)))
 
     def heading_at(self, longitudinal: float) -> float:
-        """Direction of the lane [rad]; that of its ends beyond them."""
+        """Returns the direction of the lane [rad], beyond its ends that of the end."""
         return float(self._value(polyline.HEADING, float(longitudinal)))
 
     def width_at(self, longitudinal: float) -> float:
-        """Width of the lane [m]."""
+        """Returns the width of the lane [m]."""
         return float(self._value(polyline.WIDTH, float(longitudinal)))
 
     def height_at(self, longitudinal: float) -> float:
-        """Height of the lane [m]."""
+        """Returns the height of the lane [m]."""
         return float(self._value(polyline.HEIGHT, float(longitudinal)))
 
     def local_coordinates(self, position: Array) -> tuple[float, float]:
-        """Station and signed distance to the right [m] of a world position (2,)."""
+        """Returns the station and signed distance to the right [m] of a world position (2,)."""
         station, lateral = self._local(float(position[0]), float(position[1]))
         return station, lateral
 
     def distance(self, position: Array) -> float:
-        """|lateral| + overshoot [m] of a world position (2,)."""
+        """Returns |lateral| + overshoot [m] of a world position (2,)."""
         return self.distance_with_heading(position, None)
 
     def distance_with_heading(self, position: Array, heading: float | None, heading_weight: float = 1.0) -> float:
-        """|lateral| + overshoot [m] + `heading_weight` x difference of heading [rad], as highway-env ranks lanes."""
+        """Returns |lateral| + overshoot [m] + `heading_weight` x difference of heading [rad], highway-env's ranking."""
         if heading is None:
             heading, heading_weight = 0.0, 0.0
         cost, _ = self._distance(float(position[0]), float(position[1]), float(heading), float(heading_weight))
         return float(cost)
 
     def positions(self, stations: Array, lateral: float = 0.0) -> Array:
-        """World positions (n, 2) [m] at many stations (n,), exactly as `position` gives them."""
+        """Returns the world positions (n, 2) [m] at many stations (n,), equal to those of `position`."""
         wanted = np.ascontiguousarray(stations, dtype=np.float64)
         return polyline.positions(self._points, self._offsets, self._ends, self.row, wanted, float(lateral))
 
@@ -147,11 +147,11 @@ class PolylineLane(AbstractLane):
 
     @classmethod
     def from_config(cls, config: PolylineLaneConfig) -> PolylineLane:
-        """The lane whose parameters `to_config` wrote under "config"."""
+        """Builds the lane whose parameters `to_config` wrote under "config"."""
         return cls(**config)
 
     def to_config(self) -> LaneConfig:
-        """The lane as a dict that JSON can hold and highway-env's `lane_from_config` reads."""
+        """Returns the lane as a dict for JSON, which highway-env's `lane_from_config` reads."""
         lane = self.town_lane
         return {
             "class_path": get_class_path(self.__class__),

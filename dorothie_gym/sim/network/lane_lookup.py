@@ -102,7 +102,7 @@ def _list_lanes(
 
 @allocating
 def _stretch(points: Array, first: int, last: int, x: float, y: float) -> tuple[int, int]:
-    """First and last segment that can be closest from within the cell around a place; -1 where the lane is far away."""
+    """Returns the first and last segment that can be closest from within a cell; -1 where the lane is far away."""
     radius = LOOKUP_CELL * math.sqrt(0.5)
     nearest = math.inf
     for k in range(first, last):
@@ -175,7 +175,7 @@ def value_near(points: Array, lane: LaneRecord, segment: int, column: int, stati
 
 @inlined
 def closest_segment(points: Array, first: int, last: int, x: float, y: float) -> tuple[int, float, float]:
-    """Closest segment of some (the first one of several), its share up to the closest place, and the distance^2 [m]."""
+    """Returns the closest segment (the first of several), its share up to the closest place, and distance^2 [m^2]."""
     best, at, share = math.inf, first, 0.0
     ax, ay = points[first, 0], points[first, 1]
     for k in range(first, last + 1):
@@ -215,7 +215,7 @@ def coordinates(
 
 @inlined
 def project(town: TownArrays, number: int, x: float, y: float) -> tuple[float, float, int]:
-    """Station, lateral distance [m] and closest segment of a place on a lane."""
+    """Returns station, lateral distance [m] and closest segment of a place on a lane."""
     lane = town.lanes[number]
     first, last = lane.first, lane.last - 1
     if last - first > 3:
@@ -234,7 +234,7 @@ def project(town: TownArrays, number: int, x: float, y: float) -> tuple[float, f
 
 @inlined
 def cost(points: Array, lane: LaneRecord, at: int, station: float, lateral: float, heading: float) -> float:
-    """highway-env's distance to a lane with heading: |lateral| + overshoot [m] + difference of heading [rad]."""
+    """Returns highway-env's distance to a lane: |lateral| + overshoot [m] + difference of heading [rad]."""
     found = abs(lateral) + max(station - points[lane.last, 2], 0.0) + max(0.0 - station, 0.0)
     return float(found + abs(wrap_radians(heading - value_near(points, lane, at, 3, station))))
 
@@ -251,7 +251,7 @@ def is_level(town: TownArrays, lane: LaneRecord, at: int, station: float, height
 def closest_lane(
     town: TownArrays, x: float, y: float, heading: float, cos: float, sin: float, height: float, previous: int
 ) -> tuple[int, float, float, int]:
-    """The closest lane of a place and heading.
+    """Returns the closest lane of a place and heading.
 
     Args:
         town: arrays of the town.

@@ -95,7 +95,7 @@ class _Nodes:
         self._parent[high] = low
 
     def names(self) -> list[str]:
-        """Name of the node of each end: numbers in the order of first appearance."""
+        """Returns the name of the node of each end: numbers in the order of first appearance."""
         numbers: dict[int, str] = {}
         return [numbers.setdefault(self.find(end), str(len(numbers))) for end in range(len(self._parent))]
 
@@ -121,7 +121,7 @@ class TownNetwork(RoadNetwork):
     """
 
     def __init__(self, town: Town) -> None:
-        """Build the graph and the index of a town; raises `ValueError` if it has no lanes."""
+        """Builds the graph and the index of a town; raises `ValueError` if it has no lanes."""
         super().__init__()
         if not town.lanes:
             raise ValueError(f"town {town.name!r} has no lanes: there is nothing to drive on")
@@ -146,7 +146,7 @@ class TownNetwork(RoadNetwork):
         return self
 
     def add_lane(self, _from: str, _to: str, lane: object) -> None:
-        """Refused with a `TypeError`: lanes are part of the town, which is complete before its network is built."""
+        """Raises `TypeError`: lanes are part of the town, which is complete before its network is built."""
         raise TypeError("a TownNetwork is built from a complete Town: add the lane to the town instead")
 
     # Lanes of the town and lanes of the graph
@@ -156,15 +156,15 @@ class TownNetwork(RoadNetwork):
         return self._indexes[self._row_of[lane_id]]
 
     def lane_of(self, lane_id: int) -> PolylineLane:
-        """The network's lane for a lane of the town."""
+        """Returns the network's lane for a lane of the town."""
         return self._lanes[self._row_of[lane_id]]
 
     def lane_id(self, index: tuple[str, str, int | None]) -> int:
-        """Id in the town of the lane at an index; an id of None stands for the only lane of an edge."""
+        """Returns the id in the town of the lane at an index; an id of None stands for the only lane of an edge."""
         return int(self.get_lane(index).town_lane.id)
 
     def row(self, index: tuple[str, str, int | None]) -> int:
-        """Row in the table of the lane at an index."""
+        """Returns the row in the table of the lane at an index."""
         return int(self.get_lane(index).row)
 
     # Closest lane
@@ -172,7 +172,7 @@ class TownNetwork(RoadNetwork):
     def get_closest_lane_index(
         self, position: Array, heading: float | None = None, height: float | None = None
     ) -> LaneIndex:
-        """The lane that highway-env's scan over all lanes would choose, found by the grid index.
+        """Returns the lane that highway-env's scan over all lanes would choose, found by the grid index.
 
         Args:
             position: world position (2,) [m].
@@ -194,7 +194,7 @@ class TownNetwork(RoadNetwork):
         return found
 
     def closest_place(self, x: float, y: float, heading: float, height: float) -> tuple[int, float]:
-        """The closest lane as `get_closest_lane_index` finds it, and where on it.
+        """Returns the closest lane as `get_closest_lane_index`, and the place on it.
 
         Args:
             x: position [m].
@@ -210,7 +210,7 @@ class TownNetwork(RoadNetwork):
         return lane.town_lane.id, min(max(station, 0.0), lane.length)
 
     def random_lane_index(self, np_random: np.random.Generator) -> LaneIndex:
-        """An index drawn uniformly from all lanes."""
+        """Returns an index drawn uniformly from all lanes."""
         return self._indexes[int(np_random.choice(len(self._indexes)))]
 
     # Successors
@@ -234,7 +234,7 @@ class TownNetwork(RoadNetwork):
         position: Array | None = None,
         np_random: np.random.Generator = np.random,  # type: ignore[assignment]  # highway-env's default
     ) -> LaneIndex:
-        """Lane to be followed after the current one.
+        """Returns the lane to be followed after the current one.
 
         Args:
             current_index: lane that ends.
@@ -259,7 +259,7 @@ class TownNetwork(RoadNetwork):
     def along_route(
         self, candidates: Sequence[LaneIndex], route: Sequence[tuple[str, str, int | None]] | None
     ) -> list[LaneIndex]:
-        """Those candidates that are on the next edge of a route, the best first.
+        """Returns the candidates that are on the next edge of a route, the best first.
 
         Best is the lane that the route names, then one that leads on to the edge after the next.
         """
@@ -275,7 +275,7 @@ class TownNetwork(RoadNetwork):
     def next_lane_given_next_road(
         self, _from: str, _to: str, _id: int, next_to: str, next_id: int | None, position: Array
     ) -> tuple[int, float]:
-        """Lane on the next edge and its distance to a position [m]; a linked lane, else highway-env's choice.
+        """Returns the lane on the next edge (a linked one, else highway-env's choice) and its distance [m].
 
         Args:
             _from: start of the current edge.
@@ -321,7 +321,7 @@ class TownNetwork(RoadNetwork):
 
     @classmethod
     def from_config(cls, config: Mapping[str, object]) -> RoadNetwork:
-        """The plain highway-env network that `to_config` described; a config holds no links, so it is no town."""
+        """Builds the plain highway-env network that `to_config` described; a config has no links of a town."""
         return RoadNetwork.from_config(config)
 
     def _find_side_lanes(self, lane_id: int) -> list[LaneIndex]:

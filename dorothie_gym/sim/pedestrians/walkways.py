@@ -109,7 +109,7 @@ def build_walkways(network: TownNetwork, lanes: RecordArray[LaneRecord]) -> Walk
 
 
 def _pavement(points: Array, width: float) -> Array:
-    """x, y, station, heading, height, width of a pavement's points (n, 3)."""
+    """Returns x, y, station, heading, height and width of the points (n, 3) of a pavement."""
     steps = np.diff(points[:, :2], axis=0)
     stations = np.concatenate(([0.0], np.cumsum(np.sqrt((steps * steps).sum(axis=1)))))
     headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
@@ -132,7 +132,7 @@ class _Corners(NamedTuple):
 
 
 def _corners(sidewalks: Sequence[Sidewalk], edges: LaneEdges) -> _Corners:
-    """From each end of a pavement the way to the nearest end of another one that leads over no lane.
+    """Returns the footway from each end of a pavement to the nearest end of another one, across no lane.
 
     Ends that are one place need no way between them. An end from which no other one is reached is a dead end.
     """
@@ -160,7 +160,7 @@ def _corners(sidewalks: Sequence[Sidewalk], edges: LaneEdges) -> _Corners:
 
 
 def _near(ends: Sequence[_End], places: Array) -> list[list[int]]:
-    """For each end the others that are not far away, the nearest first; back along one's own pavement is no way on."""
+    """Returns the ends near each end, nearest first, without those of its own pavement unless they coincide."""
     near: list[list[tuple[float, int]]] = [[] for _ in ends]
     for one, other in sorted(cKDTree(places[:, :2]).query_pairs(LONGEST_CORNER)):
         gap = float(np.hypot(*(places[one] - places[other])[:2]))
@@ -171,7 +171,7 @@ def _near(ends: Sequence[_End], places: Array) -> list[list[int]]:
 
 
 def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) -> tuple[int, Array] | None:
-    """The first of some ends that is reached over no lane, and the way there: straight, else in a bow."""
+    """Returns the first of some ends that is reached across no lane, and the way there: straight, else in a bow."""
     for bow in BOWS:
         for other in others:
             line = places[[one, other]]
@@ -219,7 +219,7 @@ def _crossings(
 
 
 def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
-    """The two ends of a crosswalk (2, 2) [m]: it leads across the lane that is closest to its middle."""
+    """Returns the two ends of a crosswalk (2, 2) [m], which crosses the lane closest to its middle."""
     middle = crosswalk.outline.mean(axis=0)[:2]
     lane = network.get_lane(network.get_closest_lane_index(middle)).town_lane
     heading = lane.heading_at(lane.project(middle)[0])
@@ -241,7 +241,7 @@ def _as_far_as(ends: Array, places: Array) -> Array:
 
 
 def _nearest_walk(rows: Array, owners: NDArray[np.int64], place: Array) -> tuple[float, int, float]:
-    """Distance [m], number and station [m] of the closest pavement.
+    """Returns distance [m], number and station [m] of the closest pavement.
 
     Args:
         rows: x, y, station of all points of all pavements.

@@ -256,13 +256,13 @@ def _describe(
 
 @inlined
 def _signed(value: int) -> int:
-    """The lowest 64 bits as a signed number: what compiled arithmetic gives by itself, and plain Python does not."""
+    """Returns the lowest 64 bits as a signed number, as compiled arithmetic does implicitly."""
     return (value & _LOW_63) - (((value >> 63) & 1) << 62) - (((value >> 63) & 1) << 62)
 
 
 @inlined
 def _mixed(state: int) -> int:
-    """Output of splitmix64 for a state that has been moved on."""
+    """Returns the output of splitmix64 for an advanced state."""
     z = _signed((state ^ ((state >> 30) & ((1 << 34) - 1))) * _MIX_A)
     z = _signed((z ^ ((z >> 27) & ((1 << 37) - 1))) * _MIX_B)
     return z ^ ((z >> 31) & ((1 << 33) - 1))
@@ -270,19 +270,19 @@ def _mixed(state: int) -> int:
 
 @inlined
 def _stirred(state: int, key: int) -> int:
-    """A state that also depends on a key."""
+    """Returns a state that also depends on a key."""
     return _mixed(_signed(state + _GOLDEN)) ^ key
 
 
 @inlined
 def _share(bits: int) -> float:
-    """A number in [0, 1) by the upper 53 of 64 bits."""
+    """Returns a number in [0, 1) from the upper 53 of 64 bits."""
     return ((bits >> 11) & ((1 << 53) - 1)) * _UNIT
 
 
 @inlined
 def _normal(state: int) -> tuple[float, int]:
-    """A standard normal number (Box and Muller 1958), cut off at MOST_SIGMAS, and the state behind it."""
+    """Returns a standard normal number (Box and Muller 1958), bounded by MOST_SIGMAS, and the next state."""
     state = _signed(state + _GOLDEN)
     radius = math.sqrt(-2.0 * math.log(1.0 - _share(_mixed(state))))
     state = _signed(state + _GOLDEN)

@@ -70,7 +70,7 @@ _BISECTIONS = 40
 
 
 def fog_extinction(density: float, falloff: float) -> float:
-    """Extinction of fog at the height of the sensors [1/m].
+    """Returns the extinction of fog at the height of the sensors [1/m].
 
     Args:
         density: above that of a clear noon, in [0, 1].
@@ -80,7 +80,7 @@ def fog_extinction(density: float, falloff: float) -> float:
 
 
 def rain_extinction(rate: float) -> float:
-    """Extinction by rain and what of it is on the windscreen, wipers on [1/m].
+    """Returns the extinction by rain in the air and on the wiped windscreen [1/m].
 
     Ivey, Lehtipuu and Button (J. Safety Research 7, 1975) measured a sight of 2000 ft / i^0.68 at 40 mph and i in/h.
 
@@ -91,7 +91,7 @@ def rain_extinction(rate: float) -> float:
 
 
 def daylight(altitude: float, cloudiness: float) -> float:
-    """Illuminance by the sky [lx].
+    """Returns the illuminance by the sky [lx].
 
     Interpolated in its logarithm; clouds over the share N of the sky leave 1 - 0.75 N^3.4 of it (Kasten and Czeplak,
     Solar Energy 24, 1980).
@@ -107,7 +107,7 @@ def daylight(altitude: float, cloudiness: float) -> float:
 
 @allocating
 def transmission(fog: float, fog_start: float, rain: float, distance: float) -> float:
-    """Share of the contrast that the air leaves over a distance [m]; the rest as in `Visibility`."""
+    """Returns the share of the contrast that the air leaves over a distance [m]; the rest as in `Visibility`."""
     return math.exp(-fog * max(distance - fog_start, 0.0) - rain * distance)
 
 
@@ -115,7 +115,7 @@ def transmission(fog: float, fog_start: float, rain: float, distance: float) -> 
 def gain(
     fog: float, fog_start: float, rain: float, light: float, lamps: float, clarity: float, distance: float
 ) -> float:
-    """Share G of a clear noon's signal, in [0, 1], of something at a distance [m]; the rest as in `Visibility`."""
+    """Returns the share G of a clear noon's signal, in [0, 1], at a distance [m]; the rest as in `Visibility`."""
     air = transmission(fog, fog_start, rain, distance)
     if lamps != 0.0 and light < FULL_LIGHT:  # their light passes through the air once more
         near = max(distance, 1.0)
@@ -125,7 +125,7 @@ def gain(
 
 @allocating
 def signal(gain: float, distance: float) -> float:
-    """Signal S of something at a distance [m], 1 at the edge of sight on a clear day, by its gain."""
+    """Returns the signal S of a body at a distance [m], 1 at the edge of sight on a clear day, by its gain."""
     nearness = CLEAR_SIGHT / max(distance, 1.0)
     return nearness * nearness * gain
 
@@ -151,15 +151,15 @@ class Visibility:
     clarity: float = 1.0
 
     def transmission(self, distance: float) -> float:
-        """Share of the contrast that the air leaves over a distance [m]."""
+        """Returns the share of the contrast that the air leaves over a distance [m]."""
         return float(transmission(self.fog, self.fog_start, self.rain, distance))
 
     def gain(self, distance: float) -> float:
-        """Share of a clear noon's signal, in [0, 1], of something at a distance [m]."""
+        """Returns the share of a clear noon's signal, in [0, 1], of a body at a distance [m]."""
         return float(gain(self.fog, self.fog_start, self.rain, self.light, self.lamps, self.clarity, distance))
 
     def signal(self, distance: float) -> float:
-        """Signal of something at a distance [m], 1 at the edge of sight."""
+        """Returns the signal of a body at a distance [m], 1 at the edge of sight."""
         return float(signal(self.gain(distance), distance))
 
     @functools.cached_property

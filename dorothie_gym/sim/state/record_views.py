@@ -206,7 +206,7 @@ class BodyView(Generic[Record_co]):
         return np.zeros(2)
 
     def on_lane(self) -> tuple[float, float]:
-        """Station and distance to the right on the closest lane [m]."""
+        """Returns the station and distance to the right on the closest lane [m]."""
         return self.lane.local_coordinates(self.position)
 
     def to_dict(self, origin_vehicle: RoadObject | None = None, observe_intentions: bool = True) -> dict[str, float]:

@@ -147,7 +147,7 @@ def _describe(record: LaneRecord, lane: Lane, row: int, table: LaneTable) -> Non
 
 
 def curve_speed(lane: Lane) -> float:
-    """Speed at which the tightest bend of a lane is driven, at most its limit [m/s].
+    """Returns the speed in the tightest bend of a lane, at most its limit [m/s].
 
     A bend is taken over three stretches between points: the last one of a lane may be as short as a few centimetres.
     """
@@ -245,7 +245,7 @@ def _siblings(town: Town, lanes: RecordArray[LaneRecord]) -> RecordArray[Sibling
 
 
 def _parting(lane: Lane, other: Lane) -> float:
-    """Station on the other lane from which on it is clear of a lane that begins where it does [m]."""
+    """Returns the station on the other lane from which on it is clear of a lane with the same beginning [m]."""
     for station in np.arange(0.0, other.length, 1.0):
         if abs(lane.project(other.position(float(station)))[1]) > PASSING_WIDTH:
             return float(station) + CAR_REAR

@@ -226,7 +226,7 @@ def _others(town: TownArrays, world: WorldArrays, i: int, now: float) -> int:
 
 @inlined
 def relation(town: TownArrays, connector: LaneRecord, other: int) -> int:
-    """`Relation` of a connector to another lane (or -1, for none)."""
+    """Returns the `Relation` of a connector to another lane (or -1, for none)."""
     if other < 0 or town.lanes[other].junction != connector.junction:
         return 0  # Relation.APART
     return int(town.relations[connector.relation + town.lanes[other].place])

@@ -82,7 +82,7 @@ def tow(town: TownArrays, world: WorldArrays, dt: float, turning: bool = False) 
 
 @compiled
 def _may_go(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> bool:
-    """Whether no light holds a vehicle up, at the line or in a queue, which may reach back through junctions."""
+    """Returns whether no light holds a vehicle up, at the line or in a queue, which may span junctions."""
     now = world.clock[0].time
     # a short one follows its connector before its front is over the line
     if vehicle.approach >= 0 and town.lanes[vehicle.approach_lane].programme >= 0:
@@ -170,7 +170,7 @@ def new_key(world: WorldArrays) -> int:
 
 @compiled
 def is_clear_of_car(world: WorldArrays, x: float, y: float, distance: float) -> bool:
-    """Whether a place is at a distance [m] from the ego, the first of the vehicles; true where there is none."""
+    """Returns whether a place is at least a distance [m] from the ego; true in a world without one."""
     if len(world.vehicles) == 0:
         return True
     car = world.vehicles[0]

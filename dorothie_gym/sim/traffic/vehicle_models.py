@@ -132,13 +132,13 @@ def slip_towards(
 
 @compiled
 def steering_angle(slip: float) -> float:
-    """Angle of the front wheel [rad] that belongs to the sine of a slip angle."""
+    """Returns the angle of the front wheel [rad] that belongs to the sine of a slip angle."""
     return math.atan(2.0 * slip / math.sqrt(1.0 - slip * slip))
 
 
 @compiled
 def slip_of(steering: float) -> float:
-    """Sine of the slip angle that belongs to an angle of the front wheel [rad]."""
+    """Returns the sine of the slip angle that belongs to an angle of the front wheel [rad]."""
     tangent = 0.5 * math.tan(steering)
     return tangent / math.sqrt(1.0 + tangent * tangent)
 
@@ -214,7 +214,7 @@ def _consider(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord, si
 
 @compiled
 def _move_over(town: TownArrays, world: WorldArrays, i: int, lane: LaneRecord) -> None:
-    """A cyclist changes to the lane to the right, if there is one where it may ride and room on it, and to no other."""
+    """Changes the lane of a cyclist to the right if it may ride there and has room, and never to the left."""
     vehicle = world.vehicles[i]
     if lane.right < 0 or not town.lanes[lane.right].cycling or town.lanes[lane.right].successors == 0:
         return
