@@ -6,14 +6,14 @@ import itertools
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import torch
 from torch import Tensor
 from torch.utils.flop_counter import FlopCounterMode
 
-from dorothie_gym.baselines.model_io import TASKS, Examples
-from dorothie_gym.baselines.reference_impl import PublishedTOTO, Senses, rebuild, train_step
+from dorothie_gym.baselines.model_io import TASKS, Examples, Labels, backpropagate
+from dorothie_gym.baselines.reference_impl import Features, PublishedTOTO, Senses, rebuild, train_step
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
 from dorothie_gym.bench.timing import Progress, alternate, cpu_seconds, ignore_progress, machine, rounded
 from dorothie_gym.benchmark.features import Columns, build, points
@@ -38,7 +38,7 @@ def measure(
     batch_size: int = 64,
     repeats: int = 5,
     progress: Progress = ignore_progress,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Measures points a second in training and in answering, ours and the published loop's in turns.
 
     Both have the same inputs and widths (`TOTOConfig.published`), in float32 on the CPU.
@@ -110,7 +110,7 @@ def measure(
     }
 
 
-Batch = tuple[dict[str, Tensor], Any]
+Batch = tuple[dict[str, Tensor], Labels]
 
 
 def _ours(columns: Columns, senses: Senses, batch_size: int) -> tuple[TOTO, Batch]:
@@ -144,7 +144,7 @@ class _Turns:
         order = torch.randperm(len(found), generator=torch.Generator().manual_seed(0)).tolist()
         self._points = itertools.cycle([found[place] for place in order[::step]])
 
-    def next(self) -> tuple[Any, Point]:
+    def next(self) -> tuple[Features, Point]:
         """Returns the next point with its features, rebuilt."""
         session, point = next(self._points)
         return rebuild(session, point.view, self._graphs[session.name], self._senses), point
@@ -159,7 +159,7 @@ def _train(model: TOTO, optimiser: torch.optim.Optimizer, batch: Batch) -> None:
     model.train()
     optimiser.zero_grad(set_to_none=True)
     loss = model.loss(*batch)
-    loss.backward()  # type: ignore[no-untyped-call]
+    backpropagate(loss)
     torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
     optimiser.step()
 
@@ -188,9 +188,9 @@ def _answer_published(model: PublishedTOTO, turns: _Turns) -> None:
 def _flops(model: TOTO, batch: Batch) -> float:
     """Multiplications and additions of the matrix products of one step, forward and backward."""
     model.train()
-    counter: Any = FlopCounterMode(display=False)
+    counter = FlopCounterMode(display=False)
     with counter:
-        model.loss(*batch).backward()  # type: ignore[no-untyped-call]
+        backpropagate(model.loss(*batch))
     return float(counter.get_total_flops())
 
 

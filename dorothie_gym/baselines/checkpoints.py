@@ -24,7 +24,7 @@ _ABOUT: Final = "dorothie_gym"
 
 
 def save(
-    path: Path, model: nn.Module, about: Mapping[str, Any], optimiser: torch.optim.Optimizer | None = None
+    path: Path, model: nn.Module, about: Mapping[str, object], optimiser: torch.optim.Optimizer | None = None
 ) -> None:
     """Writes a model, and the state of its optimiser if given; whole or not at all.
 
@@ -117,7 +117,7 @@ class ModelCard:
     """
 
     row: str
-    config: Mapping[str, Any]
+    config: Mapping[str, object]
     corpus: str
     encoder: str
     encoder_id: str

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Final, Self
 
 import numpy as np
 import torch
@@ -55,7 +55,7 @@ class Dataset:
         cache = cache_folder()
         return cls(build(corpus), text_encoder(encoder), None if cache is None else cache / _TABLES)
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> dict[str, object]:
         """Returns the identity of the features in JSON types; part of every checkpoint and every result."""
         return {"corpus": self.columns.content, "encoder": self.encoder.id}
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 import torch
@@ -75,7 +75,7 @@ class Experiment:
         return self.out / self.model / self.size / f"seed-{self.seed}"
 
 
-def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambda epoch: None) -> dict[str, Any]:
+def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambda epoch: None) -> dict[str, object]:
     """Trains, tests and saves a model, or reads an earlier result; returns the result in JSON types.
 
     Raises:
@@ -102,7 +102,7 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
     kept = job.folder / RESULT_FILE
     if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
         done = dict(json.loads(kept.read_text(encoding="utf-8")))
-        _describe(job, model, material, done)
+        _describe(job, model, material, steps=done["points"] * done["epochs"], seconds=done["seconds"])
         return done
     predicted = predict(model, material.examples(TEST, spec))
     rows = task_predictions(job, material.columns, material.tables(TEST), predicted)
@@ -110,11 +110,12 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
     draw_loss_curves(trained.epochs, job.row.name, job.folder / CURVES_FILE)
     result = {**about, **_told(job, model, trained), "seconds": round(wall, 3), "cpu_seconds": round(cpu, 3)}
     write_atomically(kept, json.dumps(result, indent=1) + "\n")
-    _describe(job, model, material, result)
+    steps = trained.points * len(trained.epochs)
+    _describe(job, model, material, steps=steps, seconds=round(wall, 3))
     return result
 
 
-def _describe(job: Experiment, model: TOTO, material: Dataset, result: Mapping[str, Any]) -> None:
+def _describe(job: Experiment, model: TOTO, material: Dataset, *, steps: int, seconds: float) -> None:
     """Writes the model card beside the weights."""
     pairs = material.byte_pairs(model.config.vocabulary) if needs_pieces(job.row, model.config) else None
     ModelCard(
@@ -127,12 +128,12 @@ def _describe(job: Experiment, model: TOTO, material: Dataset, result: Mapping[s
         merges=None if pairs is None else pairs.merges,
         weights=BEST_FILE,
         weights_sha256=sha256_of(job.folder / BEST_FILE),
-        steps=result["points"] * result["epochs"],
-        seconds=result["seconds"],
+        steps=steps,
+        seconds=seconds,
     ).write(job.folder)
 
 
-def _run_policy(job: Experiment, about: dict[str, Any]) -> dict[str, Any]:
+def _run_policy(job: Experiment, about: dict[str, object]) -> dict[str, object]:
     """Trains and tests policies, or reads an earlier result."""
     # imported here: stable-baselines3 is slow to import
     from dorothie_gym.baselines.teacher_forced_policies import run_policy
@@ -184,7 +185,7 @@ def task_predictions(
     return tuple(found)
 
 
-def _told(job: Experiment, model: torch.nn.Module, trained: TrainingSummary) -> dict[str, Any]:
+def _told(job: Experiment, model: torch.nn.Module, trained: TrainingSummary) -> dict[str, object]:
     last = trained.epochs[-1]
     return {
         "command": job.row.command,
@@ -207,7 +208,7 @@ OnExperimentEpoch: TypeAlias = Callable[[Experiment, Epoch], None]
 
 def run_experiments(
     jobs: Sequence[Experiment], workers: int, on_epoch: OnExperimentEpoch = lambda job, epoch: None
-) -> Iterator[tuple[Experiment, dict[str, Any]]]:
+) -> Iterator[tuple[Experiment, dict[str, object]]]:
     """Runs trainings on one corpus, one per worker at a time, and yields each with its result when it is complete.
 
     Models of the published sizes use all cores, or the GPU: they run one after another in this process.
@@ -252,7 +253,7 @@ class _ExperimentWorker:
     def load(self) -> Dataset:
         return Dataset.load(self.corpus, self.encoder)
 
-    def prepare(self) -> Callable[[Experiment], tuple[Experiment, dict[str, Any]]]:
+    def prepare(self) -> Callable[[Experiment], tuple[Experiment, dict[str, object]]]:
         torch.set_num_threads(1)
         material = self.load()
         return lambda job: (job, run_experiment(job, material))
@@ -312,7 +313,7 @@ def gather_table(
         training = labels_of(corpus, "train")
         seeds = sorted({job.seed for job in jobs})
         predicted += [part for name in FLOORS for seed in seeds for part in predict_floor(name, training, labels, seed)]
-    about: dict[str, Any] = {}
+    about: dict[str, dict[str, object]] = {}
     for job in jobs:
         told = json.loads((job.folder / RESULT_FILE).read_text(encoding="utf-8"))
         about.setdefault(job.row.name, {})[str(job.seed)] = told

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.baselines.trainer import Epoch
 from dorothie_gym.files import replacing
 from dorothie_gym.ontology import Role
 from dorothie_gym.rendering.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
 from dorothie_gym.rendering.palette import CAR, INK_SOFT, NOTE, PROP, ROAD
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def draw_loss_curves(epochs: Sequence[Epoch], title: str, path: Path) -> None:
@@ -61,7 +64,7 @@ DOTS_PER_INCH = 150
 
 
 @contextmanager
-def sheet(path: Path) -> Iterator[Any]:
+def sheet(path: Path) -> Iterator[Figure]:
     """Yields an empty figure, which is written to a PNG file afterwards.
 
     Raises:

@@ -16,6 +16,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from dorothie_gym.baselines.model_io import backpropagate
 from dorothie_gym.baselines.toto.layers import GraphAttention
 from dorothie_gym.benchmark.features import TownGraph
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES
@@ -205,7 +206,7 @@ def train_step(model: PublishedTOTO, optimiser: torch.optim.Optimizer, given: Fe
     """Takes one step for one point, as published (but that gradients are zeroed); returns the loss."""
     optimiser.zero_grad()
     loss = model.loss(given, point)
-    loss.backward()  # type: ignore[no-untyped-call]
+    backpropagate(loss)
     nn.utils.clip_grad_norm_(model.parameters(), 1.0)
     optimiser.step()
     return float(loss.detach())

@@ -17,7 +17,7 @@ from torch import nn
 
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION
-from dorothie_gym.baselines.model_io import allowed_angle
+from dorothie_gym.baselines.model_io import allowed_angle, backpropagate
 from dorothie_gym.benchmark import ActionPredictions, ActPredictions, TaskPredictions
 from dorothie_gym.envs.nfd_v0 import NfDEnv
 from dorothie_gym.envs.rfn_v0 import RfNEnv
@@ -154,7 +154,7 @@ def _clone(policy: Any, shown: TaskDemonstrations, validation: TaskDemonstration
         for rows in torch.split(torch.randperm(len(shown.labels), generator=generator), _BATCH_SIZE):
             optimiser.zero_grad()
             loss = _surprise(policy, shown, rows)
-            loss.backward()  # type: ignore[no-untyped-call]
+            backpropagate(loss)
             nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
             optimiser.step()
         with torch.no_grad():

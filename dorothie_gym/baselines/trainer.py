@@ -8,13 +8,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines import checkpoints
-from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
+from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted, backpropagate
 from dorothie_gym.benchmark.features import BatchSpec
 from dorothie_gym.errors import CheckpointError
 
@@ -48,7 +48,7 @@ class Schedule(Protocol):
     def patience(self) -> int: ...  # noqa: D102
     @property
     def spec(self) -> BatchSpec: ...  # noqa: D102
-    def to_json(self) -> dict[str, Any]: ...  # noqa: D102
+    def to_json(self) -> dict[str, object]: ...  # noqa: D102
 
 
 class Model(nn.Module, ABC):
@@ -117,7 +117,7 @@ def train(
     *,
     folder: Path,
     seed: int,
-    about: Mapping[str, Any],
+    about: Mapping[str, object],
     on_epoch: OnEpoch = lambda epoch: None,
 ) -> TrainingSummary:
     """Trains a model until its validation loss no longer falls, and leaves it with the weights of the best epoch.
@@ -186,7 +186,7 @@ def batches(examples: Examples, size: int, seed: int) -> Iterator[Tensor]:
 class _Run:
     """A training under way."""
 
-    def __init__(self, model: Model, folder: Path, seed: int, about: Mapping[str, Any]):
+    def __init__(self, model: Model, folder: Path, seed: int, about: Mapping[str, object]):
         self.model = model
         self.folder = folder
         self.seed = seed
@@ -226,7 +226,7 @@ class _Run:
             self.optimiser.zero_grad(set_to_none=True)
             with self.autocast:
                 loss = self.loss(inputs, labels)
-            loss.backward()  # type: ignore[no-untyped-call]
+            backpropagate(loss)
             nn.utils.clip_grad_norm_(self.model.parameters(), self.model.config.clip)
             self.optimiser.step()
             total += loss.detach() * len(labels)

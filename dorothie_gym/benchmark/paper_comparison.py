@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 from importlib.resources import files
-from typing import Any, Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from dorothie_gym.analysis.intervals import Estimate
 from dorothie_gym.benchmark.labels import SEEN, UNSEEN
@@ -80,7 +80,7 @@ class ModelClaim:
             holds, fails = high < SMALLEST_DIFFERENCE, low > 0.0
         return ModelVerdict.HOLDS if holds else ModelVerdict.FAILS if fails else ModelVerdict.UNDECIDED
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Returns the fields and the verdict."""
         return {
             "metric": self.metric,
@@ -115,7 +115,7 @@ class ModelFinding:
         order = (ModelVerdict.UNTESTED, ModelVerdict.FAILS, ModelVerdict.UNDECIDED)
         return next((verdict for verdict in order if verdict in found), ModelVerdict.HOLDS)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Returns the fields and the verdict."""
         return {
             "statement": self.statement,

@@ -79,7 +79,7 @@ def read_predictions(*paths: Path | str) -> tuple[TaskPredictions, ...]:
     return tuple(_merged(pieces) for _, pieces in ordered)
 
 
-def read_about(path: Path | str) -> dict[str, Any]:
+def read_about(path: Path | str) -> dict[str, object]:
     """Returns the provenance in the metadata of a file; empty if there is none.
 
     Raises:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -199,7 +199,7 @@ def file_schema() -> pa.Schema:
 
 
 def write_predictions(
-    path: Path | str, predictions: Iterable[TaskPredictions], *, about: Mapping[str, Any] | None = None
+    path: Path | str, predictions: Iterable[TaskPredictions], *, about: Mapping[str, object] | None = None
 ) -> Path:
     """Writes a file of predictions in one step; an older file is replaced.
 
@@ -227,7 +227,7 @@ def write_predictions(
     return target
 
 
-def _columns(given: TaskPredictions) -> dict[str, list[Any]]:
+def _columns(given: TaskPredictions) -> dict[str, list[object]]:
     n, left_out = len(given.events), list(given.left_out.items())
     rows = n + len(left_out)
     return {
@@ -242,7 +242,7 @@ def _columns(given: TaskPredictions) -> dict[str, list[Any]]:
     }
 
 
-def _answers(predicted: Predictions) -> dict[str, Sequence[Any]]:
+def _answers(predicted: Predictions) -> dict[str, Sequence[object]]:
     empty: list[None] = [None] * len(predicted)
     if isinstance(predicted, ActPredictions):
         moves = [DialogueMove(move).label for move in predicted.moves.tolist()]

@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,11 @@ from dorothie_gym.benchmark.scoring import class_labels
 from dorothie_gym.benchmark.table import ResultsTable
 from dorothie_gym.recording import Task
 from dorothie_gym.rendering.charts import INK, SHEET, SOFT, dress_percent_axes, empty_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
 
 NONE: Final = "–"
 """Stands where there is no figure."""
@@ -75,8 +80,6 @@ def write_report(table: ResultsTable, folder: Path | str, *, pictures: bool = Tr
         (place / name).write_text(text, encoding="utf-8")
         written.append(place / name)
     if pictures:
-        # imported here: matplotlib is slow to import, and a picture is not always wanted
-
         written.append(draw_table(table, place / "table.png"))
         for model in table.models:
             if table.runs_of(model):
@@ -214,11 +217,12 @@ def notes(table: ResultsTable) -> Iterator[str]:
             )
 
 
-def _origins(about: Mapping[str, Any]) -> set[tuple[str, str]]:
-    """Hash of the corpus and name of the encoder, wherever it is told how predictions were made."""
-    if isinstance(about.get("corpus"), str) and isinstance(about.get("encoder"), str):
-        return {(about["corpus"], about["encoder"])}
-    return {origin for told in about.values() if isinstance(told, Mapping) for origin in _origins(told)}
+def _origins(about: Mapping[str, object]) -> set[tuple[str, str]]:
+    """Returns each pair of corpus hash and encoder name in the provenance of predictions."""
+    corpus, encoder = about.get("corpus"), about.get("encoder")
+    if isinstance(corpus, str) and isinstance(encoder, str):
+        return {(corpus, encoder)}
+    return {origin for value in about.values() if isinstance(value, Mapping) for origin in _origins(value)}
 
 
 # --- LaTeX ----------------------------------------------------------------------------------------------------------
@@ -357,7 +361,7 @@ def draw_confusions(table: ResultsTable, model: str, path: Path | str) -> Path:
     return Path(path)
 
 
-def _panel(axes: Any, table: ResultsTable, key: str) -> None:
+def _panel(axes: Axes, table: ResultsTable, key: str) -> None:
     parts = table.parts
     for row, model in enumerate(table.models):
         for k, part in enumerate(parts):
@@ -370,7 +374,7 @@ def _panel(axes: Any, table: ResultsTable, key: str) -> None:
 
 
 def _dot(
-    axes: Any, figure: Estimate | PaperFigure, at: float, colour: str, *, filled: bool, square: bool = False
+    axes: Axes, figure: Estimate | PaperFigure, at: float, colour: str, *, filled: bool, square: bool = False
 ) -> None:
     if figure.mean is None:
         return
@@ -382,7 +386,7 @@ def _dot(
     )  # fmt: skip
 
 
-def _legend(figure: Any, table: ResultsTable, height: float) -> None:
+def _legend(figure: Figure, table: ResultsTable, height: float) -> None:
     from matplotlib.lines import Line2D
 
     handles = []
@@ -409,7 +413,7 @@ def _subtitle(table: ResultsTable) -> str:
     return f"{ours}{paper}. Mean and 95 % interval over seeds. (paper): computed as the paper's code does."
 
 
-def _matrix(axes: Any, counts: NDArray[np.int64], task: Task, part: str, seeds: int) -> None:
+def _matrix(axes: Axes, counts: NDArray[np.int64], task: Task, part: str, seeds: int) -> None:
     names = class_labels(task)
     used = np.flatnonzero(counts.sum(axis=1) + counts.sum(axis=0))
     shown = counts[np.ix_(used, used)]
@@ -429,7 +433,7 @@ def _matrix(axes: Any, counts: NDArray[np.int64], task: Task, part: str, seeds: 
     axes.set_title(f"{title}: {100 * right:.1f} % right", fontsize=11, loc="left", pad=8)
 
 
-def _dress_matrix(axes: Any, rows: Sequence[str], columns: Sequence[str]) -> None:
+def _dress_matrix(axes: Axes, rows: Sequence[str], columns: Sequence[str]) -> None:
     axes.set_xticks(range(len(columns)), columns, fontsize=8.5, color=INK)
     axes.set_yticks(range(len(rows)), rows, fontsize=8.5, color=INK)
     for label in axes.get_xticklabels():
@@ -444,7 +448,7 @@ def _dress_matrix(axes: Any, rows: Sequence[str], columns: Sequence[str]) -> Non
         spine.set_visible(False)
 
 
-def _shades() -> Any:
+def _shades() -> Colormap:
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("shades", ["#f2ede1", "#a9c4f2", _OURS[ALL], "#173a80"])

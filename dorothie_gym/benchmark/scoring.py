@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from dorothie_gym.benchmark.predictions import ActPredictions, Predictions, Task
 from dorothie_gym.errors import PredictionError
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, DialogueMove
 from dorothie_gym.recording import Task
+from dorothie_gym.recording.points import Point
 
 NEARBY_POINTS: Final = 3
 """Number of nearby points that a message names."""
@@ -190,7 +191,7 @@ def _scores(pieces: Sequence[_Aligned], part: str, kind: Handled | None = None) 
     return Scores(points=points, metrics=metrics, confusion=confusion)
 
 
-def score_task(task: Task, predicted: Any, labels: Any) -> dict[str, float]:
+def score_task(task: Task, predicted: Predictions, labels: Sequence[Point] | Predictions) -> dict[str, float]:
     """Returns every metric of a task by its key with the task's name; NaN if undefined.
 
     Args:

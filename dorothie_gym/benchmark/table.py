@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class ResultsTable:
     labels: CorpusLabels
     runs: tuple[RunScore, ...]
     missing: Mapping[str, str] = field(default_factory=dict)
-    about: Mapping[str, Any] = field(default_factory=dict)
+    about: Mapping[str, object] = field(default_factory=dict)
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -135,7 +135,7 @@ class ResultsTable:
             found += [above(estimate, part, model, FULL) for model in own]
         return tuple(found)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Returns everything as JSON types; None where a figure is undefined.
 
         `models.<name>.<part>.<metric>` = {mean, half_width, seeds, values}; the rest is told in docs/predictions.md.
@@ -162,7 +162,7 @@ class ResultsTable:
             "about": dict(self.about),
         }
 
-    def _corpus_json(self) -> dict[str, Any]:
+    def _corpus_json(self) -> dict[str, object]:
         labels = self.labels
         return {
             "folder": str(labels.root),
@@ -175,19 +175,19 @@ class ResultsTable:
             "skipped": [skipped.to_json() for skipped in labels.skipped],
         }
 
-    def _each(self, of: Any) -> dict[str, Any]:
+    def _each(self, of: Callable[[str, str], dict[str, object]]) -> dict[str, object]:
         return {model: {part: of(model, part) for part in self.parts} for model in self.models if self.runs_of(model)}
 
     def _keys(self, model: str) -> tuple[str, ...]:
         tasks = {task for run in self.runs_of(model) for task in run.parts[ALL].points}
         return tuple(key for task in Task if task in tasks for key in keys_of(task))
 
-    def _model_json(self, model: str) -> dict[str, Any]:
+    def _model_json(self, model: str) -> dict[str, object]:
         return {
             part: {key: self.estimate(model, part, key).to_json() for key in self._keys(model)} for part in self.parts
         }
 
-    def _handling_json(self, model: str, part: str) -> dict[str, Any]:
+    def _handling_json(self, model: str, part: str) -> dict[str, object]:
         return {
             kind.value: {
                 "points": {task.value: self.points(model, part, task, kind) for task in self.tasks},
@@ -196,17 +196,17 @@ class ResultsTable:
             for kind in Handled
         }
 
-    def _per_class_json(self, model: str, part: str) -> dict[str, Any]:
+    def _per_class_json(self, model: str, part: str) -> dict[str, object]:
         return {
             task.value: {name: estimate.to_json() for name, estimate in self.per_class(model, part, task).items()}
             for task in self.tasks
         }
 
-    def _confusion_json(self, model: str, part: str) -> dict[str, Any]:
+    def _confusion_json(self, model: str, part: str) -> dict[str, object]:
         found = {task.value: self.confusion(model, part, task) for task in self.tasks}
         return {task: matrix.tolist() for task, matrix in found.items() if matrix is not None}
 
-    def _paper_json(self, model: str) -> dict[str, Any]:
+    def _paper_json(self, model: str) -> dict[str, object]:
         return {
             part: {
                 key: {"mean": figure.mean, "half_width": figure.half_width}
@@ -223,7 +223,7 @@ def evaluate_predictions(
     split: Split = "test",
     *,
     missing: Mapping[str, str] | None = None,
-    about: Mapping[str, Any] | None = None,
+    about: Mapping[str, object] | None = None,
 ) -> ResultsTable:
     """Scores predictions and gathers them in a table.
 

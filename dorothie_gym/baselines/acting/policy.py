@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -34,7 +34,15 @@ from dorothie_gym.policies.route_progress import default_lane_distance
 from dorothie_gym.policies.speech import SpeechState, remark
 from dorothie_gym.recording import Task
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
-from dorothie_gym.spaces import ActionDict, CoWizardAction, Motion, Physical, SpaceLimits, heard_acts
+from dorothie_gym.spaces import (
+    ActionDict,
+    CoWizardAction,
+    Motion,
+    ObservationMapping,
+    Physical,
+    SpaceLimits,
+    heard_acts,
+)
 
 _TOLD_WAYS: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 """Slot values whose wording contains a direction."""
@@ -89,7 +97,7 @@ class BenchmarkCoWizard(Policy[BenchmarkPolicyState]):
         return BenchmarkPolicyState(seed=seed, town=town, voice=SpeechState(role=Role.CO_WIZARD, style=style))
 
     def step(
-        self, observation: Mapping[str, Any], state: BenchmarkPolicyState
+        self, observation: ObservationMapping, state: BenchmarkPolicyState
     ) -> tuple[ActionDict, BenchmarkPolicyState]:
         """Updates the history, queries the model if a decision is due, and returns utterance and action."""
         town, count = state.town, state.count + 1

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.files import replacing
+
+if TYPE_CHECKING:
+    from sklearn.feature_extraction.text import HashingVectorizer
 
 Vectors: TypeAlias = NDArray[np.float32]
 
@@ -131,7 +134,7 @@ class HashingEncoder:
         return np.hstack([part.transform(texts).toarray() for part in self._parts]).astype(np.float32)
 
     @cached_property
-    def _parts(self) -> tuple[Any, Any]:
+    def _parts(self) -> tuple[HashingVectorizer, HashingVectorizer]:
         # imported here: slow to import, and vectors are mostly found in the cache
         from sklearn.feature_extraction.text import HashingVectorizer
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import torch
 from torch import Tensor, nn
@@ -366,7 +366,7 @@ def reader_config(config: TOTOConfig) -> TOTOConfig:
 def _newest(values: Tensor, mask: Tensor, back: int = 1) -> Tensor:
     """Returns the element at a place from each sequence's end (B,); -1 (0 of reals) for none."""
     place = mask.sum(1) - back
-    empty: Any = 0.0 if values.is_floating_point() else -1
+    empty = 0.0 if values.is_floating_point() else -1
     return torch.where(place >= 0, values.gather(1, place.clamp(min=0)[:, None])[:, 0], empty)
 
 

@@ -195,7 +195,7 @@ class TOTOConfig(HistorySizes):
         wanted = set(channels)
         return replace(self, channels=tuple(channel for channel in ALL_CHANNELS if channel in wanted))
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Returns the fields in JSON types."""
         fields = asdict(self)
         fields["channels"] = [channel.value for channel in self.channels]

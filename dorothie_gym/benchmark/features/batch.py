@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,8 @@ from dorothie_gym.benchmark.features.columns import NO_TEXT, Columns, Flags, Int
 from dorothie_gym.benchmark.features.point_table import PointTable
 from dorothie_gym.recording import Task
 from dorothie_gym.recording.trajectory import TENTHS
+
+ScalarT = TypeVar("ScalarT", bound=np.generic)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,11 +203,11 @@ def _newest(start: Ints, stop: Ints, size: int) -> tuple[NDArray[np.int64], Flag
     return np.where(mask, rows, 0), mask
 
 
-def _take(column: NDArray[Any], rows: NDArray[np.int64], mask: Flags, filler: int = 0) -> NDArray[Any]:
+def _take(column: NDArray[ScalarT], rows: NDArray[np.int64], mask: Flags, filler: int = 0) -> NDArray[ScalarT]:
     """Returns the values at rows, and `filler` where the mask is False."""
     if not len(column):
         return np.full((*rows.shape, *column.shape[1:]), filler, dtype=column.dtype)
-    values: NDArray[Any] = column[rows]
+    values: NDArray[ScalarT] = column[rows]
     values[~mask] = filler
     return values
 
@@ -335,6 +337,6 @@ def _seconds(tenths: Ints, rows: NDArray[np.int64], mask: Flags) -> Reals:
     return _as_seconds(_take(tenths, rows, mask))
 
 
-def _as_seconds(tenths: NDArray[Any]) -> Reals:
+def _as_seconds(tenths: NDArray[np.integer]) -> Reals:
     seconds: Reals = tenths.astype(np.float32) / np.float32(TENTHS)
     return seconds

@@ -12,12 +12,15 @@ import functools
 import hashlib
 import json
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.recording.points import Moments, RecordTimes
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Ints: TypeAlias = NDArray[np.int32]
 Reals: TypeAlias = NDArray[np.float32]
@@ -305,7 +308,7 @@ class Columns:
         return digest.hexdigest()
 
 
-GROUPS: Final[dict[str, type[Any]]] = {
+GROUPS: Final[dict[str, type[DataclassInstance]]] = {
     "sessions": SessionRows, "moves": MoveRows, "utterances": UtteranceRows, "actions": ActionRows, "frames": FrameRows,
     "looks": LookRows, "objects": ObjectRows, "landmarks": LandmarkRows, "streets": StreetRows, "goals": GoalRows,
 }  # fmt: skip

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import FOLDS, Corpus, CorpusEntry, Fold, Session
 from dorothie_gym.recording.file_names import ACTIONS_FILE
 from dorothie_gym.user_cache import cache_folder
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 _log = logging.getLogger(__name__)
 
@@ -219,7 +222,7 @@ _POINTS_AT = {("moves", "utterance"): "utterances", ("frames", "look"): "looks",
 """Columns that refer to rows of another group."""
 
 
-def _column(rows: Sequence[_Shifted], group: str, name: str) -> NDArray[Any]:
+def _column(rows: Sequence[_Shifted], group: str, name: str) -> NDArray[np.generic]:
     if name == "session":
         return np.repeat(np.arange(len(rows), dtype=np.int32), [row.count(group) for row in rows])
     if name == "start" and group in _STARTS:
@@ -350,13 +353,13 @@ def _page(path: Path) -> dict[str, Any]:
     return page
 
 
-def _array(path: Path, digest: str) -> NDArray[Any]:
+def _array(path: Path, digest: str) -> NDArray[np.generic]:
     if not path.is_file() or _digest(path) != digest:
         raise FeatureStoreError(f"{path}: is missing, or does not fit its checksum")
     if path.stat().st_size <= EMPTY:  # empty files cannot be mapped
-        empty: NDArray[Any] = np.load(path, allow_pickle=False)
+        empty: NDArray[np.generic] = np.load(path, allow_pickle=False)
         return empty
-    mapped: NDArray[Any] = np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
+    mapped: NDArray[np.generic] = np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
     return mapped
 
 
@@ -381,7 +384,7 @@ def _columns(page: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Col
     )
 
 
-def _arrays(columns: Columns) -> dict[str, NDArray[Any]]:
+def _arrays(columns: Columns) -> dict[str, NDArray[np.generic]]:
     """Returns every array by the name of its file."""
     found = {
         f"{group}.{name}": getattr(getattr(columns, group), name)
@@ -393,7 +396,7 @@ def _arrays(columns: Columns) -> dict[str, NDArray[Any]]:
     return found
 
 
-def _array_fields(kind: type[Any]) -> list[str]:
+def _array_fields(kind: type[DataclassInstance]) -> list[str]:
     return [field.name for field in dataclasses.fields(kind) if field.name not in ("name", "names", "folds")]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ class SessionColumns:
         signature: hash of the above, independent of the layout of the session.
     """
 
-    arrays: dict[str, NDArray[Any]]
+    arrays: dict[str, NDArray[np.generic]]
     texts: tuple[str, ...]
     town: str
     seed: int
@@ -109,7 +109,7 @@ class TextPool:
 
 def utterance_columns(
     spoken: Sequence[UtteranceRecord], texts: TextPool, handled: Mapping[int, int]
-) -> dict[str, NDArray[Any]]:
+) -> dict[str, NDArray[np.generic]]:
     """Returns the columns of moves and utterances.
 
     Args:
@@ -140,7 +140,7 @@ def utterance_columns(
     }
 
 
-def action_columns(actions: Sequence[ActionRecord], handled: Mapping[int, int]) -> dict[str, NDArray[Any]]:
+def action_columns(actions: Sequence[ActionRecord], handled: Mapping[int, int]) -> dict[str, NDArray[np.generic]]:
     """Returns the columns of physical actions; `handled` is as of `utterance_columns`."""
     return {
         "actions.tenth": _ints([act.frame // FRAMES_PER_TENTH for act in actions]),
@@ -176,7 +176,7 @@ def frame_columns(
     looks: Sequence[tuple[int, NDArray[np.int64], NDArray[np.float64]]],
     *,
     known: bool,
-) -> dict[str, NDArray[Any]]:
+) -> dict[str, NDArray[np.generic]]:
     """Returns the columns of frames, looks and objects.
 
     Args:
@@ -203,7 +203,7 @@ def frame_columns(
     }
 
 
-def place_columns(header: SessionHeader, texts: TextPool) -> dict[str, NDArray[Any]]:
+def place_columns(header: SessionHeader, texts: TextPool) -> dict[str, NDArray[np.generic]]:
     """Returns the columns of streets, and of the landmarks that the Co-Wizard knows."""
     known = [row for row in header.landmarks if not row["hidden"]]
     return {
@@ -215,7 +215,7 @@ def place_columns(header: SessionHeader, texts: TextPool) -> dict[str, NDArray[A
     }
 
 
-def _goals(session: Session) -> dict[str, NDArray[Any]]:
+def _goals(session: Session) -> dict[str, NDArray[np.generic]]:
     """Subgoals that were completed, and where they were."""
     header, tenths, places = session.header, [], []
     for event in session.of_type(EventType.SUBGOAL):
@@ -228,7 +228,7 @@ def _goals(session: Session) -> dict[str, NDArray[Any]]:
     return goal_columns(tenths, places)
 
 
-def goal_columns(tenths: Sequence[int], places: Sequence[tuple[float, float]]) -> dict[str, NDArray[Any]]:
+def goal_columns(tenths: Sequence[int], places: Sequence[tuple[float, float]]) -> dict[str, NDArray[np.generic]]:
     """Returns the columns of goals that were reached at tenths (n,), at places x, y (n, 2) [m]."""
     return {"goals.tenth": _ints(tenths), "goals.place": _pairs(places)}
 
