@@ -26,13 +26,13 @@ _ABOUT: Final = "dorothie_gym"
 def save(
     path: Path, model: nn.Module, about: Mapping[str, object], optimiser: torch.optim.Optimizer | None = None
 ) -> None:
-    """Writes a model, and the state of its optimiser if given; whole or not at all.
+    """Writes a model, and the state of its optimiser if given, atomically.
 
     Args:
-        path: file to write; its folder is made.
-        model: its weights are written.
-        about: what made it, in JSON types.
-        optimiser: over the model's parameters in their order.
+        path: file to write; its folder is created.
+        model: model whose weights are written.
+        about: metadata in JSON types.
+        optimiser: optimiser over the model's parameters in their order.
 
     Raises:
         OSError: the file cannot be written.
@@ -47,18 +47,20 @@ def save(
 
 
 def about(path: Path) -> dict[str, Any]:
-    """Returns what made a checkpoint.
+    """Returns the metadata of a checkpoint.
 
     Raises:
-        CheckpointError: the file is none of ours, or damaged.
+        CheckpointError: the file is not a checkpoint of this package, or is damaged.
     """
     try:
         with safe_open(path, framework="pt") as file:
             written = json.loads((file.metadata() or {})[_ABOUT])
     except (SafetensorError, KeyError, ValueError) as error:
-        raise CheckpointError(f"{path}: is no checkpoint of this package, or damaged ({error}); delete it") from None
+        raise CheckpointError(
+            f"{path}: is not a checkpoint of this package, or is damaged ({error}); delete it"
+        ) from None
     if not isinstance(written, dict):
-        raise CheckpointError(f"{path}: says nothing about itself; delete it")
+        raise CheckpointError(f"{path}: its metadata is no JSON object; delete it")
     return written
 
 
@@ -77,7 +79,7 @@ def restore(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer | Non
     try:
         model.load_state_dict(weights)
     except RuntimeError as error:
-        message = f"{path}: is of a model of other sizes ({' '.join(str(error).split())[:200]}); delete it"
+        message = f"{path}: was written by a model of other sizes ({' '.join(str(error).split())[:200]}); delete it"
         raise CheckpointError(message) from None
     if optimiser is not None:
         _restore_optimiser(optimiser, tensors)

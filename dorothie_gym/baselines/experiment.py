@@ -108,7 +108,7 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
     rows = task_predictions(job, material.columns, material.tables(TEST), predicted)
     write_predictions(job.folder / PREDICTIONS_FILE, rows, about={**about, "config": model.config.to_json()})
     draw_loss_curves(trained.epochs, job.row.name, job.folder / CURVES_FILE)
-    result = {**about, **_told(job, model, trained), "seconds": round(wall, 3), "cpu_seconds": round(cpu, 3)}
+    result = {**about, **_training_facts(job, model, trained), "seconds": round(wall, 3), "cpu_seconds": round(cpu, 3)}
     write_atomically(kept, json.dumps(result, indent=1) + "\n")
     steps = trained.points * len(trained.epochs)
     _describe(job, model, material, steps=steps, seconds=round(wall, 3))
@@ -142,15 +142,15 @@ def _run_policy(job: Experiment, about: dict[str, object]) -> dict[str, object]:
     if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
         done = dict(json.loads(kept.read_text(encoding="utf-8")))
         if done.get("corpus") != about["corpus"]:
-            message = f"{kept}: was trained on another corpus than is asked for now; choose another folder or delete it"
+            message = f"{kept}: was trained on another corpus; choose another folder or delete it"
             raise CheckpointError(message)
         return done
     started = time.perf_counter()
-    predicted, told = run_policy(job.corpus, job.row.kind, job.seed, job.folder, job.row.name)
+    predicted, facts = run_policy(job.corpus, job.row.kind, job.seed, job.folder, job.row.name)
     write_predictions(job.folder / PREDICTIONS_FILE, predicted, about=about)
     seconds = round(time.perf_counter() - started, 3)
     of = {"command": job.model, "size": job.size, "seed": job.seed, "folder": str(job.folder)}
-    result = {**about, **of, "tasks": told, "seconds": seconds}
+    result = {**about, **of, "tasks": facts, "seconds": seconds}
     write_atomically(kept, json.dumps(result, indent=1) + "\n")
     return result
 
@@ -185,7 +185,7 @@ def task_predictions(
     return tuple(found)
 
 
-def _told(job: Experiment, model: torch.nn.Module, trained: TrainingSummary) -> dict[str, object]:
+def _training_facts(job: Experiment, model: torch.nn.Module, trained: TrainingSummary) -> dict[str, object]:
     last = trained.epochs[-1]
     return {
         "command": job.row.command,
@@ -278,7 +278,7 @@ def table_experiments(
     seeds: int = 5,
     rows: Sequence[ModelEntry] = ROWS,
 ) -> list[Experiment]:
-    """Returns the trainings of a table, seed by seed, so that there is a whole table as soon as may be."""
+    """Returns the trainings of a table, seed by seed: the first complete table exists after one seed."""
     return [
         Experiment(corpus=corpus, encoder=encoder, model=row.command, size=size, seed=seed, out=out)
         for seed in range(seeds)
@@ -290,11 +290,11 @@ def table_experiments(
 def gather_table(
     jobs: Sequence[Experiment], *, floors: bool = True
 ) -> tuple[ResultsTable, tuple[TaskPredictions, ...]]:
-    """Scores what finished trainings predicted, and the floors beside them.
+    """Scores the predictions of complete trainings, and of the trivial baselines.
 
     Args:
         jobs: complete trainings on one corpus.
-        floors: whether the floors get rows, drawn with the same seeds.
+        floors: whether the trivial baselines get rows, with the same seeds.
 
     Returns:
         The table, and the predictions behind it.
@@ -315,8 +315,8 @@ def gather_table(
         predicted += [part for name in FLOORS for seed in seeds for part in predict_floor(name, training, labels, seed)]
     about: dict[str, dict[str, object]] = {}
     for job in jobs:
-        told = json.loads((job.folder / RESULT_FILE).read_text(encoding="utf-8"))
-        about.setdefault(job.row.name, {})[str(job.seed)] = told
+        facts = json.loads((job.folder / RESULT_FILE).read_text(encoding="utf-8"))
+        about.setdefault(job.row.name, {})[str(job.seed)] = facts
     chosen = {job.model for job in jobs}
     whole = chosen >= {row.command for row in ROWS if not row.missing}
     missing = {row.name: row.missing for row in ROWS if row.missing} if whole else {}

@@ -57,10 +57,10 @@ def draw_loss_curves(epochs: Sequence[Epoch], title: str, path: Path) -> None:
 # --- The learning curve as a picture ---------------------------------------------------------------------------------
 
 FIGURE_SIZE = (7.0, 4.0)
-"""Of the picture [inches]."""
+"""Width and height of the picture [inches]."""
 
 DOTS_PER_INCH = 150
-"""Dots an inch."""
+"""Resolution of the picture [1/inch]."""
 
 
 @contextmanager

@@ -57,7 +57,7 @@ class Senses:
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Of one point, rebuilt whenever it is looked at; for what each is see spec/toto.md.
+    """Features of one point, rebuilt at each use; spec/toto.md describes the fields.
 
     Attributes:
         lanes, road, junction, edges, edge_types: the map.

@@ -122,7 +122,7 @@ def run_policy(
         SessionError: the corpus cannot be read, or lacks a fold.
     """
     counts = {fold: len(Corpus.load(corpus).filter(fold=fold)) for fold in (TRAIN, VALIDATION, TEST)}
-    found, told = [], {}
+    found, facts = [], {}
     for task in ENVS:
         env = make_task(corpus, task, TRAIN)
         test = demonstrate(make_task(corpus, task, TEST), counts[TEST])
@@ -130,17 +130,17 @@ def run_policy(
             "MlpPolicy", env, seed=seed, gamma=0.0, gae_lambda=0.0, n_steps=_ROLLOUT_STEPS,
             batch_size=_BATCH_SIZE, n_epochs=4, ent_coef=0.01, device="cpu",
             policy_kwargs={"net_arch": [LAYER_WIDTH, LAYER_WIDTH]},
-        )  # fmt: skip  # what is predicted never changes what comes next: the reward of the point is all there is
+        )  # fmt: skip  # a prediction does not change later points: only its own reward counts
         shown = demonstrate(env, counts[TRAIN])
         if kind == "ppo":
             learner.learn(PASSES * len(shown.labels))
-            told[task.value] = {"steps": int(learner.num_timesteps)}
+            facts[task.value] = {"steps": int(learner.num_timesteps)}
         else:
             validation = demonstrate(make_task(corpus, task, VALIDATION), counts[VALIDATION])
-            told[task.value] = {"epochs": _clone(learner.policy, shown, validation, seed)}
+            facts[task.value] = {"epochs": _clone(learner.policy, shown, validation, seed)}
         checkpoints.save(folder / f"{task.value}.safetensors", learner.policy, {"model": name, "seed": seed})
         found.append(_predictions(learner.policy, env, test, task, seed, name))
-    return tuple(found), told
+    return tuple(found), facts
 
 
 def _clone(policy: Any, shown: TaskDemonstrations, validation: TaskDemonstrations, seed: int) -> int:

@@ -1,4 +1,4 @@
-"""Training: epochs with early stopping, that go on after a kill as if nothing had happened."""
+"""Supervised training of models: epochs with early stopping, resumable after an interruption with equal results."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from dorothie_gym.benchmark.features import BatchSpec
 from dorothie_gym.errors import CheckpointError
 
 BEST_FILE: Final = "best.safetensors"
-"""The weights of the epoch with the lowest validation loss."""
+"""Weights of the epoch with the lowest validation loss."""
 
 LAST_FILE: Final = "last.safetensors"
-"""The weights and the optimiser's state after the last epoch that was finished."""
+"""Weights and optimiser state after the last complete epoch."""
 
 _EVALUATED: Final = 256
 _BUCKET: Final = 8
-"""Batches whose points are sorted by length among themselves, so that little of a batch is padding."""
+"""Number of batches whose points are sorted by length together, to reduce padding."""
 
 
 class Schedule(Protocol):
@@ -67,12 +67,12 @@ class Model(nn.Module, ABC):
 
     @abstractmethod
     def predict(self, inputs: Inputs, task: Tensor, allowed: Tensor | None = None) -> Predicted:
-        """Returns what the model takes for true at B points of some tasks (B,); `allowed` (B, 6) masks actions."""
+        """Returns the predictions at B points of tasks (B,); `allowed` (B, 6) masks navigation actions."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Epoch:
-    """One pass over the training points.
+    """Pass over the training points.
 
     Attributes:
         number: from 1.
@@ -97,8 +97,8 @@ class TrainingSummary:
     """Result of a training.
 
     Attributes:
-        epochs: all of them.
-        points: that it was trained on in an epoch.
+        epochs: all epochs.
+        points: number of training points in an epoch.
     """
 
     epochs: tuple[Epoch, ...]
@@ -122,20 +122,20 @@ def train(
 ) -> TrainingSummary:
     """Trains a model until its validation loss no longer falls, and leaves it with the weights of the best epoch.
 
-    On a CPU the same seed gives the same losses to the last digit. After each epoch all is kept in the folder; called
-    again after a kill, it goes on there and comes to the same weights. What was finished is read and not trained again.
+    On a CPU equal seeds give equal losses to the last digit. After each epoch the state is written to the folder; after
+    an interruption, a further call resumes there and reaches equal weights. A complete training is read, not repeated.
 
     Args:
-        model: drawn anew from the same seed.
-        training: points to learn from.
-        validation: points of early stopping.
-        folder: of this training alone.
-        seed: of the order of the points and of dropout.
-        about: name of the model, encoder, hash of the corpus, in JSON types: what makes this training this one.
+        model: model with initial weights drawn from the seed.
+        training: training points.
+        validation: points for early stopping.
+        folder: folder of this training only.
+        seed: seed of the order of the points and of dropout.
+        about: identity of the training in JSON types: name of the model, encoder, hash of the corpus.
         on_epoch: called after each epoch.
 
     Raises:
-        CheckpointError: in the folder lies another training.
+        CheckpointError: the folder holds another training.
         OSError: the folder cannot be written.
     """
     run = _Run(model, folder, seed, about)
@@ -143,7 +143,7 @@ def train(
         epochs = run.resume()
         while not _finished(epochs, model.config):
             number = len(epochs) + 1
-            torch.manual_seed(_mixed(seed, number))  # dropout of an epoch does not hang on the epochs before
+            torch.manual_seed(_mixed(seed, number))  # dropout does not depend on earlier epochs
             loss = run.epoch(training, number)
             found = run.evaluate(validation)
             before = epochs[-1] if epochs else None
@@ -157,7 +157,7 @@ def train(
 
 
 def predict(model: Model, examples: Examples) -> Predicted:
-    """Returns what a model takes for true at some points, on the CPU."""
+    """Returns the predictions of a model at some points, on the CPU."""
     where = next(model.parameters()).device
     model.eval()
     parts = []
@@ -184,7 +184,7 @@ def batches(examples: Examples, size: int, seed: int) -> Iterator[Tensor]:
 
 
 class _Run:
-    """A training under way."""
+    """Training in progress."""
 
     def __init__(self, model: Model, folder: Path, seed: int, about: Mapping[str, object]):
         self.model = model
@@ -211,9 +211,7 @@ class _Run:
         written = checkpoints.about(path)
         for name, value in self.about.items():
             if written.get(name) != value:
-                raise CheckpointError(
-                    f"{path}: was trained with another {name} than is asked for now; choose another folder or delete it"
-                )
+                raise CheckpointError(f"{path}: was trained with another {name}; choose another folder or delete it")
         checkpoints.restore(path, self.model, self.optimiser)
         return [Epoch(**row) for row in written["epochs"]]
 
@@ -243,7 +241,7 @@ class _Run:
         return total / len(examples)
 
     def keep(self, epochs: list[Epoch], better: bool) -> None:
-        """Writes the best first: after a kill between the two, the epoch is trained again and writes it again."""
+        """Writes the best weights first: after an interruption in between, the epoch is trained again."""
         if not math.isfinite(epochs[-1].training):
             raise FloatingPointError(
                 f"{self.folder}: the loss is {epochs[-1].training} in epoch {len(epochs)}; lower the learning rate, "

@@ -88,15 +88,15 @@ def print_counts(table: ResultsTable, console: Console) -> None:
         shown.add_row(*row)
     console.print(shown)
     console.print()
-    told = list(notes(table))
-    for note in told[: NOTES + 1]:
+    lines = list(notes(table))
+    for note in lines[: NOTES + 1]:
         console.print(note, style="dim", markup=False, soft_wrap=True)
-    if len(told) > NOTES + 1:
-        console.print(f"... and {len(told) - NOTES - 1} more; --json has all", style="dim")
+    if len(lines) > NOTES + 1:
+        console.print(f"... and {len(lines) - NOTES - 1} more; --json has all", style="dim")
 
 
 def _side_by_side(table: ResultsTable, console: Console) -> Sequence[Sequence[Task]]:
-    """The tasks that have a table together: all of them where the terminal is wide enough, else each its own."""
+    """Returns the groups of tasks that share a table: all tasks on a wide terminal, else one per group."""
     return [table.tasks] if console.width >= WIDE else [(task,) for task in table.tasks]
 
 

@@ -44,11 +44,11 @@ class FloorModel(ABC):
 
     @abstractmethod
     def predict_acts(self, count: int) -> ActPredictions:
-        """Returns acts for so many points; raises `ValueError` before `fit_acts`."""
+        """Returns acts for `count` points; raises `ValueError` before `fit_acts`."""
 
     @abstractmethod
     def predict_actions(self, count: int) -> ActionPredictions:
-        """Returns actions for so many points; raises `ValueError` before `fit_actions`."""
+        """Returns actions for `count` points; raises `ValueError` before `fit_actions`."""
 
     def _known_acts(self) -> ActPredictions:
         if self._acts is None:

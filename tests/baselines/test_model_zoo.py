@@ -25,13 +25,13 @@ def test_an_unknown_row_is_refused_with_the_names_of_all():
         find_row("gpt")
 
 
-def test_what_cannot_be_run_says_why():
+def test_error_of_missing_models_names_the_reason():
     assert [row.command for row in ROWS if row.missing] == ["hubert"]
     assert "no audio" in find_row("hubert").missing
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_each_row_differs_from_toto_by_what_its_name_says(size):
+def test_each_row_changes_the_inputs_in_its_name(size):
     base = SIZES[size]()
     change = {row.command: row.change(base) for row in ROWS if row.change}
     assert change["toto"] == base

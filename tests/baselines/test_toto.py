@@ -64,7 +64,7 @@ def test_padding_changes_nothing(text):
     torch.testing.assert_close(values(model(roomy)), values(model(tight)), atol=1e-5, rtol=1e-4)
 
 
-def test_what_stands_in_the_padding_changes_nothing():
+def test_values_in_the_padding_do_not_change_the_outputs():
     model = make().eval()
     given = samples.inputs(room=2)
     wanted = values(model(given))
@@ -75,7 +75,7 @@ def test_what_stands_in_the_padding_changes_nothing():
     torch.testing.assert_close(values(model(given)), wanted, atol=1e-5, rtol=1e-4)
 
 
-def test_other_towns_and_larger_ones_change_nothing():
+def test_other_towns_do_not_change_the_outputs():
     alone = make().eval()
     beside = make(graphs=[samples.town_graph(), samples.town_graph(30, seed=4)]).eval()
     beside.load_state_dict(alone.state_dict())
@@ -90,7 +90,7 @@ def test_the_order_of_a_batch_does_not_matter():
     torch.testing.assert_close(values(model(shuffled)), values(model(given))[order], atol=1e-5, rtol=1e-4)
 
 
-def test_a_point_alone_is_told_what_it_is_told_among_others():
+def test_outputs_of_a_point_do_not_depend_on_the_batch():
     model = make().eval()
     given = samples.inputs()
     alone = torch.cat([values(model({name: value[[row]] for name, value in given.items()})) for row in range(6)])
@@ -104,13 +104,13 @@ def later(given, seconds):
 
 
 @pytest.mark.parametrize(("clock", "told"), [("point", False), ("session", True)])
-def test_what_happened_when_is_told_back_from_the_point_and_by_the_published_clock_since_the_session_began(clock, told):
+def test_times_count_from_the_point_or_from_the_session_start_by_clock(clock, told):
     config = replace(TINY, clock=clock).without(Channel.MAP)  # known from the beginning: it has the session's time
     model, given = make(config).eval(), samples.inputs()
     assert torch.allclose(values(model(later(given, 60.0))), values(model(given)), atol=1e-4) is not told
 
 
-def test_the_map_tells_how_long_the_session_has_gone_on_whatever_the_clock():
+def test_map_tokens_have_the_session_time_for_both_clocks():
     model, given = make(replace(TINY, clock="point")).eval(), samples.inputs()
     assert not torch.allclose(values(model(later(given, 60.0))), values(model(given)), atol=1e-4)
 
@@ -165,7 +165,7 @@ def test_the_published_sizes_are_the_papers():
     assert (paper.min_epochs, paper.patience, paper.window, paper.window_step) == (10, 5, 25, 4)
 
 
-def test_a_config_comes_back_from_json():
+def test_config_is_restored_from_json():
     for config in (TOTOConfig.paper(), TOTOConfig.published(), TOTOConfig.small().without(Channel.MAP)):
         assert TOTOConfig.from_json(config.to_json()) == config
 
@@ -179,7 +179,7 @@ def test_a_config_comes_back_from_json():
         ({"min_epochs": 99}, "min_epochs is 99, above max_epochs"),
     ],
 )
-def test_a_config_that_cannot_be_is_refused_by_field(change, message):
+def test_invalid_config_is_refused_with_the_field(change, message):
     with pytest.raises(ValueError, match=message):
         replace(TINY, **change, **({"heads": 4} if "width" in change else {}))
 
@@ -224,7 +224,7 @@ def test_the_head_of_the_speaker_is_read():
     assert decode(outputs, torch.tensor([0, 1])).move.tolist() == [3, 8]
 
 
-def test_belief_counts_only_where_it_is_told():
+def test_belief_loss_counts_known_labels_only():
     given, truth = samples.inputs(), samples.labels()
     plain, with_belief = make(), make(replace(TINY, belief=True)).eval()
     outputs = with_belief(given)

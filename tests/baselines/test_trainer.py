@@ -43,7 +43,7 @@ def test_the_same_seed_gives_the_same_losses_to_the_last_digit(tmp_path):
 
 
 @pytest.mark.parametrize("died_after", [1, 2, 3])
-def test_a_training_that_was_killed_goes_on_to_the_same_weights(tmp_path, died_after):
+def test_interrupted_training_resumes_to_equal_weights(tmp_path, died_after):
     whole, wanted = run(tmp_path / "whole")
 
     class Killed(BaseException):
@@ -65,7 +65,7 @@ def test_a_training_that_was_killed_goes_on_to_the_same_weights(tmp_path, died_a
         assert same(ours, theirs)
 
 
-def test_what_is_finished_is_not_trained_again(tmp_path):
+def test_complete_training_is_not_repeated(tmp_path):
     run(tmp_path)
     told = []
     run(tmp_path, told.append)
@@ -99,7 +99,7 @@ def test_training_stops_when_validation_no_longer_gets_better(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "value"), [("corpus", "xyz"), ("encoder", "minilm"), ("model", "E.T.")])
-def test_another_training_in_the_folder_is_refused_by_what_differs(tmp_path, name, value):
+def test_other_training_in_the_folder_is_refused_with_the_difference(tmp_path, name, value):
     run(tmp_path)
     with pytest.raises(CheckpointError, match=f"another {name}"):
         run(tmp_path, told={**ABOUT, name: value})
@@ -111,7 +111,7 @@ def test_another_config_in_the_folder_is_refused(tmp_path):
         run(tmp_path, config=replace(CONFIG, learning_rate=1e-4))
 
 
-def test_a_damaged_checkpoint_is_told(tmp_path):
+def test_damaged_checkpoint_is_refused(tmp_path):
     run(tmp_path)
     file = tmp_path / LAST_FILE
     file.write_bytes(file.read_bytes()[:100])
@@ -119,7 +119,7 @@ def test_a_damaged_checkpoint_is_told(tmp_path):
         run(tmp_path)
 
 
-def test_a_checkpoint_of_other_sizes_is_told(tmp_path):
+def test_checkpoint_of_other_sizes_is_refused(tmp_path):
     save(tmp_path / "a.safetensors", make(CONFIG), {})
     with pytest.raises(CheckpointError, match="other sizes"):
         restore(tmp_path / "a.safetensors", make(replace(CONFIG, feed_forward=48)))

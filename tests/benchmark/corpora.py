@@ -24,7 +24,7 @@ def corpus(root: Path, folds: tuple[str, ...] = FOLDS) -> Path:
 
 
 def oracle(labels: CorpusLabels, model: str = "oracle", seed: int = 0, shift: int = 0) -> list[TaskPredictions]:
-    """What is right at every point; shifted: the label of the point that many rows before, of the same task."""
+    """Returns the labels as predictions; shifted: those of the point `shift` rows before, of the same task."""
     found = []
     for task, truth in labels.tasks.items():
         rows = np.roll(np.arange(len(truth)), shift)

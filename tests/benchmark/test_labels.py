@@ -19,7 +19,7 @@ from tests.recording.dialogues import talk
 JTURN = PhysicalAction.J_TURN
 
 
-def test_the_split_test_is_what_lies_in_its_folders_seen_and_unseen_apart(tmp_path: Path) -> None:
+def test_split_test_has_the_sessions_of_its_folders_by_seen_and_unseen(tmp_path: Path) -> None:
     labels = labels_of(corpus(tmp_path))
     assert labels.part_of == {"of-test-seen": "seen", "of-test-unseen": "unseen"}
     assert labels.parts == ("seen", "unseen")
@@ -61,7 +61,7 @@ def test_sessions_without_folds_are_divided_by_name(tmp_path: Path) -> None:
     assert len(labels_of(tmp_path, "all").part_of) == 3
 
 
-def test_a_split_without_sessions_is_told_with_those_that_there_are(tmp_path: Path) -> None:
+def test_error_of_empty_split_lists_the_splits_with_sessions(tmp_path: Path) -> None:
     with pytest.raises(SessionError, match="no session for the split 'val'; choose from test, train, all"):
         labels_of(corpus(tmp_path / "c", ("train", "test/seen")), "val")
     write(tmp_path / "one", talk())

@@ -254,7 +254,7 @@ def driven(pairs: list[tuple[int, float]]) -> ActionPredictions:
 
 @given(truth=ANGLES, turns=st.integers(-3, 3), error=st.floats(-14.9, 14.9))
 @settings(max_examples=60, deadline=None)
-def test_whole_turns_never_make_an_angle_wrong(truth: list[tuple[int, float]], turns: int, error: float) -> None:
+def test_full_turns_do_not_change_argument_accuracy(truth: list[tuple[int, float]], turns: int, error: float) -> None:
     labels = driven(truth)
     predicted = driven([(action, angle + error + 360.0 * turns) for action, angle in truth])
     assert ArgumentAccuracy().compute(predicted, labels) == JointAccuracy().compute(predicted, labels) == 1.0
@@ -264,7 +264,7 @@ def test_whole_turns_never_make_an_angle_wrong(truth: list[tuple[int, float]], t
 
 @given(truth=ANGLES, guess=ANGLES)
 @settings(max_examples=60, deadline=None)
-def test_joint_is_never_above_action_or_argument_nor_below_what_both_leave(
+def test_joint_accuracy_is_bounded_by_action_and_argument_accuracy(
     truth: list[tuple[int, float]], guess: list[tuple[int, float]]
 ) -> None:
     count = min(len(truth), len(guess))

@@ -9,7 +9,7 @@ NOISE = (-0.01, 0.0, 0.01)
 
 
 class Table:
-    """Figures of models: 0.6 with a little noise over three seeds, but for what is said otherwise."""
+    """Returns figures of models: 0.6 with a little noise over three seeds, unless given."""
 
     def __init__(self, means: dict[tuple[str, str], float], seeds: int = 3) -> None:
         self.means = means
@@ -43,7 +43,7 @@ def test_differences_the_other_way_do_not_hold() -> None:
     assert verdicts(table) == [ModelVerdict.FAILS] * 4
 
 
-def test_without_a_difference_it_is_undecided_but_for_what_should_not_help() -> None:
+def test_claims_without_difference_are_undecided_except_hardly_any() -> None:
     assert verdicts(Table({})) == [
         ModelVerdict.UNDECIDED,
         ModelVerdict.UNDECIDED,
@@ -56,12 +56,12 @@ def test_one_seed_decides_nothing() -> None:
     assert verdicts(Table({(NO_HISTORY, ""): 0.1}, seeds=1)) == [ModelVerdict.UNDECIDED] * 4
 
 
-def test_without_the_models_nothing_is_tested() -> None:
+def test_claims_about_missing_models_are_not_tested() -> None:
     found = findings(lambda model, part, metric: Estimate.of({}), "seen")
     assert [finding.verdict for finding in found] == [ModelVerdict.UNTESTED] * 4
 
 
-def test_history_is_compared_with_whatever_else_costs_most() -> None:
+def test_history_is_compared_with_the_ablation_of_lowest_score() -> None:
     rival = "TOTO (- GT Transcript)"
     (history, *_) = findings(Table({(NO_HISTORY, ""): 0.3, (rival, ""): 0.2}), "seen")
     assert history.verdict is ModelVerdict.FAILS

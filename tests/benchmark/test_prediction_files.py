@@ -105,7 +105,7 @@ def test_several_files_are_put_together_by_model_seed_and_task(tmp_path: Path) -
         ({**ROW, "event": 1}, "row 0 is of the same point, model mine and seed 3; leave one of them out"),
     ],
 )
-def test_a_wrong_row_is_named_with_what_to_do(tmp_path: Path, row: dict[str, Any], words: str) -> None:
+def test_error_of_wrong_row_names_row_and_remedy(tmp_path: Path, row: dict[str, Any], words: str) -> None:
     right = {**{name: None for name in {**ROW, **DRIVE}}, **ROW, "event": 1}
     message = refusal(tmp_path, right, row)
     assert message.startswith(f"{tmp_path}/p.parquet: row 1 ") and words in message
@@ -126,12 +126,12 @@ def test_of_many_wrong_rows_the_first_are_named(tmp_path: Path) -> None:
         ({"slots": "Landmark=KFC"}, "column 'slots' holds string, but lists of texts like"),
     ],
 )
-def test_a_wrong_column_is_named(tmp_path: Path, change: dict[str, Any], words: str) -> None:
+def test_error_of_wrong_column_names_it(tmp_path: Path, change: dict[str, Any], words: str) -> None:
     row = {name: value for name, value in {**ROW, **change}.items() if value is not None}
     assert words in refusal(tmp_path, row)
 
 
-def test_what_is_no_parquet_file_is_told(tmp_path: Path) -> None:
+def test_file_that_is_not_parquet_is_refused(tmp_path: Path) -> None:
     (tmp_path / "p.parquet").write_text("session,event\n")
     with pytest.raises(PredictionError, match=r"p\.parquet: is no parquet file"):
         read_predictions(tmp_path / "p.parquet")
@@ -148,7 +148,7 @@ def test_damage_is_refused_or_does_no_harm(tmp_path: Path, offset: int) -> None:
         read_predictions(tmp_path / "d.parquet")
 
 
-def test_what_a_file_tells_must_be_json(tmp_path: Path) -> None:
+def test_metadata_of_a_file_must_be_json(tmp_path: Path) -> None:
     table = pa.Table.from_pylist([ROW]).replace_schema_metadata({"dorothie_gym.about": "hashing"})
     pq.write_table(table, tmp_path / "p.parquet")
     with pytest.raises(PredictionError, match="about in its metadata is not valid JSON"):
@@ -160,7 +160,7 @@ def test_rows_that_name_no_slot_at_all_are_read(tmp_path: Path) -> None:
     assert isinstance(acts.predicted, ActPredictions) and not acts.predicted.slots.any()
 
 
-def test_how_predictions_were_made_is_kept(tmp_path: Path) -> None:
+def test_provenance_of_predictions_is_written(tmp_path: Path) -> None:
     assert read_about(file(tmp_path, ROW)) == {}
     write_predictions(tmp_path / "q.parquet", [], about={"encoder": "hashing", "layers": 2})
     assert read_about(tmp_path / "q.parquet") == {"encoder": "hashing", "layers": 2}
@@ -174,7 +174,7 @@ def test_predictions_of_the_other_kind_or_number_are_refused() -> None:
         TaskPredictions(task=Task.NFD, predicted=no_actions(2), **given)
 
 
-def test_what_is_written_is_read_back_and_an_older_file_replaced(tmp_path: Path) -> None:
+def test_written_predictions_are_read_back_and_replace_an_older_file(tmp_path: Path) -> None:
     path = tmp_path / "p.parquet"
     labels = labels_of(corpus(tmp_path / "corpus"))
     write_predictions(path, [])

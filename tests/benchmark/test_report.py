@@ -43,7 +43,7 @@ def test_columns_of_the_papers_protocol_alone_have_its_figures(table: ResultsTab
     assert "/" not in cells["NfD joint acc."]
 
 
-def test_markdown_tells_findings_and_points(table: ResultsTable) -> None:
+def test_markdown_lists_findings_and_points(table: ResultsTable) -> None:
     text = markdown(table)
     assert "**Action history matters most" in text
     assert "UfN move accuracy, TOTO minus TOTO (- Action History): +25.0 ± 317.7, expected above 0: undecided" in text
@@ -51,7 +51,7 @@ def test_markdown_tells_findings_and_points(table: ResultsTable) -> None:
     assert "| sum | 5 | 60 | 20 | 15 | 25 | 0 |" in text
 
 
-def test_markdown_tells_which_corpus_and_encoder_each_training_had(table: ResultsTable) -> None:
+def test_markdown_names_corpus_and_encoder_of_each_training(table: ResultsTable) -> None:
     runs = {
         "0": {"corpus": "c0ffee", "encoder": "hashing", "epochs": 3},
         "1": {"corpus": "c0ffee", "encoder": "hashing"},

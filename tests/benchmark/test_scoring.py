@@ -31,7 +31,7 @@ def test_a_perfect_oracle_has_everything_right(labels: CorpusLabels) -> None:
     assert run.parts["all"].points == {Task.UFN: 8, Task.RFN: 6, Task.NFD: 10}
 
 
-def test_an_oracle_that_is_two_points_late_scores_what_the_hand_says(one: CorpusLabels) -> None:
+def test_labels_shifted_by_two_points_score_as_computed_by_hand(one: CorpusLabels) -> None:
     (run,) = score_runs(one, oracle(one, shift=2))
     metrics = run.parts["seen"].metrics
     # UfN: Instruct(KFC), ReplyY, Instruct(Fuller, JTurn), Explain(Complete); said: the last two, then the first two.
@@ -47,7 +47,7 @@ def test_an_oracle_that_is_two_points_late_scores_what_the_hand_says(one: Corpus
     assert matrix.sum() == 5 and np.trace(matrix) == 1
 
 
-def test_an_angle_that_is_a_whole_turn_off_is_right_but_not_in_the_papers_protocol(one: CorpusLabels) -> None:
+def test_angle_off_by_a_full_turn_is_right_except_in_the_papers_protocol(one: CorpusLabels) -> None:
     nfd = oracle(one)[2]
     assert isinstance(nfd.predicted, ActionPredictions)
     turned = ActionPredictions(actions=nfd.predicted.actions, angles=nfd.predicted.angles + 358.0)
@@ -67,7 +67,7 @@ def test_rows_may_come_in_any_order(labels: CorpusLabels) -> None:
     assert run.parts["all"].metrics["ufn_move_accuracy"] == 1.0
 
 
-def test_what_is_handled_divides_the_points(labels: CorpusLabels) -> None:
+def test_points_are_divided_by_handled_exception(labels: CorpusLabels) -> None:
     (run,) = score_runs(labels, oracle(labels))
     for part in ("seen", "unseen"):
         for task, count in run.parts[part].points.items():
@@ -88,7 +88,7 @@ def cut(given: TaskPredictions, rows: slice) -> TaskPredictions:
     )
 
 
-def test_a_missing_point_is_named_with_what_to_do(labels: CorpusLabels) -> None:
+def test_error_of_missing_point_names_point_and_remedy(labels: CorpusLabels) -> None:
     given = cut(oracle(labels)[0], slice(2, None))
     truth = labels.tasks[Task.UFN]
     first = f"2 of 8 points have no row, the first is session of-test-seen, event {truth.events[0]}; predict them, or"
@@ -116,7 +116,7 @@ def test_sessions_of_other_folds_are_passed_over_and_unknown_ones_refused(labels
         score_runs(labels, [replace(given, sessions=np.append(given.sessions, "nowhere"), **more)])
 
 
-def test_an_event_that_is_no_point_is_told_with_the_nearest(one: CorpusLabels) -> None:
+def test_error_of_event_without_point_names_the_nearest_points(one: CorpusLabels) -> None:
     given = oracle(one)[0]
     events = given.events.copy()
     events[1] = 400

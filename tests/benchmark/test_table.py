@@ -67,7 +67,7 @@ def test_json_has_models_parts_and_metrics_by_name(labels: CorpusLabels) -> None
     assert sum(row["flagged"] for row in page["corpus"]["points"].values()) == 5 * 12
 
 
-def test_json_has_classes_confusion_and_what_is_handled(labels: CorpusLabels) -> None:
+def test_json_has_classes_confusion_and_handled_exceptions(labels: CorpusLabels) -> None:
     page = tables(labels).to_json()
     assert page["per_class"]["ours"]["seen"]["ufn"]["Instruct"]["mean"] == 1.0
     assert "Align" not in page["per_class"]["ours"]["seen"]["ufn"], "it does not occur"

@@ -65,7 +65,7 @@ def test_random_never_predicts_an_unknown_angle() -> None:
     assert model.predict_actions(1).angles.tolist() == [0.0]
 
 
-def test_model_that_learnt_nothing_says_so() -> None:
+def test_model_that_was_not_fitted_is_refused() -> None:
     with pytest.raises(ValueError, match="fit_acts first"):
         MajorityModel().predict_acts(0)
     with pytest.raises(ValueError, match="fit_actions first"):
@@ -76,6 +76,6 @@ def test_model_that_learnt_nothing_says_so() -> None:
         MajorityModel().fit_actions([])
 
 
-def test_unknown_model_is_told_with_the_known_ones() -> None:
+def test_error_of_unknown_model_lists_the_known_ones() -> None:
     with pytest.raises(ValueError, match="'best' is unknown; choose one of majority, random"):
         make_floor("best")

@@ -1,4 +1,4 @@
-"""Encoders: what turns texts, speech and pictures into vectors, with frozen weights or with none."""
+"""Encoders of texts, speech and images: mappings to vectors, with frozen weights or without weights."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -36,7 +36,7 @@ def text_encoder(name: str = "auto") -> TextEncoder:
         name: one of `TEXT_ENCODERS`; "auto" is MiniLM where its weights are installed, else hashing.
 
     Raises:
-        EncoderError: there is none of that name, or what it needs is not here.
+        EncoderError: the name is unknown, or a requirement is missing.
     """
     if name == "auto":
         name = "minilm" if has_minilm() else "hashing"

@@ -1,4 +1,4 @@
-"""Byte pairs: pieces of words, learnt from the texts of a corpus (Sennrich et al., 2016)."""
+"""Byte pair encoding: pieces of words, learnt from the texts of a corpus (Sennrich et al., 2016)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 PAD: Final = 0
-"""Id that stands for nothing; texts are filled up with it at the end."""
+"""Id of padding at the end of texts."""
 
 _BYTES: Final = 256
 _WORD: Final = re.compile(r"\w+|[^\w\s]")
@@ -36,14 +36,14 @@ class BytePairs:
 
     @classmethod
     def train(cls, texts: Iterable[str], vocabulary: int = 1024) -> Self:
-        """Learns pieces from texts: the pair that stands together most often becomes one, again and again.
+        """Learns pieces from texts by merging the most frequent pair of adjacent pieces repeatedly.
 
         Args:
             texts: of the training sessions only.
             vocabulary: how many ids there are at most, padding and bytes included.
 
         Raises:
-            ValueError: the vocabulary does not even hold the bytes.
+            ValueError: the vocabulary is too small for the bytes.
         """
         if vocabulary <= _BYTES:
             raise ValueError(f"vocabulary is {vocabulary}; it must be above {_BYTES}, which bytes and padding take")
@@ -71,7 +71,7 @@ class BytePairs:
 
     @cached_property
     def id(self) -> str:
-        """Name and a hash of what was learnt."""
+        """Name and a hash of the merges."""
         return f"byte-pairs-{hashlib.sha256(repr(self.merges).encode()).hexdigest()[:12]}"
 
     def ids(self, text: str) -> tuple[int, ...]:
@@ -112,7 +112,7 @@ def _bytes(word: str) -> tuple[int, ...]:
 
 
 def _merged(ids: tuple[int, ...], pair: tuple[int, int], new: int) -> tuple[int, ...]:
-    """Ids with each occurrence of the pair replaced."""
+    """Returns the ids with each occurrence of the pair replaced."""
     if pair[0] not in ids:
         return ids
     out: list[int] = []

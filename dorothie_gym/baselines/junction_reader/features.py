@@ -32,7 +32,7 @@ def label_words(label: str) -> tuple[str, ...]:
 
 
 def mentions(texts: Sequence[str]) -> NDArray[np.bool_]:
-    """Returns which slot values each text names (n, 69): all words of the label stand in it, one after another."""
+    """Returns which slot values each text names (n, 69): it contains all words of the label in sequence."""
     table = np.zeros((len(texts), len(LABELS)), dtype=bool)
     for row, text in zip(table, texts, strict=True):
         row[list(_named(text))] = True
@@ -40,7 +40,7 @@ def mentions(texts: Sequence[str]) -> NDArray[np.bool_]:
 
 
 def ways(texts: Sequence[str]) -> NDArray[np.bool_]:
-    """Returns which ways each text names (n, 3): left, right, straight on."""
+    """Returns which directions each text names (n, 3): left, right, straight on."""
     table = np.zeros((len(texts), len(_WAYS)), dtype=bool)
     for row, text in zip(table, texts, strict=True):
         said = set(words(text))
@@ -77,8 +77,8 @@ RECENT_SIZE: Final = RECENT_MOVES * _WHO_AND_WHAT + len(LABELS) + len(PhysicalAc
 def recent(inputs: Inputs) -> Tensor:
     """Returns features of the most recent events before B points (B, RECENT_SIZE), in 0..1; zeros for missing events.
 
-    The last moves, each by whom and which; the slots of the last; the last physical action; how fresh the last move of
-    each speaker and the last action are.
+    The last moves with their speakers; the slots of the last; the last physical action; decays of the age of the last
+    move of each speaker and of the last action.
     """
     mask, actions = inputs["move_mask"], inputs["action_mask"]
     moves = inputs["move"] * 2 + inputs["move_speaker"]
@@ -106,10 +106,10 @@ def _freshness(now: Tensor, times: Tensor, mask: Tensor) -> Tensor:
     return torch.stack([torch.exp(-age / decay) for decay in DECAYS], dim=-1)
 
 
-# --- The ways on at the next junction, read off a town's lane graph --------------------------------------------------
+# --- Exits of the next junction, from the lane graph of a town --------------------------------------------------------
 
 EXITS: Final = 5
-"""Ways on that are kept at most; a crossing has three."""
+"""Largest number of exits; a crossing has three."""
 
 _HOPS: Final = 24
 _START_YAW, _END_YAW = FEATURES.index("start_yaw"), FEATURES.index("end_yaw")
@@ -120,13 +120,13 @@ LANE_END: Final = slice(FEATURES.index("end_x"), FEATURES.index("end_y") + 1)
 
 @dataclass(frozen=True, eq=False)
 class ExitTable:
-    """For each lane of a town (L,) the ways on at the next place where there is a choice.
+    """Exits at the next junction with a choice, for each lane of a town (L,).
 
     Attributes:
-        angle: (L, X) turn to each way [degrees, positive left], as the angle of a turn is counted.
-        lane: (L, X) lane that the car is on after the junction, -1 where there is none.
-        place: (L, X, 2) where that lane ends [m]: which way it leads.
-        there: (L, X) whether there is such a way.
+        angle: (L, X) angle of the turn to each exit [degrees, positive left].
+        lane: (L, X) lane that the car is on after the junction, -1 for none.
+        place: (L, X, 2) end of that lane [m].
+        there: (L, X) whether the exit exists.
         distance: (L,) from the end of the lane to the junction along the lanes between [m].
     """
 
@@ -138,7 +138,7 @@ class ExitTable:
 
 
 def exit_table(graph: TownGraph) -> ExitTable:
-    """Returns the ways on from every lane: along the only successor until there are several."""
+    """Returns the exits from every lane: follows single successors until there are several."""
     count = len(graph.lanes)
     successors = _successors(graph)
     angle, lane = np.zeros((count, EXITS), np.float32), np.full((count, EXITS), -1)
@@ -161,7 +161,7 @@ def _successors(graph: TownGraph) -> list[list[int]]:
 
 
 def _ways(graph: TownGraph, successors: list[list[int]], lane: int) -> tuple[list[tuple[float, int]], float]:
-    """Turns and lanes at the next choice from a lane, and how far it is from its end [m]."""
+    """Returns turns and lanes at the next choice from a lane, and its distance from the end of the lane [m]."""
     gone = 0.0
     for _ in range(_HOPS):
         following = successors[lane]

@@ -1,4 +1,4 @@
-"""The Junction Reader: a model of our own that reads turns off the map and slots off the words (docs/reader.md).
+"""Junction Reader: predicts turns from the exits on the map and slots from the words (docs/reader.md).
 
 Letters in shapes: B points, X exits of the next junction, P pieces of a text, d the width of a token.
 """
@@ -44,10 +44,10 @@ from dorothie_gym.benchmark.features import PARTICIPANT, Columns
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
 
 WORD_BY_WORD: Final = 3
-"""Utterances that are read word by word: the current one, and the last two before."""
+"""Number of utterances that are encoded piece by piece: the current one and the two before it."""
 
 EXIT_TOLERANCE: Final = 15.0
-"""An exit is the labelled one within this angle [degrees] (paper, section 5, Evaluation)."""
+"""Largest error of the angle at which an exit counts as the labelled one [degrees] (paper, section 5, Evaluation)."""
 
 SLOT_THRESHOLD: Final = 0.3
 """Probability from which a slot value is predicted: F1 is maximal at half its optimum (Lipton et al., 2014)."""
@@ -59,7 +59,7 @@ _SPANS: Final = 4
 _SAME_TIME: Final = 0.05
 _MEMORY: Final = (1, 2, 4, 8)
 _NAMED: Final = 3 + 2 * len(_MEMORY) + 2
-"""Features of a slot value: who named it, presence in the last moves of each speaker, presence in the town."""
+"""Features of a slot value: mentions in utterances, in the last moves of each speaker, and in the town."""
 
 _HIDDEN: Final = 32
 _SIDES: Final = 2
@@ -71,9 +71,9 @@ _AT_PLACE: Final = 20.0
 class JunctionReader(TOTO):
     """TOTO's channels and encoder with map exits, subwords and slot-wise scores.
 
-    Time is told back from the point, and what happened last stands apart; the last words are read piece by piece, and
-    what was understood of the current utterance already is marked; the exits of the next junction are tokens, and a
-    turn is one of them; each slot value has a score of its own, from where it was named; and the task is known.
+    Times count back from the point. The most recent events have features of their own, the last utterances are encoded
+    piece by piece, and spans of the current utterance with known acts are marked. The exits of the next junction are
+    tokens, and a turn selects one of them. Each slot value has its own score from its mentions. The task is an input.
 
     Args:
         config: sizes and inputs.
@@ -81,7 +81,7 @@ class JunctionReader(TOTO):
         texts: vectors of texts.
         columns: the corpus, for its graphs and texts.
         pieces: (n, P) pieces of each text of the corpus.
-        vocabulary: how many pieces there are.
+        vocabulary: number of pieces.
     """
 
     def __init__(
@@ -197,7 +197,7 @@ class JunctionReader(TOTO):
         tokens, mask = self._timed(channels, inputs["time"])
         for block in self.blocks[:-1]:
             tokens = block(tokens, mask)
-        # The readout is first of all; the exits' own tokens are asked again, so that each knows what was said.
+        # The readout is the first token; the exits are queries as well, so that each attends to the dialogue.
         asked = self.blocks[-1](tokens, mask, torch.cat((tokens[:, :1], self.norm(exits)), dim=1))
         last, ways = asked[:, 0], asked[:, 1:]
         scores = (ways @ self.which_exit(last).unsqueeze(-1)).squeeze(-1) / ways.shape[-1] ** 0.5
@@ -218,12 +218,12 @@ class JunctionReader(TOTO):
         return torch.where(understands, moves[0], moves[1]), torch.where(understands, slots[0], slots[1])
 
     def _decision(self, last: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Scores of the actions (B, 6) and of the sides (B, 2), and a direction (B, 2) where there is no junction."""
+        """Returns scores of the actions (B, 6) and sides (B, 2), and a direction (B, 2) away from junctions."""
         action, side, direction = self.decision(last).split((len(NAVIGATION_ACTIONS), _SIDES, 2), dim=-1)
         return action, side, direction
 
     def _exit_loss(self, scores: Tensor, there: Tensor, angles: Tensor, labels: Labels) -> Tensor:
-        """Cross entropy of the exit that is labelled (B,); 0 where none is, or the action takes no angle."""
+        """Returns the cross entropy of the labelled exit (B,); 0 without one, or if the action takes no angle."""
         apart = ((angles - labels.angle[:, None].nan_to_num() + 180.0) % 360.0 - 180.0).abs()
         apart = apart.masked_fill(~there, torch.inf)
         nearest, which = apart.min(1)
@@ -239,7 +239,7 @@ class JunctionReader(TOTO):
         return tokens + self.move_text(self.texts(inputs["move_text"])), mask, times
 
     def _exits(self, inputs: Inputs) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Tokens of the exits of the next junction (B, X, d), mask and angles (B, X), how far it is (B,) [m]."""
+        """Returns tokens (B, X, d), mask, angles (B, X) of the exits of the next junction; its distance (B,) [m]."""
         lane, pose = _newest(inputs["window_lane"], inputs["window_mask"]), _newest_pose(inputs)
         row = self.towns.lane_rows(inputs["town"], lane)  # (B,)
         there, angles, places = self.exit_there[row], self.exit_angle[row], self.exit_place[row]
@@ -276,7 +276,7 @@ class JunctionReader(TOTO):
         return torch.stack((fits, any_way, age[:, None].expand(fits.shape)), dim=-1)
 
     def _street_names(self, inputs: Inputs, lane: Tensor) -> Tensor:
-        """Vectors of the names of the streets of lanes (B, X, E); zeros where a lane has none."""
+        """Returns the vectors of the names of the streets of lanes (B, X, E); zeros where a lane has none."""
         row = self.towns.lane_rows(inputs["town"], lane)
         street = torch.where(row >= 0, self.lane_street[row], -1)  # (B, X)
         names = inputs["street_text"]  # (B, R)
@@ -330,7 +330,7 @@ class JunctionReader(TOTO):
         return torch.where(inputs["current_text"] >= 0, inputs["current_text"], last)
 
     def _named(self, inputs: Inputs) -> Tensor:
-        """Returns features of each slot value (B, 69, n): who named it, how long ago, whether the town has it."""
+        """Returns features of each slot value (B, 69, n): who named it and when, and whether the town has it."""
         mask = inputs["move_mask"]
         after = mask.sum(1, keepdim=True) - 1 - torch.arange(mask.shape[1], device=mask.device)
         slots = inputs["move_slots"].float() * mask.unsqueeze(-1)  # (B, M, 69)
@@ -358,7 +358,7 @@ class JunctionReader(TOTO):
 
 
 def reader_config(config: TOTOConfig) -> TOTOConfig:
-    """Returns the reader's config from TOTO's: the same sizes, the point's clock, and slots that can be learnt."""
+    """Returns the reader's config from TOTO's: equal sizes, times back from the point, and a larger weight of slots."""
     channels = tuple(channel for channel in config.channels if channel is not Channel.SPEECH)
     return replace(config, channels=channels, clock="point", loss=replace(config.loss, slot_values=0.3))
 

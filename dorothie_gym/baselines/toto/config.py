@@ -13,7 +13,7 @@ from dorothie_gym.benchmark.features import HISTORY, BatchSpec, HistorySizes
 
 
 class Channel(enum.StrEnum):
-    """A kind of input. A model without one is not given it at all."""
+    """Kind of input; a model receives only its channels."""
 
     MAP = "map"
     """The lane graph, known landmarks and streets."""
@@ -24,11 +24,11 @@ class Channel(enum.StrEnum):
     MOVES = "moves"
     """Dialogue moves so far, with their slots."""
     TRANSCRIPT = "transcript"
-    """The words that were spoken, those of the current utterance among them."""
+    """Spoken words, including those of the current utterance."""
     VISION = "vision"
     """Objects around the ego in the last ten seconds."""
     SPEECH = "speech"
-    """The current utterance as it is heard: its sound, or what a recogniser made of it where there is no sound."""
+    """The current utterance as heard: its sound, or its recognised words if there is no sound."""
     OBJECTS = "objects"
     """Objects around the ego at the point."""
 
@@ -46,7 +46,7 @@ ABLATIONS: Final[Mapping[str, tuple[Channel, ...]]] = MappingProxyType(
     }
 )
 """Ablations of TOTO, by their names in the paper's table. Without Current Speech the words of the
-current utterance go too where there is no sound (`TOTOConfig.current_text`)."""
+current utterance are left out as well if there is no sound (`TOTOConfig.current_text`)."""
 
 TextTraining = Literal["frozen", "trained"]
 
@@ -74,20 +74,20 @@ class LossWeights:
 
 @dataclass(frozen=True, kw_only=True)
 class TOTOConfig(HistorySizes):
-    """Everything that makes one TOTO differ from another. Each ablation of the table is one value of `channels`.
+    """Hyperparameters and inputs of a TOTO model. Each ablation of the table is one value of `channels`.
 
-    How much it is given of what happened is said by the fields of `HistorySizes`.
+    The fields of `HistorySizes` limit the history that the model receives.
 
     Attributes:
         width: numbers of a token.
         layers, heads, feed_forward, dropout: of the encoder.
         attention_dropout: share of the attention's weights that are dropped.
-        channels: what the model is given.
+        channels: inputs of the model.
         current_text: whether the words of the current utterance are among the transcript.
         belief: whether the model also predicts the car's next position and its goal.
         clock: origin of a token's time: the start of the "session", as published, or back from the
             "point". Tokens known from the start then have the session's time: both carry the same information.
-        text: "frozen" vectors of a text encoder, or a "trained" one, which learns with the rest.
+        text: "frozen" vectors of a text encoder, or a "trained" encoder.
         text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, where it is not a BERT's.
         pretrained_text: whether the trained text encoder is MiniLM, where its weights are installed.
         lane_width: numbers of a lane's vector, a multiple of `map_heads`.
@@ -99,7 +99,8 @@ class TOTOConfig(HistorySizes):
         detector: (queries, numbers each) of an object detector; None: objects come from the world's list.
         learning_rate, weight_decay, clip: of AdamW, and the largest norm of the gradient.
         batch_size: points of a step.
-        min_epochs, max_epochs, patience: epochs at least, at most, and without a better validation loss.
+        min_epochs, max_epochs: smallest and largest number of epochs.
+        patience: epochs without a better validation loss after which training stops.
         loss: weights of its parts.
 
     Raises:
@@ -169,7 +170,7 @@ class TOTOConfig(HistorySizes):
 
     @classmethod
     def small(cls) -> Self:
-        """Trains in less than a minute on two cores; the default."""
+        """Returns small sizes, the default: training takes less than a minute on two cores."""
         return cls(
             width=96, layers=2, heads=4, feed_forward=192, text_width=96, text_layers=1, text_tokens=20,
             lane_width=32, map_heads=4, id_width=8, moves=12, utterances=6, actions=10, window=8, window_step=12,

@@ -1,4 +1,4 @@
-"""The parts that TOTO is made of: time, dropout, attention over a sequence and over a graph."""
+"""Layers of TOTO: time encoding, dropout, attention over a sequence and over a graph."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def time_encoding(seconds: Tensor, width: int) -> Tensor:
 
 
 class Dropout(nn.Module):
-    """Dropout whose random numbers cost an eighth: one byte for each value, so that `rate` is rounded to 1/256.
+    """Dropout with one random byte per value, an eighth of the usual cost; `rate` is rounded to 1/256.
 
-    What stays is scaled by the rounded rate, so that the mean is exact.
+    Remaining values are scaled by the rounded rate, so that the mean is exact.
 
     Args:
         rate: share of values that become 0, in [0, 1).
@@ -46,7 +46,7 @@ class Dropout(nn.Module):
         self.level = round(256 * rate)
 
     def forward(self, values: Tensor) -> Tensor:
-        """Returns values of which some are 0; all of them as they are when not training."""
+        """Returns the values, in training with some of them set to 0."""
         if not self.training or self.level == 0:
             return values
         if values.device.type != "cpu":
@@ -57,7 +57,7 @@ class Dropout(nn.Module):
 
 
 class Block(nn.Module):
-    """One layer of the encoder: attention, then feed-forward, each added to its input and normalised after (2017).
+    """Layer of the encoder: attention, then feed-forward, each added to its input and normalised after (2017).
 
     Args:
         width: numbers of a token.
@@ -84,9 +84,9 @@ class Block(nn.Module):
         """Returns the tokens after the layer.
 
         Args:
-            tokens: (B, T, width) what is attended to.
+            tokens: (B, T, width) tokens that are attended to.
             mask: (B, T) True where there is a token.
-            queries: (B, Q, width) the tokens to compute; None: all of them. The others cost nothing.
+            queries: (B, Q, width) the tokens to compute; all if None.
         """
         queries = tokens if queries is None else queries
         queries = self.after_attention(queries + self.dropout(self._attend(queries, tokens, mask)))
@@ -99,7 +99,7 @@ class Block(nn.Module):
         key, value = (_split(part, self.heads) for part in self.key_value(tokens).chunk(2, dim=-1))
         seen = mask[:, None, None, :]  # (B, 1, 1, T)
         if self.training and self.attention_dropout.level and query.device.type == "cpu":
-            # torch's own attention takes a slow way on a CPU when it is to drop weights
+            # torch's own attention is slow on a CPU with dropout of weights
             scores = (query @ key.mT / math.sqrt(query.shape[-1])).masked_fill(~seen, -math.inf)
             attended = self.attention_dropout(scores.softmax(dim=-1)) @ value
         else:
@@ -112,14 +112,13 @@ class Block(nn.Module):
 class GraphAttention(nn.Module):
     """Attention of each node to those that lead to it, and to itself (Velickovic et al., 2018), written sparse.
 
-    Nothing depends on how many nodes there are: graphs of any size, one after another in one, give what each gives
-    alone.
+    The result does not depend on the number of nodes: concatenated graphs give the same vectors as each graph alone.
 
     Args:
         inputs: numbers of a node.
         outputs: numbers of a node after, a multiple of `heads`.
         heads: of the attention.
-        edge_types: how many kinds of edges there are; one more is that of a node to itself.
+        edge_types: number of kinds of edges, without that of a node to itself.
     """
 
     def __init__(self, inputs: int, outputs: int, heads: int, edge_types: int):

@@ -1,4 +1,4 @@
-"""The loss of TOTO (paper, appendix C), of a batch whose points are of different tasks."""
+"""Loss of TOTO (paper, appendix C) for batches of points of different tasks."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from dorothie_gym.ontology import VECTOR_SLOTS
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
 
 _ROOT_OFFSET: Final = 1e-6
-"""Under a root, so that its slope stays finite at 0."""
+"""Summand under a root, so that its slope stays finite at 0."""
 
 
 def point_losses(outputs: Outputs, labels: Labels, config: TOTOConfig) -> Tensor:
-    """Returns the loss of each point (B,): the published one, which was taken one point at a time.
+    """Returns the published loss of each point (B,).
 
     The error of the angle is the chord between directions, in degrees: small errors count as published, and 179 is
     next to -179.
@@ -56,7 +56,7 @@ def _decision(outputs: Outputs, labels: Labels, weights: LossWeights) -> Tensor:
 
 
 def angle_error(direction: Tensor, degrees: Tensor) -> Tensor:
-    """Returns how far directions (B, 2) are from angles (B,) [degrees]; 0 where an angle is not known."""
+    """Returns the error of directions (B, 2) from angles (B,) [degrees]; 0 where the angle is unknown."""
     known = ~degrees.isnan()
     radians = torch.deg2rad(torch.where(known, degrees, 0.0))
     target = torch.stack((radians.cos(), radians.sin()), dim=-1)

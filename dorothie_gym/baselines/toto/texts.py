@@ -96,17 +96,17 @@ class TrainedTexts(Texts):
 
 
 def spread_of(table: Tensor) -> float:
-    """Returns how large the numbers of vectors (n, width) are: the root of their mean square."""
+    """Returns the root mean square of vectors (n, width)."""
     return float(table.square().mean().sqrt().clamp(min=_SMALLEST_SPREAD))
 
 
 class SmallBert(nn.Module):
-    """A BERT of few layers over byte pairs, without weights from elsewhere.
+    """BERT of few layers over byte pairs, trained from random weights.
 
     Args:
-        vocabulary: how many pieces there are.
-        length: pieces of a text at most.
-        width, layers: of the encoder; its heads are 32 numbers wide, or all of a narrower one.
+        vocabulary: number of pieces.
+        length: largest number of pieces of a text.
+        width, layers: sizes of the encoder; each head is 32 wide, or as wide as a narrower encoder.
         dropout: share of values dropped.
     """
 
@@ -137,7 +137,7 @@ class SmallBert(nn.Module):
 
 
 class PretrainedBert(nn.Module):
-    """A BERT of transformers whose weights go on learning.
+    """BERT of transformers whose weights are trained further.
 
     Args:
         model: a `BertModel`; its padding is id 0, as in every published BERT.

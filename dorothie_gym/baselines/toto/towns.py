@@ -1,4 +1,4 @@
-"""The lane graphs of some towns as one graph."""
+"""Lane graphs of several towns as one graph."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _LANE_ID_UNIT: Final = 4.0
 
 
 class Towns(nn.Module):
-    """The lane graphs of some towns, one after another (L lanes, E edges, s streets, all towns together).
+    """Lane graphs of several towns, concatenated (L lanes, E edges, s streets, all towns together).
 
-    They are no part of a model's weights: a model may be used in other towns than it was trained in.
+    They are not part of a model's weights: a model can be used in towns that it was not trained in.
 
     Attributes:
         lanes: (L, 14) columns as in `FEATURES`, each about 1.

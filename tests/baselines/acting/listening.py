@@ -1,4 +1,4 @@
-"""A Co-Wizard whose observations and actions are encoded as the learned one encodes its own."""
+"""Co-Wizard whose observations and actions are encoded as those of a benchmark model."""
 
 from __future__ import annotations
 

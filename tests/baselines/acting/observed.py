@@ -25,5 +25,5 @@ def _first() -> CoWizardView:
 
 
 def view(**changes: Any) -> CoWizardView:
-    """What the Co-Wizard of a session sees at first, with other values in some fields."""
+    """Returns the first view of a Co-Wizard, with other values in some fields."""
     return replace(_first(), **changes)

@@ -1,4 +1,4 @@
-"""Actions and angles of a model become what the car can do."""
+"""Feasible actions for predicted actions and angles."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_turn_takes_the_exit_nearest_to_its_angle_left_positive(angle, directi
     assert any(way.angle == deed.physical.angle for way in crossing().exits)
 
 
-def test_a_turn_that_is_planned_already_is_not_asked_for_again():
+def test_planned_turn_is_not_repeated():
     way = crossing().exits[0]
     planned = {"choice": crossing(), "manoeuvre": TURN, "angle": float(way.angle)}
     assert feasible_action(TURN, way.angle, view(**planned), town()).physical is None
@@ -72,7 +72,7 @@ def test_the_car_follows_its_lane_by_itself_but_not_across_a_junction():
     assert feasible_action(FOLLOW, 0.0, view(motion=Motion.WAITING), town()) is None
 
 
-def test_who_stands_before_a_junction_must_take_a_turn_to_go_on():
+def test_car_standing_before_a_junction_needs_a_turn():
     near = replace(crossing(), distance=3.0)
     stands = view(motion=Motion.STOPPED, choice=near, manoeuvre=None, speed=0.0)
     assert feasible_action(START, 0.0, stands, town()) is feasible_action(FOLLOW, 0.0, stands, town()) is None
@@ -81,7 +81,7 @@ def test_who_stands_before_a_junction_must_take_a_turn_to_go_on():
     assert feasible_action(START, 0.0, planned, town()).physical == Physical(action=START)
 
 
-def test_only_who_stands_starts_and_only_who_drives_stops():
+def test_start_needs_a_stopped_car_and_stop_a_moving_one():
     stands, drives = view(motion=Motion.STOPPED, choice=None), view(motion=Motion.DRIVING)
     assert feasible_action(START, 0.0, stands, town()).physical == Physical(action=START)
     assert feasible_action(STOP, 0.0, drives, town()).physical == Physical(action=STOP)

@@ -1,4 +1,4 @@
-"""When it is decided, and about what."""
+"""Triggers of decisions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def junction(distance: float) -> Choice:
 
 
 def decided(*moments: dict[str, Any], heard: tuple[int, ...] = ()) -> list[DecisionTrigger]:
-    """What is decided at observations half a second apart, the car far from any junction where nothing else is told."""
+    """Returns the triggers at observations half a second apart, by default far from any junction."""
     watch, found = TriggerState(), []
     for number, changes in enumerate(moments):
         usual = {"time": 0.5 * number, "choice": None, "motion": Motion.DRIVING, "manoeuvre": None}
@@ -29,7 +29,7 @@ def decided(*moments: dict[str, Any], heard: tuple[int, ...] = ()) -> list[Decis
     return found
 
 
-def test_nothing_is_decided_on_the_open_road():
+def test_no_decision_is_triggered_on_the_open_road():
     assert decided({}, {"choice": junction(120.0)}, {"choice": junction(41.0)}) == [NOTHING] * 3
 
 
@@ -48,7 +48,7 @@ def test_words_close_to_a_junction_are_about_it():
     assert decided({"choice": junction(30.0)}, {"choice": junction(25.0)}, heard=(0,)) == [BOTH, NOTHING]
 
 
-def test_who_waits_at_a_junction_decides_again():
+def test_car_waiting_at_a_junction_decides_again():
     waits = {"choice": junction(1.0), "motion": Motion.WAITING}
     found = decided(*[waits] * 22)
     assert [number for number, occasion in enumerate(found) if occasion == BOTH] == [0, 20]
@@ -59,13 +59,13 @@ def test_a_hazard_is_decided_upon_when_it_begins_and_when_it_ends():
     assert decided({}, hazard, hazard, {}, {}) == [NOTHING, DRIVES, NOTHING, DRIVES, NOTHING]
 
 
-def test_who_stops_for_a_hazard_looks_again_after_a_while_though_nothing_makes_the_car_brake():
+def test_car_stopped_for_a_hazard_decides_again_without_braking():
     hazard, stands = {"hazard": ObjectClass.TRAFFIC_LIGHT, "motion": Motion.HAZARD}, {"motion": Motion.STOPPED}
     found = decided({}, hazard, *[stands] * 10)
     assert [number for number, occasion in enumerate(found) if occasion == DRIVES] == [1, 9]
 
 
-def test_a_car_that_comes_to_the_place_that_was_named_decides_once():
+def test_car_reaching_the_last_named_place_decides_once():
     watch, drives = TriggerState(), []
     for way in (60.0, 20.0, 12.0, 6.0, 1.0, None):  # at 6 m/s Stop takes about 9 m
         occasion, watch = watch.look(view(speed=6.0, choice=None, motion=Motion.DRIVING, manoeuvre=None), False, way)
@@ -78,6 +78,6 @@ def test_nobody_stands_for_ever():
     assert [number for number, occasion in enumerate(found) if occasion.drives] == [0, 1, 21, 41]
 
 
-def test_while_the_car_turns_round_it_answers_and_decides_what_to_do_afterwards():
+def test_navigation_decision_is_postponed_during_a_u_turn():
     turns = {"manoeuvre": PhysicalAction.U_TURN}
     assert decided(turns, turns, {}, {}, heard=(1,)) == [NOTHING, DecisionTrigger(speaks=True), DRIVES, NOTHING]

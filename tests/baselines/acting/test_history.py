@@ -62,7 +62,7 @@ def test_the_own_words_are_known_when_they_are_over():
     ]
 
 
-def test_of_two_that_end_together_who_began_first_comes_first():
+def test_utterances_that_end_together_are_ordered_by_their_start():
     heard = (Span("Go to the shop on Fuller Street and then stop please.", OKAY),)
     late = begin().acted(None, None, view(time=0.0), 4).observed(view(time=3.0), town(), ())
     late = late.acted(Speech(act=OKAY, text="Okay."), None, view(time=3.0), 4)
@@ -70,7 +70,7 @@ def test_of_two_that_end_together_who_began_first_comes_first():
     assert [speaker for speaker, _, _ in said(both)] == ["participant", "co_wizard"]
 
 
-def test_more_acts_than_an_utterance_has_room_for_are_not_said():
+def test_acts_beyond_the_size_of_an_utterance_are_dropped():
     following = begin()
     for k in range(3):
         following = following.acted(Speech(act=OKAY, text=f"Okay {k}."), None, view(time=0.0), 2)

@@ -1,4 +1,4 @@
-"""At every recorded point, what the playing model is given is what the corpus holds of the same session.
+"""Parity of the inputs of a playing model and of the recorded session at every point.
 
 The Co-Wizard's own history comes from its observations alone. Words, acts, actions, times and the map are exactly those
 of the recording; where it was and what was around it are estimates, and close.
@@ -26,10 +26,10 @@ ESTIMATED = {
     "window_pose", "window_speed", "window_lane", "window_kind", "window_values", "window_objects_mask",
     "kind", "values", "objects_mask",
 }  # fmt: skip
-"""Fields that hang on where the car believes itself to be, and on what it perceives."""
+"""Fields that depend on the estimated pose and on perception."""
 
 GUESSED = {"move_text"}
-"""The words of each act of an utterance with several: only the whole utterance is heard."""
+"""Words of each act of an utterance with several acts: only the whole utterance is observed."""
 
 
 @pytest.fixture(scope="module", params=[("brookside", 3, 120.0), ("midtown", 5, 150.0)], ids=lambda case: case[0])

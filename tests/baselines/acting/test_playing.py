@@ -68,7 +68,7 @@ def test_every_kind_of_model_plays_whether_acts_are_observed_or_not(
         assert [row.error for row in result.rows if row.error] == []
 
 
-def test_the_hash_covers_the_weights_and_the_cost_is_told(folders: dict[str, Path], tmp_path: Path) -> None:
+def test_hash_covers_the_weights_and_training_cost_is_reported(folders: dict[str, Path], tmp_path: Path) -> None:
     player = find_player(str(folders["toto"]), Role.CO_WIZARD)
     told = json.loads((folders["toto"] / "result.json").read_text())
     assert player.training == {"steps": told["points"] * told["epochs"], "seconds": told["seconds"]}
@@ -93,7 +93,7 @@ def test_another_encoder_than_the_model_was_trained_with_is_refused(folders: dic
         BenchmarkModel.load(other)
 
 
-def test_a_description_of_another_version_is_told(folders: dict[str, Path], tmp_path: Path) -> None:
+def test_model_card_of_another_version_is_refused(folders: dict[str, Path], tmp_path: Path) -> None:
     other = shutil.copytree(folders["toto"], tmp_path / "other")
     (other / "model.json").write_text('{"kind": "benchmark"}')
     with pytest.raises(ValueError, match="describes no model of this version"):

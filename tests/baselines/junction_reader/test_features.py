@@ -1,4 +1,4 @@
-"""What the reader is told of what happened last."""
+"""Features of the most recent events."""
 
 import pytest
 import torch
@@ -33,7 +33,7 @@ def test_before_anything_happened_there_is_nothing():
     assert recent(inputs([], [])).tolist() == [[0.0] * RECENT_SIZE]
 
 
-def test_the_last_moves_are_told_newest_first_by_whom_and_which():
+def test_last_moves_are_encoded_newest_first_with_speaker():
     told = recent(inputs([(0, 3, 1.0, 7), (1, 5, 4.0, 9)], []))[0]
     assert told[:AT_SLOTS].nonzero()[:, 0].tolist() == [5 * 2 + 1, KINDS + 3 * 2]
     assert told[AT_SLOTS:AT_ACTIONS].nonzero()[:, 0].tolist() == [9]
@@ -48,6 +48,6 @@ def test_freshness_is_that_of_each_speaker_and_of_the_last_action():
     assert action == pytest.approx([2.718281828 ** (-2.0 / decay) for decay in DECAYS])
 
 
-def test_room_that_is_not_used_changes_nothing():
+def test_padding_does_not_change_recent_features():
     happened = [(0, 3, 1.0, 7), (1, 5, 4.0, 9)], [(4, 2.0)]
     assert torch.equal(recent(inputs(*happened, room=4)), recent(inputs(*happened, room=9)))

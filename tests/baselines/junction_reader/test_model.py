@@ -54,7 +54,7 @@ def test_labels_are_spelt_in_words():
     assert label_words(ObjectClass.TRAFFIC_LIGHT.label) == ("traffic", "light")
 
 
-def test_a_text_names_whole_words_only():
+def test_mentions_match_complete_words_only():
     table = mentions(["Take Fuller to the burger king!", "Fullerton", ""])
     named = {LABELS[place] for place in np.flatnonzero(table[0])}
     assert {StreetName.FULLER, LandmarkName.BURGER_KING} <= named
@@ -127,7 +127,7 @@ def test_a_town_that_is_not_known_is_no_obstacle():
     assert answers(make((samples.no_town(),)), given, torch.arange(6) % 3).isfinite().all()
 
 
-def test_what_was_understood_already_is_marked():
+def test_spans_with_known_acts_are_marked():
     model = make()
     given = samples.inputs()
     given["current_text"] = torch.zeros(6, dtype=torch.int64)

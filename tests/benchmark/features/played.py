@@ -129,7 +129,7 @@ def _others(table: SceneTable, first: int) -> SceneTable:
 
 
 def seen(columns: Columns, batch: Batch) -> dict[str, Any]:
-    """What a batch holds, texts as words: their numbers depend on what else was said."""
+    """Returns the fields of a batch with texts as words, since their numbers depend on other texts."""
     words = np.array([*columns.texts, ""], dtype=object)  # -1 is the last
     found = {}
     for field in fields(batch):

@@ -42,7 +42,7 @@ def test_columns_are_built_once_and_mapped_then(corpus: Path, monkeypatch: pytes
     assert not again.frames.pose.flags.writeable
 
 
-def test_without_a_cache_nothing_is_kept(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_file_is_written_without_a_cache(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     build(corpus, cache=False)
     folder = features_folder()
     assert folder is not None and not folder.exists()
@@ -51,7 +51,7 @@ def test_without_a_cache_nothing_is_kept(corpus: Path, monkeypatch: pytest.Monke
     assert len(build(corpus).moves.move) == 7
 
 
-def test_what_changes_in_a_session_or_its_place_is_built_anew(corpus: Path) -> None:
+def test_changed_sessions_and_folds_are_built_again(corpus: Path) -> None:
     keys = {build(corpus).key}
     events = corpus / "train" / "a" / "events.jsonl"
     events.write_text(events.read_text().replace("turning left.", "turning right."))
@@ -63,7 +63,7 @@ def test_what_changes_in_a_session_or_its_place_is_built_anew(corpus: Path) -> N
     assert len(keys) == 4
 
 
-def test_a_corpus_is_known_by_what_it_holds_whatever_its_sessions_are_called(corpus: Path) -> None:
+def test_content_hash_does_not_depend_on_names_of_sessions(corpus: Path) -> None:
     first = build(corpus).content
     (corpus / "train" / "a").rename(corpus / "train" / "b")
     assert build(corpus).content == build(corpus, cache=False).content == first
@@ -74,7 +74,7 @@ def test_a_corpus_is_known_by_what_it_holds_whatever_its_sessions_are_called(cor
 
 @pytest.mark.parametrize("name", ["moves.slots.npy", "frames.pose.npy", INDEX_FILE])
 @pytest.mark.parametrize("damage", ["torn", "changed", "gone"])
-def test_damaged_files_are_built_anew(corpus: Path, name: str, damage: str) -> None:
+def test_damaged_entries_are_built_again(corpus: Path, name: str, damage: str) -> None:
     first = build(corpus)
     path = entry() / name
     data = bytearray(path.read_bytes())
@@ -97,7 +97,7 @@ def test_the_faster_of_two_processes_wins(corpus: Path) -> None:
     assert_same(first, build(corpus))
 
 
-def test_nothing_in_the_cache_can_run_code(corpus: Path) -> None:
+def test_pickled_objects_in_the_cache_are_refused(corpus: Path) -> None:
     build(corpus)
     assert {path.suffix for path in entry().iterdir()} == {".npy", ".json"}
     for path in entry().glob("*.npy"):
@@ -114,14 +114,14 @@ def test_sessions_that_cannot_be_read_are_listed(corpus: Path) -> None:
     assert build(corpus).unreadable == columns.unreadable
 
 
-def test_a_corpus_of_which_nothing_can_be_read_is_one_clear_error(tmp_path: Path) -> None:
+def test_corpus_without_a_readable_session_is_refused(tmp_path: Path) -> None:
     broken = write(tmp_path / "corpus" / "broken", talk())
     (broken / "session.json").write_text("{")
     with pytest.raises(SessionError, match=r"no session can be read: .*session\.json"):
         build(tmp_path / "corpus")
 
 
-def test_progress_is_told(corpus: Path) -> None:
+def test_progress_is_reported_for_each_session(corpus: Path) -> None:
     told: list[int] = []
     build(corpus, cache=False, on_session=lambda: told.append(1))
     assert told == [1]

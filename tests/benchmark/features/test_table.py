@@ -113,7 +113,7 @@ def test_the_paper_s_leak_is_at_ufn_points_only(task: Task) -> None:
     np.testing.assert_equal(vars(honest), vars(leaked))
 
 
-def test_the_newest_are_kept_and_what_is_missing_is_at_the_end() -> None:
+def test_newest_entries_are_kept_and_padding_is_at_the_end() -> None:
     columns = columns_of(session(talk()))
     table = points(columns, Task.RFN)
     batch = gather(columns, table, [2], BatchSpec(moves=3, actions=2, utterances=9))
@@ -143,7 +143,7 @@ def test_a_point_before_the_first_frame_has_an_empty_window() -> None:
     assert not batch.window_mask.any() and not batch.action_mask.any()
 
 
-def test_what_happened_within_the_tenth_of_a_point_is_not_visible() -> None:
+def test_events_within_the_tenth_of_a_point_are_not_visible() -> None:
     acts = [physical(60, PhysicalAction.START), physical(61, PhysicalAction.STOP), physical(63, PhysicalAction.START)]
     columns = columns_of(session(acts))
     batch = gather(columns, points(columns, Task.NFD), [0, 1, 2])
@@ -175,7 +175,7 @@ def test_belief_is_the_next_frame_and_the_subgoal_reached_next() -> None:
 
 
 def odd_session() -> Session:
-    """Flagged events of every sort that is no point, and a turn whose angle nobody knows."""
+    """Session with flagged events of each kind without a point, and a turn with unknown angle."""
     return session(
         [
             *talk(),
@@ -214,7 +214,7 @@ def test_folds_choose_sessions() -> None:
         points(columns, Task.UFN, "other")
 
 
-def test_an_utterance_whose_acts_were_written_apart_is_visible_when_it_is_over() -> None:
+def test_utterance_with_acts_at_several_times_is_visible_after_the_last() -> None:
     """In recordings of people the acts of an utterance may have frames of their own."""
     first, second = utterance(60, Role.PARTICIPANT, 0, ("Yes,", YES), ("left.", STREET))
     columns = columns_of(session([first, replace(second, frame=90), physical(75, PhysicalAction.START)]))
@@ -223,7 +223,7 @@ def test_an_utterance_whose_acts_were_written_apart_is_visible_when_it_is_over()
     assert not gather(columns, points(columns, Task.NFD), [0]).move_mask.any()
 
 
-def test_a_batch_of_nothing_has_its_shapes() -> None:
+def test_empty_batch_has_its_shapes() -> None:
     columns = columns_of(session([]))
     for task in Task:
         batch = gather(columns, points(columns, task), [])
@@ -238,7 +238,7 @@ def test_wrong_sizes_are_named() -> None:
         BatchSpec(moves=-1)
 
 
-def test_what_a_recogniser_heard_is_kept_beside_the_words() -> None:
+def test_recognised_words_are_kept_beside_the_spoken_words() -> None:
     heard = utterance(30, Role.PARTICIPANT, 0, ("To the KFC please.", DONE))
     heard = [replace(event, data={**event.data, "recognised": "to the cafe"}) for event in heard]
     columns = columns_of(session([*heard, *utterance(60, Role.CO_WIZARD, 1, ("Okay", OKAY))]))
