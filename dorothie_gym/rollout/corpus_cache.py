@@ -35,9 +35,9 @@ _LOG = logging.getLogger(__name__)
 def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: EnvConfig | None = None) -> Path:
     """Returns the folder of a corpus of the scripted roles; generates it at the first call, with a progress bar.
 
-    Its folds and towns are shared out as the paper's. It is kept in the user's cache under the version of the package
-    and what it was made from, so that another version plays its own. The folder appears when all sessions are played:
-    nobody ever reads a part of it.
+    Folds and towns have the proportions of the paper. The corpus is kept in the user's cache; the name of its folder
+    contains the version of the package and a hash of the settings. The folder appears when all sessions are played, so
+    that incomplete corpora are never read.
 
     Args:
         sessions: number of sessions; `SESSIONS` if None.
@@ -71,7 +71,7 @@ def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: Env
 
 def _play(folder: Path, sessions: int, seed: int, config: EnvConfig) -> None:
     console = Console(stderr=True)
-    _LOG.info("playing %d sessions, which are kept in %s", sessions, folder.parent)
+    _LOG.info("playing %d sessions, which are stored in %s", sessions, folder.parent)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
         bar = progress.add_task("Generating the default corpus", total=sessions)
@@ -84,8 +84,8 @@ def _play(folder: Path, sessions: int, seed: int, config: EnvConfig) -> None:
 
 
 def _publish(part: Path, folder: Path) -> None:
-    """Gives the finished folder its name, unless another process was faster with the same sessions."""
-    part.chmod(0o755)  # temporary folders are closed to everybody else
+    """Renames the finished folder, unless another process has already stored the same sessions."""
+    part.chmod(0o755)  # temporary folders are closed to other users
     try:
         part.rename(folder)
     except OSError:

@@ -53,7 +53,7 @@ def test_an_annotation_agrees_with_itself() -> None:
     assert found.moves == found.slots == pytest.approx(1.0)
 
 
-def test_no_better_than_chance_is_zero_and_one_label_alone_is_undefined() -> None:
+def test_kappa_is_zero_at_chance_and_undefined_for_a_single_label() -> None:
     assert agreement(labelled(GO, GO, TELL, TELL), labelled(GO, TELL, GO, TELL)).moves == pytest.approx(0.0)
     found = agreement(labelled(GO, GO), labelled(GO, GO))
     assert found.moves is None and found.slots is None
@@ -68,7 +68,7 @@ def test_utterances_that_are_split_otherwise_are_compared_piece_by_piece() -> No
 
 
 @pytest.mark.parametrize(
-    ("other", "told"),
+    ("other", "message"),
     [
         (labelled(GO, seed=8), "seed is 7 in the one, 8 in the other"),
         (labelled(GO, town="elsewhere"), "town is 'crossing' in the one, 'elsewhere' in the other"),
@@ -76,10 +76,10 @@ def test_utterances_that_are_split_otherwise_are_compared_piece_by_piece() -> No
         (drive(one(("other words", GO))), "utterance 10 is 'word' in the one, 'other words' in the other"),
     ],
 )
-def test_annotations_of_different_sessions_are_refused(other: Session, told: str) -> None:
+def test_annotations_of_different_sessions_are_refused(other: Session, message: str) -> None:
     with pytest.raises(SessionError, match="not the same session") as refused:
         agreement(labelled(GO), other)
-    assert told in str(refused.value)
+    assert message in str(refused.value)
 
 
 def test_silence_cannot_be_compared() -> None:

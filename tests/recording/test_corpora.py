@@ -98,11 +98,11 @@ def test_manifest_reports_changed_sessions(corpus: Corpus) -> None:
     events.write_text(events.read_text().replace("Great.", "Grand."))
     (corpus.root / "train/b/frames.parquet").unlink()
     (corpus.root / "val/seen/c").rename(corpus.root / "val/seen/x")
-    told = Corpus.load(corpus.root).verify()
-    assert told[0] == "val/seen/c: is missing"
-    assert told[1] == "train/a: its content was changed"
-    assert told[2].startswith("train/b: cannot be read (")
-    assert told[3] == "val/seen/x: is not in the manifest"
+    faults = Corpus.load(corpus.root).verify()
+    assert faults[0] == "val/seen/c: is missing"
+    assert faults[1] == "train/a: its content was changed"
+    assert faults[2].startswith("train/b: cannot be read (")
+    assert faults[3] == "val/seen/x: is not in the manifest"
 
 
 def test_manifest_that_was_changed_itself_is_noticed(corpus: Corpus) -> None:

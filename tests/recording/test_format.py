@@ -186,7 +186,7 @@ def test_faults_that_the_reader_accepts_are_reported_by_check() -> None:
         Event(frame=80, type=EventType.END, source=Role.AGENT),
         Event(frame=81, type=EventType.MESSAGE, source=Role.AD_WIZARD),
     ]
-    told = "\n".join(session(events).check())
+    faults = "\n".join(session(events).check())
     for part in (
         "events[0] (Subgoal, frame 0): subgoal 9 is none of the 2",
         "events[2] (utterance 0): has another speaker than events[1]",
@@ -195,7 +195,7 @@ def test_faults_that_the_reader_accepts_are_reported_by_check() -> None:
         "events[4] (SpeedChange): does not say whether up or down",
         "events[6] (Message, frame 81): comes after the end",
     ):
-        assert part in told
+        assert part in faults
 
 
 def test_frames_that_are_missing_are_a_fault_and_another_rate_is_none() -> None:

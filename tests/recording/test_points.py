@@ -116,7 +116,7 @@ def test_before_the_first_frame_there_is_no_car() -> None:
     assert next(nfd_points(session([physical(0, PhysicalAction.START)]))).view.car is None
 
 
-def test_the_way_goes_back_from_the_last_state_of_the_car() -> None:
+def test_way_ends_at_the_last_state_of_the_car() -> None:
     view = next(nfd_points(session([physical(100, PhysicalAction.STOP)]))).view
     assert [state.frame for state in view.way] == [3, 15, 27, 39, 51, 63, 75, 87, 99]
     assert view.way[-1] == view.car

@@ -16,7 +16,7 @@ from dorothie_gym.rollout import play_session
 
 
 @pytest.mark.parametrize("seed", [3, 8, 21])
-def test_stored_exchanges_and_transactions_are_those_found_anew(seed: int, tmp_path: Path) -> None:
+def test_stored_exchanges_and_transactions_equal_derived_ones(seed: int, tmp_path: Path) -> None:
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=150.0))
     policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
     play_session(env, policies, seed=seed, folder=tmp_path / "session")

@@ -48,7 +48,7 @@ def test_an_interrupted_corpus_leaves_nothing(cache: Path, monkeypatch: pytest.M
     assert list(cache.iterdir()) == []
 
 
-def test_a_faster_process_wins(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_corpus_of_a_faster_process_is_kept(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     done = default_corpus(sessions=1, seed=3, config=SHORT)
     part = cache / "other.part"
     part.mkdir()
@@ -56,16 +56,14 @@ def test_a_faster_process_wins(cache: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert len(load_sessions(done)) == 1
 
 
-def test_a_cache_that_cannot_be_written_is_told_with_what_to_set(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_unwritable_cache_is_reported_with_the_variable_to_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("DOROTHIE_GYM_CACHE", str(tmp_path / "file" / "below"))
     with pytest.raises(CacheError, match=r"below: no corpus can be stored here \(.*set DOROTHIE_GYM_CACHE to a folder"):
         default_corpus(sessions=1, seed=3, config=SHORT)
 
 
-def test_a_cache_that_is_turned_off_is_reported_with_the_variable_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_disabled_cache_is_reported_with_the_variable_to_set(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DOROTHIE_GYM_CACHE", "")
     with pytest.raises(CacheError, match="sessions cannot be kept: DOROTHIE_GYM_CACHE is empty; set it to a folder"):
         default_corpus(sessions=1, seed=3, config=SHORT)

@@ -21,7 +21,7 @@ def test_other_numbers_are_shared_out_in_proportion(sessions: int) -> None:
     assert all(abs(sizes[fold] - sessions * PAPER_FOLDS[fold] / 183) < 1 for fold in FOLDS)
 
 
-def test_unseen_folds_have_towns_that_training_never_has_and_all_seen_towns_take_part() -> None:
+def test_unseen_folds_share_no_town_with_training_and_all_seen_towns_occur() -> None:
     plans = plan_corpus(183, 0)
     for plan in plans:
         assert plan.town in (UNSEEN_TOWNS if "unseen" in plan.fold else SEEN_TOWNS)

@@ -44,7 +44,7 @@ def test_what_is_there_is_not_played_again(corpus: Path) -> None:
     assert contents(corpus) == before
 
 
-def test_session_that_is_missing_is_played_anew_with_the_same_bytes(corpus: Path, tmp_path: Path) -> None:
+def test_missing_session_is_played_again_with_the_same_bytes(corpus: Path, tmp_path: Path) -> None:
     before = contents(corpus)
     victim = Corpus.load(corpus).entries[2].path
     victim.rename(tmp_path / "gone")
@@ -91,11 +91,11 @@ def test_two_at_once_are_kept_apart(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_killed_at_random_moments_it_ends_in_the_bytes_of_an_undisturbed_run(tmp_path: Path) -> None:
+def test_run_killed_at_random_moments_gives_the_bytes_of_an_undisturbed_run(tmp_path: Path) -> None:
     kill_again_and_again(tmp_path, times=6, sessions=6, seconds=60.0, longest=3.0)
 
 
-def test_two_workers_make_the_same_bytes_and_ctrl_c_tells_how_to_go_on(corpus: Path, tmp_path: Path) -> None:
+def test_two_workers_make_the_same_bytes_and_ctrl_c_prints_how_to_resume(corpus: Path, tmp_path: Path) -> None:
     out = tmp_path / "two"
     process = begin(out, sessions=6, seconds=8, workers=2)
     while process.poll() is None and not list(out.glob("[tv]*/**/session.json")):

@@ -48,7 +48,7 @@ def test_rollout_of_a_cluster_goes_on_with_what_is_there(cluster: Any, tmp_path:
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "ray://127.0.0.1:1", "nowhere:in particular"])
-def test_address_without_a_cluster_is_told(address: str, tmp_path: Path) -> None:
+def test_address_without_a_cluster_is_reported(address: str, tmp_path: Path) -> None:
     pytest.importorskip("ray")
     with pytest.raises(ProcessError, match=f"there is no Ray cluster at '{address}'"):
         generate_corpus(tmp_path, sessions=1, seed=0, ray=address)

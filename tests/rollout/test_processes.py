@@ -17,11 +17,11 @@ def test_no_more_processes_are_started_than_there_are_tasks() -> None:
     assert list(run_tasks(workshop.squares, [], workers=2)) == []
 
 
-def test_failure_tells_task_and_reason() -> None:
+def test_failure_names_task_and_reason() -> None:
     with pytest.raises(ProcessError, match="3: ValueError: three is too much"):
         list(run_tasks(workshop.refusing, range(5), workers=2))
 
 
-def test_death_of_a_process_is_told_instead_of_waited_for() -> None:
+def test_death_of_a_worker_is_reported_at_once() -> None:
     with pytest.raises(ProcessError, match="died with code -9"):
         list(run_tasks(workshop.dying, range(5), workers=2))

@@ -53,7 +53,7 @@ def test_wrapper_records_what_is_needed_to_play_it_again(tmp_path: Path) -> None
     assert resimulate(session, TOWN).digest == session.digest
 
 
-def test_session_that_was_cut_off_is_checked_as_far_as_it_goes(tmp_path: Path) -> None:
+def test_interrupted_session_is_checked_up_to_its_last_frame(tmp_path: Path) -> None:
     def stop(env: DuoWizardEnv) -> None:
         if env.session.world.frame == 300:
             raise KeyboardInterrupt
@@ -69,12 +69,12 @@ def test_session_that_was_cut_off_is_checked_as_far_as_it_goes(tmp_path: Path) -
 
 def test_other_action_is_found_at_the_frame_after_it(recorded: Session) -> None:
     assert recorded.decisions
-    told = next(d for d in recorded.decisions if "utterance" in d.actions.get(Role.PARTICIPANT, {}))
-    said = {**told.actions, Role.PARTICIPANT: {**told.actions[Role.PARTICIPANT], "utterance": "something else"}}
-    others = tuple(Decision(frame=d.frame, actions=said) if d is told else d for d in recorded.decisions)
+    spoken = next(d for d in recorded.decisions if "utterance" in d.actions.get(Role.PARTICIPANT, {}))
+    said = {**spoken.actions, Role.PARTICIPANT: {**spoken.actions[Role.PARTICIPANT], "utterance": "something else"}}
+    others = tuple(Decision(frame=d.frame, actions=said) if d is spoken else d for d in recorded.decisions)
     changed = dataclasses.replace(recorded, decisions=others)
     difference = first_difference(changed, resimulate(changed, TOWN))
-    assert difference is not None and difference.frame >= told.frame and "events" in difference.field
+    assert difference is not None and difference.frame >= spoken.frame and "events" in difference.field
 
 
 def test_last_bit_of_one_number_is_found(recorded: Session) -> None:
@@ -103,7 +103,7 @@ def test_event_that_is_missing_and_another_outcome_are_found(recorded: Session) 
     assert difference is not None and difference.field == "outcome.success"
 
 
-def test_other_town_is_told(recorded: Session) -> None:
+def test_other_town_is_reported(recorded: Session) -> None:
     without = dataclasses.replace(recorded, decisions=())  # its places are not those of the other town
     difference = first_difference(without, resimulate(without, load_town("midtown")))
     assert difference is not None and (difference.frame, difference.field) == (-1, "header.town")

@@ -29,7 +29,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
 
 SESSIONS, SEED = 183, 977
 SPREAD = 0.2
-"""How far the figures of a seed that nobody has tried may be from the paper's."""
+"""Largest difference from the paper's figures for an untested seed."""
 
 CAR_ONLY_ANSWERS = frozenset({DialogueMove.INSTRUCT})
 """Moves that are not the car's to make."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Final
 
-from dorothie_gym.analysis.phenomena import changes, questions
-from dorothie_gym.analysis.phenomena import routes as ways
+from dorothie_gym.analysis.phenomena import changes, questions, routes
 from dorothie_gym.analysis.phenomena.dialogue_view import DialogueView, Phenomenon, Query, both_speak
 from dorothie_gym.ontology import ExceptionKind
 
@@ -27,15 +26,15 @@ def _happens(kind: ExceptionKind, talk: DialogueView) -> bool:
 
 
 PHENOMENA: Final[tuple[Phenomenon, ...]] = (
-    _always(1, "goal-level instruction, taken up", ways.goal_level, "goal"),
-    _always(2, "step-level instruction, taken up", ways.step_level, "step"),
-    _always(3, "two acts in one utterance", ways.two_acts, "two acts"),
+    _always(1, "goal-level instruction, taken up", routes.goal_level, "goal"),
+    _always(2, "step-level instruction, taken up", routes.step_level, "step"),
+    _always(3, "two acts in one utterance", routes.two_acts, "two acts"),
     Phenomenon(
         number=4,
         title="question at a junction",
         cause="the car turns at a junction",
-        has_cause=ways.turns_at_junctions,
-        find=ways.asked_at_junction,
+        has_cause=routes.turns_at_junctions,
+        find=routes.asked_at_junction,
         forms=("told",),
     ),
     _always(5, "yes/no question answered", questions.yes_no, "yes", "no", "unsure"),
@@ -52,7 +51,7 @@ PHENOMENA: Final[tuple[Phenomenon, ...]] = (
     Phenomenon(
         number=9,
         title="roadblock reported and bypassed",
-        cause="the car comes near something put on the road",
+        cause="the car comes near an object placed on the road",
         has_cause=changes.meets_roadblock,
         find=changes.roadblock,
         forms=("proposed", "told"),
@@ -74,7 +73,7 @@ PHENOMENA: Final[tuple[Phenomenon, ...]] = (
     Phenomenon(
         number=14,
         title="completion",
-        cause="a goal is reached and the drive goes on",
+        cause="a goal is reached before the end of the drive",
         has_cause=changes.completes,
         find=changes.completion,
         forms=("told", "asked"),
@@ -82,19 +81,19 @@ PHENOMENA: Final[tuple[Phenomenon, ...]] = (
     _always(15, "perception asked for", questions.perception, "seen", "not seen"),
     Phenomenon(
         number=16,
-        title="reason asked for",
+        title="question for a reason",
         cause="the car stops by itself, or turns round",
         has_cause=questions.acts_by_itself,
         find=questions.reason,
         forms=("explained",),
     ),
-    _always(17, "plan described on request", ways.plan_on_request, "described"),
+    _always(17, "plan described on request", routes.plan_on_request, "described"),
     Phenomenon(
         number=18,
         title="correction of a wrong turn",
         cause="the car turns at a junction",
-        has_cause=ways.turns_at_junctions,
-        find=ways.wrong_turn,
+        has_cause=routes.turns_at_junctions,
+        find=routes.wrong_turn,
         forms=("corrected", "answered"),
     ),
     _always(19, "overlapping exchanges", questions.overlap, "both answered"),
@@ -102,12 +101,12 @@ PHENOMENA: Final[tuple[Phenomenon, ...]] = (
     Phenomenon(
         number=21,
         title="abandoned exchange",
-        cause="somebody asks something",
+        cause="a speaker asks a question",
         has_cause=questions.has_question,
         find=questions.abandoned,
         forms=("asked again", "dropped"),
     ),
-    _always(22, "reference instead of a name", ways.references, "human", "car"),
+    _always(22, "reference instead of a name", routes.references, "human", "car"),
     Phenomenon(
         number=23,
         title="negotiation",

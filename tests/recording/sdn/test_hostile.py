@@ -87,8 +87,8 @@ def test_trajectory_ends_at_its_second_header(tmp_path: Path) -> None:
     text = csv(drive()[:50]) + csv(drive()[100:])
     session = read_sdn(release(tmp_path / "log_1", trajectory__csv=text))
     assert session.trajectory["frame"].tolist() == list(range(0, 150, 3))
-    told = "trajectory.csv: ends at a second header (line 52); 200 lines after it were left out"
-    assert session.report.repaired[told] == 1
+    repair = "trajectory.csv: ends at a second header (line 52); 200 lines after it were left out"
+    assert session.report.repaired[repair] == 1
 
 
 def test_faults_of_the_trajectory_are_repaired_and_reported(tmp_path: Path) -> None:

@@ -204,13 +204,13 @@ def test_the_release_layout_is_read_with_all_its_traps(release: Path, tmp_path: 
 
 def test_unknown_fields_are_kept_and_reported_by_name(release: Path) -> None:
     session = read_session(release)
-    told = "\n".join(session.report.lines())
+    report = "\n".join(session.report.lines())
     for part in (
         "act: field 'annotator'", "slot value Colour=red", "row of type 'SystemPrompt'", "type 'dance'",
         "street 'Somewhere'", "field 'build'", "field 'environment.trees'", "a second header", "U+2019", "1 1, 7 1",
         "lines without a frame", "out of order",
     ):  # fmt: skip
-        assert part in told, told
+        assert part in report, report
     (kept,) = [e for e in session.events if e.type_name == "sdn:SystemPrompt"]
     assert kept.data["text"] == "A prompt that nobody has described."
     assert "embeddings.pkl" in session.report.facts["files_not_read"]

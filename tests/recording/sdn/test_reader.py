@@ -129,7 +129,7 @@ def test_header_has_the_town_its_streets_and_landmarks(tmp_path: Path) -> None:
     assert header.config["sdn"]["first_frame"] == FIRST
 
 
-def test_the_speed_of_a_frame_does_not_tell_where_the_car_goes_next(tmp_path: Path) -> None:
+def test_speed_of_a_frame_does_not_depend_on_later_frames(tmp_path: Path) -> None:
     rows = drive()
     stops = [*rows[:100], *((FIRST + k, *rows[99][1:]) for k in range(100, 300))]
     one, other = (

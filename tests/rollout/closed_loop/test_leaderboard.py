@@ -53,7 +53,7 @@ def test_who_hears_badly_has_a_row_of_its_own(tmp_path: Path) -> None:
     assert [entry.policy for entry in read_entries([tmp_path])] == ["scripted", "scripted (word errors 20 %)"]
 
 
-def test_two_results_of_one_row_and_none_at_all_are_told(tmp_path: Path) -> None:
+def test_duplicate_and_missing_results_are_rejected(tmp_path: Path) -> None:
     write(tmp_path / "a", "scripted", 4)
     write(tmp_path / "b", "scripted", 3)
     with pytest.raises(RolloutError, match=r"b: scripted in unseen towns is also in .*a; give one"):

@@ -60,6 +60,6 @@ def test_command_plays_the_same_again() -> None:
     [({"sessions": 0}, "sessions is 0"), ({"seed": -1}, "seed is -1"), ({"towns": ()}, "towns is empty"),
      ({"cast": {Role.CO_WIZARD: Player(name="silent")}}, "no player for participant, ad_wizard")],
 )  # fmt: skip
-def test_settings_that_cannot_be_are_told(wrong: dict[str, object], message: str) -> None:
+def test_invalid_settings_are_rejected(wrong: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         RolloutSettings(**wrong)  # type: ignore[arg-type]

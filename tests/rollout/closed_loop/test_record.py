@@ -34,7 +34,7 @@ def test_standing_is_no_progress() -> None:
     assert measure(drive([(0.0, 20.0), (30.0, 20.0)]), street()).completion == 0.0
 
 
-def test_collision_of_its_own_making_is_no_success_but_that_of_others_is() -> None:
+def test_own_collision_prevents_success_and_one_of_others_does_not() -> None:
     assert not measure(drive(STRAIGHT, [hit(5.0, "Vehicles"), *ARRIVALS]), street()).success
     found = measure(drive(STRAIGHT, [hit(5.0, "Vehicles", own_fault=False), *ARRIVALS]), street())
     assert found.success and found.infractions == {"hit_by_others": 1}
@@ -59,7 +59,7 @@ def test_best_order_that_is_allowed_is_the_shortest_way() -> None:
 
 
 def test_way_that_there_is_not_has_no_length() -> None:
-    bound = (goal(0), goal(1, 0), goal(2))  # nobody can turn round in this street
+    bound = (goal(0), goal(1, 0), goal(2))  # a U-turn is not possible in this street
     found = measure(drive(STRAIGHT, goals=bound, stations=(220.0, 120.0, 320.0)), street())
     assert found.shortest is None and found.completion is None
 

@@ -8,7 +8,7 @@ STRAIGHT = [(0.0, 20.0), (60.0, 320.0)]  # 5 m/s
 HOME = (goal(1),)
 
 
-def test_car_that_drives_on_has_recovered_as_soon_as_it_is_ten_metres_further() -> None:
+def test_undisturbed_car_recovers_after_ten_metres() -> None:
     events = [unexpected(10.0, "weather"), reached(60.0, 0)]
     (found,) = met_exceptions(drive(STRAIGHT, events, goals=HOME), street())
     assert (found.kind, found.met, found.seconds) == (ExceptionKind.WEATHER, 10.0, 2.0)
@@ -21,7 +21,7 @@ def test_car_that_stands_recovers_when_it_goes_on() -> None:
     assert found.met == 10.0 and found.seconds == 32.0  # 30 s of standing, and 10 m at 5 m/s
 
 
-def test_who_goes_back_again_has_not_recovered_before_it_has_come_back() -> None:
+def test_car_that_drives_back_recovers_after_its_return() -> None:
     path = [(0.0, 20.0), (20.0, 120.0), (30.0, 70.0), (80.0, 320.0)]
     events = [unexpected(10.0, "weather"), reached(80.0, 0)]
     (found,) = met_exceptions(drive(path, events, goals=HOME), street())

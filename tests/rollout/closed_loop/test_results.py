@@ -58,7 +58,7 @@ def test_result_survives_its_file(tmp_path: Path) -> None:
     [('{"version": ', "is not valid JSON"), ("[]", "is not the result"), ('{"version": "1.0"}', "KeyError: 'settings'"),
      ('{"version": "2.0"}', "is of version 2.0")],
 )  # fmt: skip
-def test_other_files_are_told(tmp_path: Path, text: str, message: str) -> None:
+def test_other_files_are_rejected(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "rollout.json").write_text(text)
     with pytest.raises(RolloutError, match=message):
         read_result(tmp_path)

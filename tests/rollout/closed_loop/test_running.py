@@ -57,7 +57,7 @@ def test_measures_agree_with_what_the_environment_said(folder: Path) -> None:
         assert row["record"]["infractions"]["timeout"] == 1
 
 
-def test_interruption_leaves_the_result_so_far_and_the_next_run_goes_on(folder: Path, tmp_path: Path) -> None:
+def test_interruption_keeps_the_result_so_far_and_the_next_run_resumes(folder: Path, tmp_path: Path) -> None:
     def stop(done: int, total: int) -> None:
         if done == 2:
             raise KeyboardInterrupt
@@ -79,7 +79,7 @@ def test_folder_of_another_rollout_is_not_gone_on_with(folder: Path, tmp_path: P
         roll_out(other, tmp_path / "copy")
 
 
-def test_session_whose_policy_fails_is_counted_and_told(tmp_path: Path) -> None:
+def test_session_whose_policy_fails_is_counted_and_reported(tmp_path: Path) -> None:
     file = tmp_path / "player.faint"
     file.write_text("faint")
     cast = {**ALL_SCRIPTED, Role.CO_WIZARD: Player(name=str(file), path=file, loader=load_fainting)}

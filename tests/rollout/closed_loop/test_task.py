@@ -33,7 +33,7 @@ def test_changed_subgoal_is_where_it_was_moved_to() -> None:
     assert task.places == {0: (0, 320.0), 1: (0, 220.0)}
 
 
-def test_older_recordings_do_not_tell_the_row_of_a_change_but_where_the_car_stood() -> None:
+def test_place_of_a_change_in_older_recordings_is_where_the_car_stood() -> None:
     events = [unexpected(5.0, "task_change", subgoal=0, landmark="House"), reached(30.0, 0)]
     path = [(0.0, 20.0), (30.0, 218.5), (60.0, 218.5)]
     task = task_at_end(drive(path, events, goals=(goal(0), goal(2)), stations=STATIONS))
