@@ -48,7 +48,7 @@ def process(*arguments: object, **variables: str) -> subprocess.CompletedProcess
 
 
 class TestRun:
-    def test_json_has_exactly_the_promised_keys(self) -> None:
+    def test_json_has_exactly_the_documented_keys(self) -> None:
         facts = loaded("run", "--seed", 3, "--max-seconds", 4, "--json")
         assert list(facts) == RUN_KEYS
         assert list(facts["subgoals"]) == ["live", "reached"]
@@ -66,7 +66,7 @@ class TestRun:
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert Session.load(session).complete
 
-    def test_talk_and_summary_are_shown_and_the_end_is_drawn(self) -> None:
+    def test_dialogue_summary_and_picture_are_written(self) -> None:
         result = call("run", "--seed", 3, "--max-seconds", 8)
         assert result.exit_code == 0, result.output
         assert Path("dorothie.png").read_bytes().startswith(b"\x89PNG")
@@ -74,16 +74,16 @@ class TestRun:
             assert text in result.stdout
         assert max(map(len, result.stdout.splitlines())) <= 80
 
-    def test_no_picture_is_drawn_where_none_is_wanted(self) -> None:
+    def test_no_picture_option_draws_none(self) -> None:
         assert call("run", "--max-seconds", 1, "--no-picture").exit_code == 0
         assert not Path("dorothie.png").exists()
 
-    def test_the_picture_shows_the_whole_town(self) -> None:
+    def test_picture_shows_the_whole_town(self) -> None:
         pygame = pytest.importorskip("pygame")
         loaded("run", "--max-seconds", 1, "--json", "--picture", "p.png")
         assert pygame.image.load("p.png").get_size() == (1280, 800)
 
-    def test_a_session_is_recorded_where_it_is_told(self) -> None:
+    def test_session_is_recorded_into_the_given_folder(self) -> None:
         facts = loaded("run", "--seed", 3, "--max-seconds", 6, "--json", "--out", "deep/down")
         session = Session.load(facts["session"])
         assert facts["session"] == str(Path("deep/down"))
@@ -91,7 +91,7 @@ class TestRun:
         assert len(session.utterances()) == facts["utterances"] > 0
         assert len(session.all_moves) == facts["acts"]
 
-    def test_word_errors_are_recorded_beside_what_was_said_and_come_out_again(self) -> None:
+    def test_word_errors_survive_replay_and_conversion(self) -> None:
         loaded("run", "--seed", 3, "--max-seconds", 60, "--word-errors", 0.3, "--out", "s", "--json")
         session = Session.load("s")
         assert session.header.config["word_error_rate"] == 0.3
@@ -103,16 +103,16 @@ class TestRun:
         heard = [(move.text, move.recognised) for move in Session.load("back").moves()]
         assert heard == [(move.text, move.recognised) for move in moves]
 
-    def test_roles_can_be_silenced(self) -> None:
+    def test_silent_roles_do_nothing(self) -> None:
         silent = ("--participant", "silent", "--co-wizard", "silent", "--ad-wizard", "silent")
         facts = loaded("run", "--max-seconds", 5, "--json", *silent)
         assert facts["utterances"] == facts["acts"] == facts["physical_actions"] == facts["exceptions"] == 0
 
-    def test_storyboards_and_towns_can_be_named(self) -> None:
+    def test_storyboard_and_town_can_be_chosen(self) -> None:
         facts = loaded("run", "--town", "brookside", "--storyboard", "poorly_cat", "--max-seconds", 1, "--json")
         assert (facts["town"], facts["storyboard"]) == ("brookside", "poorly_cat")
 
-    def test_a_film_is_written_at_ten_frames_a_second(self) -> None:
+    def test_video_has_ten_frames_per_second(self) -> None:
         ffmpeg = pytest.importorskip("imageio_ffmpeg")
         # In a process of its own: imageio-ffmpeg leaves pipes open, which is a warning here.
         done = process("run", "--seed", 3, "--max-seconds", 2, "--json", "--video", "v.mp4")
@@ -121,7 +121,7 @@ class TestRun:
         assert frames == 21  # the beginning, and five for each of four decisions
         assert seconds == pytest.approx(2.1, abs=0.05)
 
-    def test_a_film_without_its_extra_says_what_to_install(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_video_without_its_extra_names_the_package_to_install(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr("dorothie_gym.cli.output.find_spec", lambda name: None)
         result = call("run", "--video", "v.mp4")
         assert result.exit_code == 2 and "pip install 'dorothie-gym[video]'" in result.stderr
@@ -145,10 +145,10 @@ class TestRun:
 
 
 class TestTowns:
-    def test_json_of_one_is_its_description(self) -> None:
+    def test_json_of_one_town_is_its_description(self) -> None:
         assert loaded("towns", "brookside", "--json") == describe(load_town("brookside"))
 
-    def test_json_of_all_is_a_list(self) -> None:
+    def test_json_of_all_towns_is_a_list(self) -> None:
         rows = loaded("towns", "--json")
         assert {**describe(load_town("brookside")), "fold": "unseen"} in rows
 
@@ -156,13 +156,13 @@ class TestTowns:
         result = call("towns")
         assert result.exit_code == 0 and "brookside" in result.stdout
 
-    def test_a_town_is_described_and_drawn(self) -> None:
+    def test_town_is_described_and_drawn(self) -> None:
         result = call("towns", "brookside", "--picture", "map.png")
         assert result.exit_code == 0 and "Brook Road" in result.stdout and "map.png" in result.stdout
         assert Path("map.png").read_bytes().startswith(b"\x89PNG")
 
     @pytest.mark.parametrize("name", ["Town02", "Town05"])
-    def test_a_published_map_is_described(self, name: str) -> None:
+    def test_published_map_is_described(self, name: str) -> None:
         path = ROOT.parent / "shared" / "maps" / f"{name}.xodr"
         if not path.is_file():
             pytest.skip(f"{path} is not there")
@@ -186,36 +186,36 @@ class TestEvaluate:
         for key in ("ufn_move_accuracy", "rfn_slot_f1", "nfd_joint_accuracy", "nfd_joint_accuracy_paper"):
             assert table[key] == table["models"][model]["all"][key]["mean"]
 
-    def test_a_floor_is_written_and_scored_like_any_model(self, sessions: Path, tmp_path: Path) -> None:
+    def test_trivial_baseline_is_written_and_scored_like_any_model(self, sessions: Path, tmp_path: Path) -> None:
         file = tmp_path / "random.parquet"
         drawn = loaded("evaluate", "--corpus", sessions, "--model", "random", "--seed", 5, "--save", file, "--json")
         read = loaded("evaluate", file, "--corpus", sessions, "--json")
         assert read["models"] == drawn["models"] and read["seed"] == 5
         assert read["about"][str(file)]["model"] == "random"
 
-    def test_several_seeds_of_a_floor_give_an_interval(self, sessions: Path) -> None:
+    def test_several_seeds_of_a_trivial_baseline_give_an_interval(self, sessions: Path) -> None:
         table = loaded("evaluate", "--corpus", sessions, "--model", "random", "--seed", 3, "--seeds", 2, "--json")
         figure = table["models"]["random"]["all"]["ufn_move_accuracy"]
         assert sorted(figure["values"]) == ["3", "4"] and figure["seeds"] == 2 and figure["half_width"] is not None
         assert "ufn_move_accuracy" not in table, "a single run only"
 
-    def test_the_table_names_sessions_and_counts_points(self, sessions: Path) -> None:
+    def test_table_names_sessions_and_counts_points(self, sessions: Path) -> None:
         result = call("evaluate", "--sessions", sessions, "--tasks", "ufn,nfd")
         assert result.exit_code == 0
         assert "UfN" in result.stdout and "NfD" in result.stdout and "RfN, right of" not in result.stdout
         assert "points scored" in result.stdout and "flagged events" in result.stdout
         assert "split test, 1 sessions; divided: the first half of the sessions by name trains" in result.stdout
 
-    def test_a_report_is_written(self, sessions: Path, tmp_path: Path) -> None:
+    def test_report_is_written(self, sessions: Path, tmp_path: Path) -> None:
         assert call("evaluate", "--corpus", sessions, "--out", tmp_path / "r").exit_code == 0
         assert (tmp_path / "r/table.md").read_text().startswith("# Results")
         assert (tmp_path / "r/confusion-majority.png").is_file()
 
-    def test_without_sessions_a_few_are_played(self, monkeypatch: pytest.MonkeyPatch, sessions: Path) -> None:
+    def test_default_corpus_is_used_without_sessions(self, monkeypatch: pytest.MonkeyPatch, sessions: Path) -> None:
         monkeypatch.setattr("dorothie_gym.rollout.default_corpus", lambda: sessions)
         assert loaded("evaluate", "--json")["corpus"]["folder"] == str(sessions)
 
-    def test_a_cache_that_cannot_be_written_is_told(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_unwritable_cache_is_reported(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (tmp_path / "file").touch()
         monkeypatch.setenv("DOROTHIE_GYM_CACHE", str(tmp_path / "file" / "below"))
         result = call("evaluate")
@@ -228,7 +228,7 @@ def test_storyboards_are_listed() -> None:
     assert len(names) >= 8 and all(name in result.stdout for name in names)
 
 
-def test_the_version_is_told() -> None:
+def test_version_is_printed() -> None:
     assert call("--version").stdout == f"dorothie-gym {dorothie_gym.__version__}\n"
 
 

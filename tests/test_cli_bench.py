@@ -27,12 +27,12 @@ def call(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["bench", *map(str, arguments)])
 
 
-def test_alone_it_shows_what_there_is() -> None:
+def test_without_arguments_the_measurements_are_listed() -> None:
     result = call()
     assert all(name in result.output for name in ("world", "env", "vector", "import"))
 
 
-def test_json_is_all_that_is_on_standard_output() -> None:
+def test_standard_output_is_json_and_nothing_else() -> None:
     command = [sys.executable, "-m", "dorothie_gym.cli", "bench", "world", *map(str, SMALL), "--json"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120)
@@ -44,7 +44,7 @@ def test_json_is_all_that_is_on_standard_output() -> None:
     assert not any(Path().iterdir())
 
 
-def test_a_table_is_shown_and_a_chart_is_drawn() -> None:
+def test_table_is_shown_and_chart_is_drawn() -> None:
     result = call("world", *SMALL, "--picture")
     assert result.exit_code == 0, result.output
     for text in ("highway-env's road", "spread", "times real time", "KiB", "numba", "bench_world.png"):
@@ -53,7 +53,7 @@ def test_a_table_is_shown_and_a_chart_is_drawn() -> None:
     assert Path("bench_world.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_chart_can_be_had_beside_json() -> None:
+def test_chart_can_be_drawn_with_json() -> None:
     result = call("world", *SMALL, "--json", "--picture", "c.png")
     assert json.loads(result.stdout)["town"] == "brookside"
     assert Path("c.png").is_file()
@@ -74,7 +74,7 @@ def test_a_chart_can_be_had_beside_json() -> None:
         (("import", "extra"), "extra"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(arguments: tuple[str, ...], said: str) -> None:
+def test_invalid_option_is_reported_in_one_line(arguments: tuple[str, ...], said: str) -> None:
     result = call(*arguments)
     assert result.exit_code == 2 and result.stdout == ""
     assert result.stderr.startswith("Error: ") and result.stderr.count("\n") == 1 and said in result.stderr

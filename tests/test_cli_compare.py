@@ -70,7 +70,7 @@ def test_session_that_was_cut_off_differs_from_the_complete_one(tmp_path: Path, 
 
 
 @pytest.mark.parametrize(("other", "message"), [("nowhere", "there is no such folder"), ("empty", "holds no session")])
-def test_folder_without_sessions_is_a_mistake(tmp_path: Path, other: str, message: str) -> None:
+def test_folder_without_sessions_is_reported(tmp_path: Path, other: str, message: str) -> None:
     one = write(tmp_path / "one", talk())
     (tmp_path / "empty").mkdir()
     result = call(one, tmp_path / other)

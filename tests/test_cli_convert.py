@@ -35,7 +35,7 @@ def refused(*arguments: object) -> str:
     return str(result.stderr)
 
 
-def test_a_session_goes_to_sdn_and_back() -> None:
+def test_session_is_converted_to_sdn_and_back() -> None:
     write(Path("one"), talk())
     converted("one", "there", "--to", "sdn")
     assert (Path("there") / "annotated_log.json").is_file()
@@ -46,7 +46,7 @@ def test_a_session_goes_to_sdn_and_back() -> None:
     assert back.check() == ()
 
 
-def test_a_corpus_keeps_its_folds_and_gets_the_names_that_scripts_look_for() -> None:
+def test_corpus_keeps_its_folds_and_gets_the_names_of_the_release() -> None:
     for k, fold in enumerate(("train", "train", "val/seen", "test/unseen")):
         write(Path("corpus") / fold / f"seed_{k}", talk(), seed=k)
     converted("corpus", "sdn", "--to", "sdn")
@@ -63,7 +63,7 @@ def test_sessions_of_one_seed_do_not_collide() -> None:
     assert len({row["out"] for row in rows}) == 2
 
 
-def test_all_layouts_of_a_folder_are_converted_with_one_sign() -> None:
+def test_all_layouts_of_a_folder_are_converted() -> None:
     release(Path("sdn/train/log_1"), trajectory__csv=csv(drive(90.0)))
     release(Path("sdn/train/log_2"), trajectory__csv=csv(drive(90.0)))
     release(Path("sdn/val/seen/log_3"), trajectory__csv=None)
@@ -78,7 +78,7 @@ def test_all_layouts_of_a_folder_are_converted_with_one_sign() -> None:
     assert set(result["sessions"][0]) == {"path", "out", "complete", "events", "frames", "report", "faults"}
 
 
-def test_the_report_is_told_in_words() -> None:
+def test_report_is_printed_in_words() -> None:
     release(Path("log_1"))
     told = converted("log_1", "out", "--to", "native").stdout
     for part in (
@@ -99,7 +99,7 @@ def test_sessions_become_tables() -> None:
     assert "2 sessions: tables/utterances.parquet" in converted("corpus", "tables", "--to", "tables").stdout
 
 
-def test_what_cannot_be_read_is_named_and_the_rest_is_converted() -> None:
+def test_unreadable_sessions_are_named_and_the_rest_is_converted() -> None:
     release(Path("sdn/log_1"))
     release(Path("sdn/log_2"), annotated_log__json='[{"frame": 3')
     result = converted("sdn", "out", "--to", "native", code=2)
@@ -110,7 +110,7 @@ def test_what_cannot_be_read_is_named_and_the_rest_is_converted() -> None:
     assert [sorted(row) for row in again["sessions"]][1] == ["error", "path"]
 
 
-def test_mistakes_are_told_in_one_line() -> None:
+def test_invalid_arguments_are_reported_in_one_line() -> None:
     release(Path("log_1"))
     Path("empty").mkdir()
     Path("file").touch()
@@ -127,12 +127,12 @@ def test_mistakes_are_told_in_one_line() -> None:
     assert not Path("out3").exists()
 
 
-def test_wrong_layouts_are_refused() -> None:
+def test_unknown_layouts_are_refused() -> None:
     result = CliRunner().invoke(app, ["convert", "a", "b", "--to", "xml"])
     assert result.exit_code == 2 and "sdn" in result.stderr
 
 
-def test_a_session_that_was_cut_off_stays_so() -> None:
+def test_incomplete_session_stays_incomplete() -> None:
     folder = write(Path("one"), talk())
     page = json.loads((folder / "session.json").read_text())
     (folder / "session.json").write_text(json.dumps({**page, "outcome": None, "counts": None}))

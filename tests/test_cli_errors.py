@@ -43,29 +43,29 @@ def template(**changes: Any) -> Path:
 
 
 @pytest.mark.parametrize("json_too", [[], ["--json"]])
-def test_an_unknown_town_is_told_with_the_known_ones(json_too: list[str]) -> None:
+def test_unknown_town_is_reported_with_the_known_ones(json_too: list[str]) -> None:
     message = refused("run", "--town", "nowhere", *json_too)
     assert "nowhere" in message and "brookside" in message
     assert refused("towns", "nowhere", *json_too) == message
 
 
-def test_a_missing_map() -> None:
+def test_missing_map_is_reported() -> None:
     assert "missing.xodr: file: cannot be read (No such file or directory)" in refused("run", "--town", "missing.xodr")
 
 
-def test_a_truncated_map() -> None:
+def test_truncated_map_is_reported() -> None:
     Path("cut.xodr").write_text('<?xml version="1.0"?>\n<OpenDRIVE>\n  <road id="1" leng', encoding="utf-8")
     message = refused("towns", "cut.xodr", "--json")
     assert "cut.xodr" in message and "line 3" in message
 
 
-def test_a_storyboard_with_an_unknown_category() -> None:
+def test_storyboard_with_an_unknown_category_is_reported() -> None:
     path = template(variables=[["P", "places.moonbase"], ["H", "places.residential"]])
     message = refused("run", "--storyboard", path)
     assert "board.json" in message and "places.moonbase" in message
 
 
-def test_a_subgoal_that_refers_to_nothing() -> None:
+def test_subgoal_with_an_unknown_reference_is_reported() -> None:
     path = template(
         subgoals=[{"destination": "$Q", "description": "Go"}, {"destination": "$H", "description": "Go home"}]
     )
@@ -73,21 +73,21 @@ def test_a_subgoal_that_refers_to_nothing() -> None:
     assert "subgoals[0].destination" in message and "'Q'" in message
 
 
-def test_an_unknown_storyboard_is_told_with_the_known_ones() -> None:
+def test_unknown_storyboard_is_reported_with_the_known_ones() -> None:
     message = refused("run", "--storyboard", "nothing")
     assert "nothing" in message and "poorly_cat" in message
 
 
-def test_an_unknown_policy_is_told_with_the_known_ones() -> None:
+def test_unknown_policy_is_reported_with_the_known_ones() -> None:
     assert "scripted, silent, random" in refused("run", "--ad-wizard", "nasty")
 
 
-def test_a_folder_that_cannot_be_written() -> None:
+def test_unwritable_folder_is_reported() -> None:
     Path("file").touch()
     assert str(Path("file/below")) in refused("run", "--out", "file/below", "--json")
 
 
-def test_a_folder_that_holds_a_session() -> None:
+def test_folder_that_holds_a_session_is_refused() -> None:
     silent = ("--max-seconds", "1", "--json", "--out", "one")
     assert CliRunner().invoke(app, ["run", *silent]).exit_code == 0
     before = Path("one/events.jsonl").read_bytes()
@@ -108,7 +108,7 @@ def test_a_folder_that_holds_a_session() -> None:
         (["towns", "brookside", "--picture", "none/p.png"], "the folder none does not exist"),
     ],
 )
-def test_files_that_cannot_be_written(arguments: list[str], words: str) -> None:
+def test_unwritable_files_are_reported(arguments: list[str], words: str) -> None:
     Path("folder.png").mkdir()
     assert words in refused(*arguments)
     assert [path.name for path in Path().iterdir()] == ["folder.png"], "nothing is left behind"
@@ -128,12 +128,12 @@ def test_files_that_cannot_be_written(arguments: list[str], words: str) -> None:
         (["--save", "none/x.parquet"], "the folder none does not exist"),
     ],
 )
-def test_what_cannot_be_evaluated(arguments: list[str], words: str) -> None:
+def test_invalid_evaluations_are_reported(arguments: list[str], words: str) -> None:
     Path("text.parquet").write_text("session,event")
     assert words in refused("evaluate", *arguments)
 
 
 @pytest.mark.parametrize("arguments", [["--seed", "x"], ["--seed", "-1"], ["--max-seconds", "0"], ["--bogus"]])
-def test_options_that_are_wrong(arguments: list[str]) -> None:
+def test_invalid_options_are_reported(arguments: list[str]) -> None:
     result = CliRunner().invoke(app, ["run", *arguments])
     assert result.exit_code == 2 and result.stdout == "" and arguments[0] in result.stderr

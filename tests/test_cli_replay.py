@@ -31,7 +31,7 @@ def test_check_of_a_recorded_session_succeeds(recorded: Path) -> None:
     assert (row["session"], row["frames"], row["difference"], row["complete"]) == ("one", 600, None, True)
 
 
-def test_check_of_a_session_that_was_changed_tells_frame_and_field(recorded: Path, tmp_path: Path) -> None:
+def test_check_of_a_changed_session_names_frame_and_field(recorded: Path, tmp_path: Path) -> None:
     folder = tmp_path / "forged"
     folder.mkdir()
     for file in recorded.iterdir():
@@ -47,7 +47,7 @@ def test_check_of_a_session_that_was_changed_tells_frame_and_field(recorded: Pat
     assert f"differs first at frame {event['frame']}, events[{k}].data.text: recorded 'forged'" in result.stdout
 
 
-def test_what_cannot_be_replayed_says_what_to_do(recorded: Path, tmp_path: Path) -> None:
+def test_sessions_that_cannot_be_replayed_are_reported(recorded: Path, tmp_path: Path) -> None:
     sdn = release(tmp_path / "release")
     for arguments, message in (
         ((sdn,), "give --town FILE, or --maps DIR"),
@@ -60,7 +60,7 @@ def test_what_cannot_be_replayed_says_what_to_do(recorded: Path, tmp_path: Path)
         assert result.exit_code == 2 and message in result.stderr, result.output
 
 
-def test_session_is_shown_in_a_window_as_long_as_it_is_open(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_session_is_shown_until_the_window_is_closed(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setattr("dorothie_gym.rendering.frames.HumanWindow.show", lambda self, frame, rate: None)
     result = call("replay", recorded, "--fps", 1, "--json")

@@ -24,7 +24,7 @@ def invoke(*arguments: object) -> Any:
     return CliRunner().invoke(app, ["rollout", *map(str, arguments)])
 
 
-def test_json_has_each_metric_with_its_interval_and_twice_the_same() -> None:
+def test_json_has_each_metric_with_its_interval_and_is_reproducible() -> None:
     first, second = (invoke(*SHORT, "--sessions", 2, "--json") for _ in range(2))
     assert first.exit_code == 0, first.output
     assert first.stdout == second.stdout
@@ -35,7 +35,7 @@ def test_json_has_each_metric_with_its_interval_and_twice_the_same() -> None:
     assert set(page["per_town"]) == {"brookside"} and set(page["per_exception"]) == {"none"}
 
 
-def test_tables_tell_seeds_and_where_sessions_are_kept(tmp_path: Path) -> None:
+def test_tables_name_seeds_and_the_folder_of_sessions(tmp_path: Path) -> None:
     done = invoke(*SHORT, "--sessions", 1, "--out", tmp_path / "kept")
     assert done.exit_code == 0, done.output
     for words in ("1 sessions: participant scripted, co_wizard lane-follow", "driving score", "Seeds (of --seed 0)"):
@@ -55,7 +55,7 @@ def test_tables_tell_seeds_and_where_sessions_are_kept(tmp_path: Path) -> None:
         (("--participant", "hollow"), "navigation models play the co_wizard, not the participant"),
     ],
 )
-def test_mistakes_are_told(
+def test_invalid_arguments_are_reported(
     arguments: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -66,7 +66,7 @@ def test_mistakes_are_told(
     assert done.exit_code == 2 and message in done.stderr and "Traceback" not in done.stderr
 
 
-def test_ctrl_c_tells_where_results_are_and_how_to_go_on(tmp_path: Path) -> None:
+def test_ctrl_c_names_the_results_and_the_command_that_resumes(tmp_path: Path) -> None:
     out = tmp_path / "stopped"
     arguments = [*SHORT[:4], "--max-seconds", "40", "--workers", "1", "--sessions", "40", "--out", str(out)]
     process = subprocess.Popen(

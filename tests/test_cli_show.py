@@ -30,7 +30,7 @@ def texts(*events: Event) -> list[str]:
     return [line.text for line in script_lines(events, TASKS.__getitem__)]
 
 
-def test_the_acts_of_an_utterance_stand_under_its_words() -> None:
+def test_acts_of_an_utterance_are_below_its_words() -> None:
     words = "Okay. Which way?"
     events = [said(4, words, "Acknowledge"), said(4, words, "QueryW", Action=["Queried"]), said(5, "Right.", "Confirm")]
     first, second = script_lines(events, TASKS.__getitem__)
@@ -39,7 +39,7 @@ def test_the_acts_of_an_utterance_stand_under_its_words() -> None:
     assert (second.text, second.acts) == ("Right.", "Confirm")
 
 
-def test_subgoals_turn_green_in_their_own_words() -> None:
+def test_reached_subgoals_are_green() -> None:
     done = event(EventType.SUBGOAL, Role.AGENT, subgoal=0, landmark="Coco", status="Complete", cause="arrival")
     (line,) = script_lines([done], TASKS.__getitem__)
     assert "Buy tea" in line.text and "green" in line.style
@@ -58,7 +58,7 @@ def test_subgoals_turn_green_in_their_own_words() -> None:
         ({"action": "Stop", "angle": None, "up": None}, "Stop"),
     ],
 )
-def test_what_the_co_wizard_does_is_shown(data: dict[str, Any], text: str) -> None:
+def test_physical_actions_are_shown(data: dict[str, Any], text: str) -> None:
     assert texts(event(EventType.PHYSICAL_ACTION, Role.CO_WIZARD, **data)) == [text]
 
 
@@ -91,7 +91,7 @@ def test_hazards_collisions_and_messages_are_shown_and_beliefs_are_not() -> None
 
 
 @pytest.mark.parametrize("width", [40, 80, 200])
-def test_whatever_happens_fits_the_terminal(width: int) -> None:
+def test_every_event_fits_the_terminal(width: int) -> None:
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=30.0))
     policies = {role: make_policy("random", role, env.limits) for role in AGENT_ROLES}
     output = io.StringIO()
@@ -102,7 +102,7 @@ def test_whatever_happens_fits_the_terminal(width: int) -> None:
     assert any("Ad-Wizard" in line for line in lines)
 
 
-def test_tasks_and_clock_stand_below_the_talk_of_a_terminal() -> None:
+def test_tasks_and_clock_are_below_the_dialogue() -> None:
     env = DuoWizardEnv("brookside", "poorly_cat", config=EnvConfig(max_seconds=3.0))
     policies = {role: make_policy("silent", role, env.limits) for role in AGENT_ROLES}
     output = io.StringIO()

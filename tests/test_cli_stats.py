@@ -55,7 +55,7 @@ def corpus() -> Path:
     return Path("corpus")
 
 
-def test_a_corpus_is_told_beside_the_papers() -> None:
+def test_corpus_is_shown_beside_that_of_the_paper() -> None:
     shown = stats(corpus()).stdout
     assert "8,415" in shown and "18.70" in shown and "vocabulary" in shown
     assert [line.split() for line in shown.splitlines() if line.startswith("test/unseen")] == [
@@ -71,12 +71,12 @@ def test_json_has_the_keys_of_the_table_and_nothing_else_on_standard_output() ->
     assert table["diversity"]["perplexity"] > 1.0
 
 
-def test_one_session_is_a_corpus_too() -> None:
+def test_one_session_is_accepted_as_corpus() -> None:
     table = json.loads(stats(write(Path("one"), conversation()), "--json").stdout)
     assert table["sessions"] == 1 and table["folds"] == {} and table["diversity"]["perplexity"] is None
 
 
-def test_a_picture_is_drawn_with_or_without_a_name() -> None:
+def test_picture_is_drawn_with_or_without_a_name() -> None:
     stats(corpus(), "--picture", "here.png")
     stats(corpus_again := Path("corpus"), "--json", "--picture")
     stats("--picture", corpus_again)
@@ -93,7 +93,7 @@ def test_every_phenomenon_is_in_the_table() -> None:
     assert "goal-level instruction" in stats("corpus", "--phenomena").stdout
 
 
-def test_what_the_paper_reports_is_told_claim_by_claim() -> None:
+def test_claims_of_the_paper_are_tested_one_by_one() -> None:
     found = json.loads(stats(corpus(), "--behaviour", "--json").stdout)
     assert found["sessions"] == 4
     rows = {row["name"]: row for row in found["behaviour"]}
@@ -109,7 +109,7 @@ def test_consistent_annotation_passes() -> None:
     assert "4 of 4 sessions" in stats(corpus(), "--check").stdout
 
 
-def test_a_fault_of_annotation_is_named_and_fails() -> None:
+def test_annotation_fault_is_named_and_fails() -> None:
     corpus()
     write(Path("corpus/train/bad"), conversation(exchange=None), seed=9)
     shown = stats("corpus", "--check", code=1).stdout
@@ -131,7 +131,7 @@ def test_kappa_of_different_sessions_is_refused() -> None:
     assert "a and b are not the same session: seed is 7 in the one, 8 in the other" in refused("--kappa", one, other)
 
 
-def test_mistakes_are_told_in_one_line() -> None:
+def test_invalid_arguments_are_reported_in_one_line() -> None:
     corpus()
     assert "dorothie-gym stats DIR" in refused()
     assert "--phenomena and --check" in refused("corpus", "--phenomena", "--check")

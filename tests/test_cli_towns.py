@@ -69,7 +69,7 @@ class TestList:
         assert all(row["fold"] == "seen" for name, row in rows.items() if name != "brookside")
         assert describe(load_town("brookside")) == {k: v for k, v in rows["brookside"].items() if k != "fold"}
 
-    def test_the_table_shows_the_folds(self) -> None:
+    def test_table_shows_the_folds(self) -> None:
         lines = call().stdout.splitlines()
         assert any(re.match(r"brookside +unseen +\d", line) for line in lines)
         assert max(map(len, lines)) <= 80
@@ -77,18 +77,18 @@ class TestList:
 
 class TestCheck:
     @pytest.mark.parametrize("arguments", [("--check", "brookside"), ("brookside", "--check")])
-    def test_a_sound_town(self, arguments: tuple[str, ...]) -> None:
+    def test_faultless_town(self, arguments: tuple[str, ...]) -> None:
         result = call(*arguments)
         assert result.exit_code == 0 and result.stderr == ""
         facts = describe(load_town("brookside"))
         assert result.stdout.startswith(f"brookside: no faults: {facts['lanes']} lanes, {facts['links']} links, ")
         assert result.stdout.count("\n") == 1
 
-    def test_a_sound_town_as_json(self) -> None:
+    def test_faultless_town_as_json(self) -> None:
         result = call("--check", "brookside", "--json")
         assert result.exit_code == 0 and loaded(result) == {"town": "brookside", "faults": []}
 
-    def test_an_imported_map_is_checked_like_our_own(self) -> None:
+    def test_imported_map_is_checked_like_a_shipped_one(self) -> None:
         result = call("--check", ring())
         assert result.exit_code == 0 and result.stdout.startswith("ring: no faults: 2 lanes, 2 links, 0 junctions")
 
@@ -109,19 +109,19 @@ class TestCheck:
         assert list(fault) == ["kind", "lanes", "position", "message"]
         assert fault["kind"] == "narrow" and fault["lanes"] == [0] and len(fault["position"]) == 2
 
-    def test_the_map_is_drawn_too_where_it_is_wanted(self) -> None:
+    def test_check_can_draw_the_map(self) -> None:
         result = call("--check", ring("path.xodr", width=1.5), "--picture", "map.png")
         assert result.exit_code == 1 and result.stdout.endswith("Map: map.png\n")
         assert Path("map.png").read_bytes().startswith(b"\x89PNG")
 
     @pytest.mark.parametrize("more", [[], ["--json"]])
-    def test_a_file_that_cannot_be_read(self, more: list[str]) -> None:
+    def test_unreadable_file_is_reported(self, more: list[str]) -> None:
         Path("broken.yaml").write_text("junctions: [", encoding="utf-8")
         for path in ("missing.xodr", "broken.yaml", "nowhere"):
             result = call("--check", path, *more)
             assert result.exit_code == 2 and result.stdout == "" and path in result.stderr
 
-    def test_without_a_name_it_says_what_to_name(self) -> None:
+    def test_check_without_a_town_is_refused(self) -> None:
         result = call("--check")
         assert result.exit_code == 2 and result.stdout == ""
         assert "name it: dorothie-gym towns --check NAME" in result.stderr

@@ -21,13 +21,13 @@ runner = CliRunner()
         (["table", "--models", "toto,gpt"], "there is no model 'gpt'"),
     ],
 )
-def test_what_cannot_be_trained_is_told(arguments, message, tmp_path):
+def test_unknown_and_untrainable_models_are_reported(arguments, message, tmp_path):
     result = runner.invoke(app, [*arguments, "--corpus", str(tmp_path), "--out", str(tmp_path / "runs")])
     assert result.exit_code == 2
     assert message in " ".join(result.stderr.split())
 
 
-def test_a_folder_without_sessions_is_told(tmp_path):
+def test_folder_without_sessions_is_reported(tmp_path):
     result = runner.invoke(app, ["train", "bert", "--corpus", str(tmp_path), "--out", str(tmp_path / "runs")])
     assert result.exit_code == 2
     assert str(tmp_path) in result.stderr.replace("\n", "")
@@ -44,7 +44,7 @@ def corpus(tmp_path_factory):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-def test_a_table_is_made_once_and_read_then(corpus, tmp_path):
+def test_table_is_computed_once_and_then_read(corpus, tmp_path):
     command = ["table", "--models", "detector,cloning", "--seeds", "2", "--encoder", "hashing", "--json"]
     places = ["--corpus", str(corpus), "--out", str(tmp_path)]
     first = json.loads(runner.invoke(app, [*command, *places], catch_exceptions=False).stdout)
@@ -58,7 +58,7 @@ def test_a_table_is_made_once_and_read_then(corpus, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-def test_a_training_killed_with_9_goes_on_to_the_same_bytes(corpus, tmp_path):
+def test_killed_training_resumes_to_the_same_bytes(corpus, tmp_path):
     def command(out):
         options = ["--corpus", str(corpus), "--seeds", "1", "--encoder", "hashing", "--json"]
         return [sys.executable, "-m", "dorothie_gym.cli", "train", "map", *options, "--out", str(tmp_path / out)]
@@ -82,7 +82,7 @@ def test_a_training_killed_with_9_goes_on_to_the_same_bytes(corpus, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-def test_training_is_measured_against_the_published_loop(corpus):
+def test_training_speed_is_compared_with_the_published_loop(corpus):
     arguments = [
         "bench",
         "train",

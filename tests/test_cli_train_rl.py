@@ -13,7 +13,7 @@ from dorothie_gym.cli.app import app
 SHORT = ["--set", "max_seconds=5", "--set", "traffic=none", "--episodes", "1", "--environments", "1", "--workers", "0"]
 
 
-def test_training_tells_what_came_of_it_in_json(tmp_path: Path) -> None:
+def test_training_prints_its_result_as_json(tmp_path: Path) -> None:
     out = tmp_path / "run"
     result = CliRunner().invoke(app, ["train-rl", "a2c", "--out", str(out), "--steps", "32", *SHORT, "--json"])
     assert result.exit_code == 0, result.output
@@ -26,7 +26,7 @@ def test_training_tells_what_came_of_it_in_json(tmp_path: Path) -> None:
     assert again.exit_code == 0 and "curve.png" in again.stdout
 
 
-def test_three_roles_learn_and_play(tmp_path: Path) -> None:
+def test_selfplay_trains_roles_that_rollout_can_play(tmp_path: Path) -> None:
     out = tmp_path / "run"
     short = ["--steps", "128", "--environments", "1", "--workers", "0", "--episodes", "1", "--set", "max_seconds=5"]
     result = CliRunner().invoke(
@@ -66,7 +66,7 @@ def test_three_roles_learn_and_play(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("algorithm", "module"), [("ppo", "rl.behaviour_cloning"), ("selfplay", "selfplay.demonstrations")]
 )
-def test_ctrl_c_while_a_corpus_is_read_is_told(
+def test_ctrl_c_while_a_corpus_is_read_is_reported(
     algorithm: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*arguments: object) -> None:
@@ -80,7 +80,7 @@ def test_ctrl_c_while_a_corpus_is_read_is_told(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["trpo"], "algorithm is 'trpo'"),
         (["ppo", "--set", "guidance"], "NAME=VALUE"),
@@ -97,7 +97,7 @@ def test_ctrl_c_while_a_corpus_is_read_is_told(
         (["ppo", "--warm-start", "no-such-corpus"], "no-such-corpus"),
     ],
 )
-def test_mistakes_are_told_in_one_line(arguments: list[str], told: str, tmp_path: Path) -> None:
+def test_invalid_arguments_are_reported(arguments: list[str], message: str, tmp_path: Path) -> None:
     result = CliRunner().invoke(
         app,
         [
@@ -109,5 +109,5 @@ def test_mistakes_are_told_in_one_line(arguments: list[str], told: str, tmp_path
         ],
     )
     assert result.exit_code == 2
-    assert told in " ".join(result.stderr.split())
+    assert message in " ".join(result.stderr.split())
     assert "Traceback" not in result.output

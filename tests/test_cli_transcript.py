@@ -25,7 +25,7 @@ def test_sessions_of_any_layout_become_one_page(tmp_path: Path) -> None:
     assert call(ours).stdout == page.split("\n## ")[0]
 
 
-def test_mistakes_are_told_in_one_line(tmp_path: Path) -> None:
+def test_invalid_arguments_are_reported_in_one_line(tmp_path: Path) -> None:
     for arguments, message in (
         ((tmp_path / "nowhere",), "nowhere"),
         ((write(tmp_path / "ours", talk()), "--out", tmp_path / "no" / "page.md"), "page.md"),
