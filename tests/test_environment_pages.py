@@ -53,7 +53,7 @@ def section(name: str, title: str) -> str:
 
 def made(name: str) -> gym.Env[Any, Any]:
     corpus = {"corpus": "corpus"} if name in ("ufn", "rfn", "nfd") else {}
-    return gym.make(f"dorothie_gym/{IDS[name]}", **corpus)  # type: ignore[arg-type]
+    return gym.make(f"dorothie_gym/{IDS[name]}", **corpus)  # type: ignore[arg-type]  # keywords of several types
 
 
 def rows(text: str) -> dict[str, list[str]]:
@@ -91,7 +91,7 @@ def test_each_field_of_each_space_has_a_row(name: str) -> None:
             _, shape, dtype, values, _, meaning = table[field]
             text = isinstance(part, spaces.Text)
             assert shape == ("-" if text else str(part.shape)) and dtype == ("str" if text else str(part.dtype)), field
-            assert meaning and (str(part.max_length) if text else "[") in values, field  # type: ignore[attr-defined]
+            assert meaning and (str(part.max_length) if text else "[") in values, field  # type: ignore[attr-defined]  # only texts reach the attribute
             found += 1
     assert found > 10 or name.startswith("navigation")
 
@@ -106,7 +106,7 @@ def test_rows_of_a_vector_cover_it_in_order(name: str) -> None:
             continue
         positions = [[int(end) for end in row[1].split(" to ")] for row in table.values()]
         covered = [k for ends in positions for k in range(ends[0], ends[-1] + 1)]
-        assert covered == list(range(space.shape[0]))  # type: ignore[index]
+        assert covered == list(range(space.shape[0]))  # type: ignore[index]  # a `Box` always has a shape
 
 
 def test_the_page_of_all_roles_lists_the_fields_of_each_role() -> None:

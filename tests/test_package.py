@@ -84,4 +84,4 @@ def test_pettingzoo_makes_both_forms() -> None:
 
 def test_gymnasium_makes_a_role_without_importing_the_package_first() -> None:
     env = gym.make("dorothie_gym:dorothie_gym/CoWizard-v0", town="brookside")
-    assert env.unwrapped.role is dorothie_gym.Role.CO_WIZARD  # type: ignore[attr-defined]
+    assert env.unwrapped.role is dorothie_gym.Role.CO_WIZARD  # type: ignore[attr-defined]  # `gym.make` returns an `Env`

@@ -18,7 +18,7 @@ def one(*spans: tuple[str, DialogueAct], start: float = 1.0) -> list[Event]:
 def labelled(*acts: DialogueAct, name: str = "a", **header: object) -> Session:
     """One utterance "word" for each act, three seconds apart."""
     parts = [one(("word", each), start=1.0 + 3.0 * k) for k, each in enumerate(acts)]
-    return drive(*parts, **header)  # type: ignore[arg-type]
+    return drive(*parts, **header)  # type: ignore[arg-type]  # parts and header fields of several types
 
 
 GO, TELL, YES = act(M.INSTRUCT), act(M.EXPLAIN), act(M.REPLY_Y)

@@ -16,7 +16,7 @@ def annotated(numbers: Iterable[int | None], *events: list[Event], **changes: ob
         replace(event, data={**event.data, "exchange": number, "transaction": 0})
         for event, number in zip(flat, numbers, strict=True)
     ]
-    return replace(drive(stored), **changes)  # type: ignore[arg-type]
+    return replace(drive(stored), **changes)  # type: ignore[arg-type]  # fields of several types
 
 
 TALK = (

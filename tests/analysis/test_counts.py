@@ -13,7 +13,7 @@ P = PhysicalAction
 
 
 def counted(*parts: object, fold: Fold | None = None) -> Counts:
-    session = drive(*parts)  # type: ignore[arg-type]
+    session = drive(*parts)  # type: ignore[arg-type]  # parts of several types
     counts = Counts()
     counts.add(session, Units(session), fold)
     return counts

@@ -90,7 +90,7 @@ def test_decision_frequency_is_respected() -> None:
 def test_malformed_actions_raise_error(env: NavigationContinuousEnv, action: object) -> None:
     env.reset(seed=0)
     with pytest.raises(ValueError, match="throttle, steer, brake"):
-        env.step(action)  # type: ignore[arg-type]
+        env.step(action)  # type: ignore[arg-type]  # a wrong type on purpose
 
 
 def test_values_lie_in_the_ranges_of_their_fields() -> None:

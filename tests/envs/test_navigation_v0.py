@@ -213,7 +213,7 @@ def test_returned_objects_may_be_changed(env: NavigationEnv) -> None:
 
 
 def test_fields_fill_the_observation() -> None:
-    assert sum(FIELDS.values()) == NavigationEnv().observation_space.shape[0]  # type: ignore[index]
+    assert sum(FIELDS.values()) == NavigationEnv().observation_space.shape[0]  # type: ignore[index]  # a `Box` always has a shape
     assert [where.stop - where.start for where in FIELD.values()] == list(FIELDS.values())
 
 

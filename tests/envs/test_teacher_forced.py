@@ -96,7 +96,7 @@ def test_observation_holds_the_history_newest_first() -> None:
 
 def test_only_ufn_observes_words() -> None:
     for env in (RfNEnv([session(talk())]), NfDEnv([session(talk())])):
-        assert "utterance" not in env.observation_space.spaces  # type: ignore[attr-defined]
+        assert "utterance" not in env.observation_space.spaces  # type: ignore[attr-defined]  # a `Dict`, declared as `Space`
 
 
 def test_reward_of_ufn_is_the_mean_of_move_and_slots() -> None:
@@ -245,7 +245,7 @@ def test_error_names_wrong_argument() -> None:
 def test_the_default_corpus_is_the_cached_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path / "cached", talk())
     corpus = types.ModuleType("dorothie_gym.rollout.corpus_cache")
-    corpus.default_corpus = lambda: tmp_path  # type: ignore[attr-defined]
+    corpus.default_corpus = lambda: tmp_path  # type: ignore[attr-defined]  # an attribute of an empty module
     monkeypatch.setitem(sys.modules, "dorothie_gym.rollout.corpus_cache", corpus)
     assert UfNEnv().reset(seed=0)[1]["session"] == "cached"
     assert gym.make("dorothie_gym/UfN-v0", corpus="default").reset(seed=0)[1]["session"] == "cached"

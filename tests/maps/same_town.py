@@ -52,7 +52,7 @@ def town_with_everything() -> Town:
         Lane(id=0, road_id=3, lane_id=-1, points=ahead, widths=np.array([3.5, 3.4, 0.1]), speed_limit=50 / 3.6),
         Lane(
             id=1,
-            road_id=np.int64(4),  # type: ignore[arg-type]
+            road_id=np.int64(4),  # type: ignore[arg-type]  # a NumPy number instead of a Python one on purpose
             lane_id=2,
             junction_id=8,
             points=ahead[1:] + 60.0,

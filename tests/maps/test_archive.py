@@ -132,6 +132,6 @@ def test_content_without_a_town_is_refused_even_with_a_correct_checksum(data: by
 
 def test_a_town_with_something_unknown_in_it_is_not_packed() -> None:
     town = town_with_everything()
-    town.name = {1, 2}  # type: ignore[assignment]
+    town.name = {1, 2}  # type: ignore[assignment]  # a wrong type on purpose
     with pytest.raises(TypeError, match="cannot be archived with a set"):
         pack(town, "key")

@@ -90,7 +90,7 @@ def test_error_names_index_and_label_of_invalid_entry() -> None:
 
 def test_encoding_other_objects_raises_error() -> None:
     with pytest.raises(OntologyError, match="EXPLAIN"):
-        encode_slots([LandmarkName.KFC, DialogueMove.EXPLAIN])  # type: ignore[list-item]
+        encode_slots([LandmarkName.KFC, DialogueMove.EXPLAIN])  # type: ignore[list-item]  # a wrong type on purpose
 
 
 acts = st.builds(DialogueAct, st.sampled_from(DialogueMove), st.frozensets(st.sampled_from(LABELS)))
@@ -132,17 +132,17 @@ def test_values_of_all_slots_together_are_the_slots(act: DialogueAct) -> None:
 
 def test_move_given_as_number_raises_error() -> None:
     with pytest.raises(OntologyError, match=r"DialogueAct.move"):
-        DialogueAct(1)  # type: ignore[arg-type]
+        DialogueAct(1)  # type: ignore[arg-type]  # a wrong type on purpose
 
 
 def test_slots_other_than_frozenset_raise_error() -> None:
     with pytest.raises(OntologyError, match=r"DialogueAct.of"):
-        DialogueAct(DialogueMove.EXPLAIN, [LandmarkName.KFC])  # type: ignore[arg-type]
+        DialogueAct(DialogueMove.EXPLAIN, [LandmarkName.KFC])  # type: ignore[arg-type]  # a wrong type on purpose
 
 
 def test_slot_of_other_type_raises_error() -> None:
     with pytest.raises(OntologyError, match="'KFC'"):
-        DialogueAct.of(DialogueMove.EXPLAIN, "KFC")  # type: ignore[arg-type]
+        DialogueAct.of(DialogueMove.EXPLAIN, "KFC")  # type: ignore[arg-type]  # a wrong type on purpose
 
 
 def test_only_transactions_can_be_interrupted() -> None:

@@ -124,7 +124,7 @@ def test_error_names_unknown_text(parser: Parser, text: str) -> None:
 @pytest.mark.parametrize("text", [None, 3])
 def test_parsers_raise_error_for_non_text(parser: Parser, text: object) -> None:
     with pytest.raises(OntologyError, match="expected a text"):
-        parser(text)  # type: ignore[arg-type]
+        parser(text)  # type: ignore[arg-type]  # a wrong type on purpose
 
 
 def test_error_names_vocabulary_and_nearest_spelling() -> None:

@@ -44,7 +44,7 @@ def test_decisions_count_in_the_hash_and_are_saved(tmp_path: Path) -> None:
     found = Session.load(record(tmp_path / "one"))
     copy = Session.load(found.save(tmp_path / "two"))
     assert copy.decisions == found.decisions and copy.digest == found.digest
-    assert dataclasses.replace(found, decisions=found.decisions[:1]).digest != found.digest  # type: ignore[index]
+    assert dataclasses.replace(found, decisions=found.decisions[:1]).digest != found.digest  # type: ignore[index]  # the recorded session has decisions
     assert session(name="none").digest != dataclasses.replace(session(name="none"), decisions=()).digest
 
 

@@ -28,7 +28,7 @@ from tests.recording.builders import physical, session
 
 
 def one_look(rows: object, frame: int = 30) -> SceneTable:
-    values = np.atleast_1d(rows)  # type: ignore[call-overload]
+    values = np.atleast_1d(rows)  # type: ignore[call-overload]  # NumPy has no overload for a sequence of records
     return SceneTable(np.array([frame]), np.array([0, len(values)]), values)
 
 
@@ -39,11 +39,11 @@ def standing(x: float, y: float, heading: float) -> Session:
     return replace(session([physical(60, PhysicalAction.START)]), trajectory=trajectory_of(rows))
 
 
-def actor(kind: ActorKind, x: float, y: float, heading: float = 0.0) -> np.ndarray:  # type: ignore[type-arg]
+def actor(kind: ActorKind, x: float, y: float, heading: float = 0.0) -> np.ndarray:  # type: ignore[type-arg]  # structured rows
     return np.array([(7, kind, x, y, heading, 3.0, 4.5, 1.8)], dtype=ACTOR_DTYPE)
 
 
-def now(recorded: Session) -> tuple[list[int], np.ndarray]:  # type: ignore[type-arg]
+def now(recorded: Session) -> tuple[list[int], np.ndarray]:  # type: ignore[type-arg]  # structured rows
     columns = columns_of(recorded)
     batch = gather(columns, points(columns, Task.NFD), [0])
     mask = batch.objects_mask[0]

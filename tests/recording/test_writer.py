@@ -31,7 +31,7 @@ def test_order_of_keys_does_not_reach_the_file(tmp_path: Path) -> None:
 
 
 def test_numpy_numbers_are_written_as_plain_ones(tmp_path: Path) -> None:
-    event = physical(3, PhysicalAction.J_TURN, angle=np.float64(12.5))  # type: ignore[arg-type]
+    event = physical(3, PhysicalAction.J_TURN, angle=np.float64(12.5))  # type: ignore[arg-type]  # a NumPy number instead of a Python one on purpose
     loaded = Session.load(write(tmp_path / "one", [event]))
     assert loaded.physical_actions[0].angle == 12.5
 
@@ -86,7 +86,7 @@ def test_frames_must_rise(tmp_path: Path) -> None:
     ],
 )
 def test_event_that_could_not_be_read_back_is_not_written(tmp_path: Path, data: object, message: str) -> None:
-    event = Event(frame=1, type=EventType.PHYSICAL_ACTION, source=Role.CO_WIZARD, data=data)  # type: ignore[arg-type]
+    event = Event(frame=1, type=EventType.PHYSICAL_ACTION, source=Role.CO_WIZARD, data=data)  # type: ignore[arg-type]  # values that JSON does not hold on purpose
     with SessionWriter(tmp_path, header()) as writer, pytest.raises(SessionError, match=message):
         writer.append([event])
 

@@ -71,7 +71,7 @@ def test_corpus_with_word_errors_has_transcripts_and_says_so(tmp_path: Path) -> 
 def test_corpus_of_other_settings_is_not_gone_on_with(corpus: Path, change: dict[str, object]) -> None:
     settings: dict[str, object] = {"sessions": 6, "seed": 5, "config": SHORT, **change}
     with pytest.raises(SessionError, match=f"has {next(iter(change))} .* choose another folder"):
-        generate_corpus(corpus, **settings)  # type: ignore[arg-type]
+        generate_corpus(corpus, **settings)  # type: ignore[arg-type]  # settings of several types
 
 
 def test_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ TOWN = load_town("brookside")
 
 
 def played(folder: Path, name: str = "scripted", **arguments: object) -> Session:
-    env = DuoWizardEnv("brookside", **{"config": EnvConfig(max_seconds=40.0), **arguments})  # type: ignore[arg-type]
+    env = DuoWizardEnv("brookside", **{"config": EnvConfig(max_seconds=40.0), **arguments})  # type: ignore[arg-type]  # arguments of several types
     policies = {role: make_policy(name, role, env.limits) for role in AGENT_ROLES}
     play_session(env, policies, seed=3, folder=folder)
     return Session.load(folder)

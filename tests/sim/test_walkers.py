@@ -65,7 +65,7 @@ def test_car_yields_to_pedestrians_on_a_crosswalk_and_then_continues(which: int,
     assert world.planner.lane not in (lane, connector)
 
 
-def passage_of(arrays, connector: int, crossing: int) -> float:  # type: ignore[no-untyped-def]
+def passage_of(arrays, connector: int, crossing: int) -> float:  # type: ignore[no-untyped-def]  # arrays of compiled records have no type
     """Returns the distance along a crosswalk at which a lane crosses it [m]."""
     lane = arrays.lanes[connector]
     passages = arrays.passages[lane.passage : lane.passage + lane.passages]

@@ -123,4 +123,4 @@ def test_error_names_missing_or_unknown_field() -> None:
     with pytest.raises(ValueError, match="field 'wish' is unknown"):
         decode_action(Role.PARTICIPANT, {**noop(Role.PARTICIPANT, LIMITS), "wish": 1}, LIMITS)
     with pytest.raises(ValueError, match="expected a dict, got list"):
-        decode_action(Role.PARTICIPANT, [], LIMITS)  # type: ignore[arg-type]
+        decode_action(Role.PARTICIPANT, [], LIMITS)  # type: ignore[arg-type]  # a wrong type on purpose

@@ -62,7 +62,7 @@ def test_actions_are_a_vector_of_choices() -> None:
     assert env.action_space == spaces.MultiDiscrete([4, 3, 2, 2, 2, 2])
     env.reset(seed=0)
     env.step(np.array([3, 2, 1, 0, 1, 1]))
-    taken = env.unwrapped.taken  # type: ignore[attr-defined]
+    taken = env.unwrapped.taken  # type: ignore[attr-defined]  # `unwrapped` is declared as `Env`
     assert MIXED.contains(taken)
     assert taken["angle"] == 1
     assert taken["plan"].tolist() == [2, 1]
@@ -161,7 +161,7 @@ def test_plain_spaces_are_flattened() -> None:
     assert observation["observation"].shape == (6,)
     assert observation["action_mask"].tolist() == [1, 1, 1]
     env.step(np.array([2]))
-    assert env.unwrapped.taken == 3  # type: ignore[attr-defined]
+    assert env.unwrapped.taken == 3  # type: ignore[attr-defined]  # `unwrapped` is declared as `Env`
 
 
 @pytest.mark.parametrize(

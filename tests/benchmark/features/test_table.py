@@ -24,12 +24,12 @@ def test_points_are_those_of_the_session_with_their_labels(task: Task) -> None:
     assert table.event.tolist() == [point.index for point in expected]
     assert table.tenth.tolist() == [point.view.frame // 3 for point in expected]
     if task is Task.NFD:
-        assert table.label_action.tolist() == [point.action.nfd_class for point in expected]  # type: ignore[union-attr]
+        assert table.label_action.tolist() == [point.action.nfd_class for point in expected]  # type: ignore[union-attr]  # points of a task have its label
         assert table.label_angle.tolist() == [0.0, 88.0, 0.0, -179.0, 0.0]
         assert not table.label_slots.any() and set(table.label_move.tolist()) == {-1}
     else:
-        assert table.label_move.tolist() == [int(point.act.move) for point in expected]  # type: ignore[union-attr]
-        assert table.label_slots.tolist() == [list(map(bool, point.act.vector)) for point in expected]  # type: ignore[union-attr]
+        assert table.label_move.tolist() == [int(point.act.move) for point in expected]  # type: ignore[union-attr]  # points of a task have its label
+        assert table.label_slots.tolist() == [list(map(bool, point.act.vector)) for point in expected]  # type: ignore[union-attr]  # points of a task have its label
         assert np.isnan(table.label_angle).all()
 
 

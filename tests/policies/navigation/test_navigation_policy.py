@@ -45,7 +45,7 @@ def test_observation_equals_that_of_training(guidance: str) -> None:
     viewpoint = NavigationEncoder(learning.town, JunctionExits(learning.town), learning.config.max_seconds)
     done: dict[Role, Any] = {}
     play = drive.session.step
-    drive.session.step = lambda actions: (done.update(actions), play(actions))  # type: ignore[assignment,func-returns-value]
+    drive.session.step = lambda actions: (done.update(actions), play(actions))  # type: ignore[assignment,func-returns-value]  # a replaced method that records its actions
     for _ in range(160):
         seen = viewpoint.observe(observations["co_wizard"], drive.heard, drive.instructor.blocked)
         np.testing.assert_array_equal(seen, observation)

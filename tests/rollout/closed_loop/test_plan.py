@@ -62,4 +62,4 @@ def test_command_plays_the_same_again() -> None:
 )  # fmt: skip
 def test_invalid_settings_are_rejected(wrong: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        RolloutSettings(**wrong)  # type: ignore[arg-type]
+        RolloutSettings(**wrong)  # type: ignore[arg-type]  # a wrong type on purpose

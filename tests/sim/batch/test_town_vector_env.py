@@ -39,7 +39,7 @@ class Lot:
 
 
 def stock_road(env: TownVectorEnv, number: int = 0) -> TownRoad:
-    return TownRoad(env._network, np_random=Lot(int(env.world(number).vehicles.random[0])))  # type: ignore[arg-type]
+    return TownRoad(env._network, np_random=Lot(int(env.world(number).vehicles.random[0])))  # type: ignore[arg-type]  # a substitute for the random generator
 
 
 def same_place(row: Any, stock: Vehicle) -> None:
@@ -48,7 +48,7 @@ def same_place(row: Any, stock: Vehicle) -> None:
 
 
 def stock_reward(env: TownVectorEnv, stock: Vehicle) -> float:
-    return sum(TownEnv._rewards(SimpleNamespace(vehicle=stock, config=env.config), None).values())  # type: ignore[arg-type]
+    return sum(TownEnv._rewards(SimpleNamespace(vehicle=stock, config=env.config), None).values())  # type: ignore[arg-type]  # a substitute for the environment
 
 
 # --- the ego is highway-env's -----------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ Points = NDArray[np.float64]
 
 
 @numba.njit(cache=False, fastmath=False)
-def _exhaustive(points, offsets, ends, queries, weight, any_height):  # type: ignore[no-untyped-def]
+def _exhaustive(points, offsets, ends, queries, weight, any_height):  # type: ignore[no-untyped-def]  # compiled: numba infers the types
     """First row of least distance for each query, over all lanes and without any index.
 
     The distance is highway-env's (`AbstractLane.distance_with_heading`), as the compiled lanes measure it; that they

@@ -177,7 +177,7 @@ def test_estimates_are_copies() -> None:
     assert localizer.covariance[0, 0] < 1.0
 
 
-class Reference(ExtendedKalmanFilter):  # type: ignore[misc]
+class Reference(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy has no types
     """filterpy's filter over the same odometry."""
 
     def __init__(self, start: Array) -> None:
