@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dorothie_gym.cli.options import AsJson, Maps
-from dorothie_gym.cli.output import fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stderr, stdout
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,7 +83,7 @@ def _write_tables(corpus: Corpus, out: Path, *, as_json: bool) -> None:
 
 def _convert(
     corpus: Corpus, out: Path, to: TargetLayout, maps: Path | None, *, is_one: bool, quiet: bool
-) -> list[dict[str, Any]]:
+) -> list[Facts]:
     rows = []
     taken: set[Path] = set()
     with _progress(len(corpus), quiet=quiet) as advance:
@@ -103,13 +103,13 @@ def _convert_one(
     taken: set[Path],
     *,
     is_one: bool,
-) -> dict[str, Any]:
+) -> Facts:
     """Converts a session; returns its row for --json."""
     from dorothie_gym.errors import SessionError, TownError
     from dorothie_gym.recording.sdn import write_sdn
 
     path = entry.path.relative_to(corpus.root)
-    row: dict[str, Any] = {"path": str(path)}
+    row: Facts = {"path": str(path)}
     try:
         session = entry.load()
         target = out if is_one else out / path.with_name(_name(session, number, to, out / path.parent, taken))
@@ -149,7 +149,7 @@ def _progress(total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
         yield lambda: progress.advance(bar)
 
 
-def _show(rows: list[dict[str, Any]], out: Path) -> None:
+def _show(rows: list[Facts], out: Path) -> None:
     from dorothie_gym.recording.validation import report_lines
 
     console = stdout()
@@ -164,7 +164,7 @@ def _show(rows: list[dict[str, Any]], out: Path) -> None:
     console.print(f"{done} of {len(rows)} sessions written to {out}.", markup=False, soft_wrap=True)
 
 
-def _line(row: Mapping[str, Any]) -> str:
+def _line(row: Facts) -> str:
     ending = "" if row["complete"] else ", not recorded to its end"
     layout = row["report"]["layout"]
     return f"{row['path']}: {layout}, {row['events']} events, {row['frames']} frames{ending} -> {row['out']}"

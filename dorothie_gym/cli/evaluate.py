@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dorothie_gym.cli.options import Maps
-from dorothie_gym.cli.output import check_file, fail, print_json, reporting_errors, wide_stdout
+from dorothie_gym.cli.output import Facts, check_file, fail, print_json, reporting_errors, wide_stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.benchmark import CorpusLabels, ResultsTable, Split, TaskPredictions
@@ -68,7 +68,7 @@ def evaluate(
             labels = labels_of(where, part)
             if floor is not None:
                 read += _floor(floor, where, labels, range(seed, seed + seeds), chosen, save)
-            about = {str(path): told for path in files if (told := read_about(path))}
+            about = {str(path): page for path in files if (page := read_about(path))}
             table = evaluate_predictions(read, labels, about=about)
             if out is not None:
                 from dorothie_gym.benchmark.report import write_report
@@ -145,7 +145,7 @@ def _default_sessions() -> Path:
         fail(str(error))
 
 
-def _flat(table: ResultsTable) -> dict[str, Any]:
+def _flat(table: ResultsTable) -> Facts:
     """Returns the scores of a single run over all parts; skipped points are unscored or scored in part."""
     if len(table.runs) != 1:
         return {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,7 @@ from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray, WordError
 from dorothie_gym.cli.output import (
     FAILED,
     INTERRUPTED,
+    Facts,
     fail,
     print_json,
     reporting_errors,
@@ -88,7 +89,7 @@ def _exit_interrupted(out: Path, sessions: int, seed: int, max_seconds: float | 
     raise typer.Exit(INTERRUPTED)
 
 
-def _facts(made: Generated, seed: int, wall: float) -> dict[str, Any]:
+def _facts(made: Generated, seed: int, wall: float) -> Facts:
     import json
 
     folds: dict[str, int] = {}

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
 from dorothie_gym.cli.options import OWN_NAME
-from dorothie_gym.cli.output import check_picture, fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stderr, stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.lint import Fault
@@ -96,7 +96,7 @@ def storyboards(
     stdout().print(table)
 
 
-def _show_towns(rows: Sequence[Mapping[str, Any]]) -> None:
+def _show_towns(rows: Sequence[Facts]) -> None:
     table = Table(box=None, pad_edge=False)
     table.add_column("Town", style="bold")
     table.add_column("Fold")
@@ -119,7 +119,7 @@ def _show_towns(rows: Sequence[Mapping[str, Any]]) -> None:
     console.print("OpenDRIVE maps (.xodr) and town files (.yaml) can be given by their path.", style="dim")
 
 
-def _show_town(facts: Mapping[str, Any]) -> None:
+def _show_town(facts: Facts) -> None:
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
@@ -138,7 +138,7 @@ def _show_town(facts: Mapping[str, Any]) -> None:
     console.print(table)
 
 
-def _show_faults(facts: Mapping[str, Any], faults: Sequence[Fault]) -> None:
+def _show_faults(facts: Facts, faults: Sequence[Fault]) -> None:
     """Prints a line per fault with kind, position and message, or a summary without faults."""
     console = stdout()
     for fault in faults:
@@ -156,7 +156,7 @@ def _show_faults(facts: Mapping[str, Any], faults: Sequence[Fault]) -> None:
         console.print(f"{facts['name']}: no faults: {numbers}, {more}", markup=False)
 
 
-def _fault_row(fault: Fault) -> dict[str, Any]:
+def _fault_row(fault: Fault) -> Facts:
     x, y = fault.position
     return {
         "kind": str(fault.kind),

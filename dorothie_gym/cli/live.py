@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeAlias
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
@@ -14,12 +14,16 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from dorothie_gym.cli.output import Facts
 from dorothie_gym.engine.session_engine import LiveSession, SessionEngine
 from dorothie_gym.ontology import GoalStatus, Role
 from dorothie_gym.recording import Event, EventType
 from dorothie_gym.recording.events import move_record
 from dorothie_gym.recording.json_io import Fields
 from dorothie_gym.tasks import TaskState
+
+EventData: TypeAlias = Mapping[str, Any]
+"""Data of an event, whose fields depend on its type."""
 
 SPEAKERS: Mapping[Role, tuple[str, str]] = {
     Role.PARTICIPANT: ("Participant", "bold cyan"),
@@ -77,11 +81,11 @@ def script_lines(events: Iterable[Event], task: Callable[[int], str]) -> list[Sc
     return lines
 
 
-def _message(data: Mapping[str, Any]) -> tuple[str, str]:
+def _message(data: EventData) -> tuple[str, str]:
     return f"“{data['text']}”", "magenta"
 
 
-def _physical(data: Mapping[str, Any]) -> tuple[str, str]:
+def _physical(data: EventData) -> tuple[str, str]:
     text = str(data["action"])
     if data["angle"] is not None:
         side = "left" if data["angle"] > 0 else "right"
@@ -91,7 +95,7 @@ def _physical(data: Mapping[str, Any]) -> tuple[str, str]:
     return text, "dim"
 
 
-def _exception(data: Mapping[str, Any]) -> tuple[str, str]:
+def _exception(data: EventData) -> tuple[str, str]:
     kind = data["kind"].replace("_", " ")
     details = {
         "weather": lambda: f"{data['parameter']} becomes {data['value']:g}",
@@ -106,27 +110,27 @@ def _exception(data: Mapping[str, Any]) -> tuple[str, str]:
     return f"{kind}: {detail}", "magenta"
 
 
-def _hazard(data: Mapping[str, Any]) -> tuple[str, str]:
+def _hazard(data: EventData) -> tuple[str, str]:
     return f"stops for a hazard {data['distance']:.0f} m ahead: {data['reason']}", "yellow"
 
 
-def _collision(data: Mapping[str, Any]) -> tuple[str, str]:
+def _collision(data: EventData) -> tuple[str, str]:
     fault = "its own fault" if data["own_fault"] else "not its fault"
     return f"collides at {data['speed'] * 3.6:.0f} km/h: {data['other']} ({fault})", "bold red"
 
 
-def _breach(text: str) -> Callable[[Mapping[str, Any]], tuple[str, str]]:
+def _breach(text: str) -> Callable[[EventData], tuple[str, str]]:
     return lambda data: (text, "bold red")
 
 
-def _subgoal(data: Mapping[str, Any], task: str) -> tuple[str, str]:
+def _subgoal(data: EventData, task: str) -> tuple[str, str]:
     status = data["status"]
     if status == "Complete":
         return f"arrives. Done: {task}", "bold green"
     return f"{'No longer' if status == 'Abandoned' else 'Now'}: {task}", "magenta"
 
 
-_DESCRIBED: Mapping[EventType, Callable[[Mapping[str, Any]], tuple[str, str]]] = {
+_DESCRIBED: Mapping[EventType, Callable[[EventData], tuple[str, str]]] = {
     EventType.MESSAGE: _message,
     EventType.PHYSICAL_ACTION: _physical,
     EventType.EXCEPTION: _exception,
@@ -225,7 +229,7 @@ def tasks(task: TaskState, console: Console) -> RenderableType:
     return table
 
 
-def summary(facts: dict[str, Any], files: dict[str, str], console: Console) -> RenderableType:
+def summary(facts: Facts, files: dict[str, str], console: Console) -> RenderableType:
     """Returns the outcome of a session.
 
     Args:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeAlias
 
 import typer
 from rich.console import Console
@@ -16,6 +16,9 @@ from rich.console import Console
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+Facts: TypeAlias = dict[str, Any]
+"""Fields of a JSON object that a command prints, or of a row of its table; the command knows the type of each."""
 
 FAILED = 1
 """Exit code where a command could not do its work."""

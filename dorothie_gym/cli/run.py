@@ -7,13 +7,14 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dorothie_gym.cli.options import AdWizard, AsJson, CoWizard, Participant, WordErrors, env_config, find_cast
 from dorothie_gym.cli.output import (
     INTERRUPTED,
+    Facts,
     check_picture,
     check_video,
     compiling,
@@ -108,7 +109,7 @@ def _check_outputs(plan: _Plan) -> None:
         check_video(plan.video)
 
 
-def _play(plan: _Plan, *, quiet: bool) -> dict[str, Any]:
+def _play(plan: _Plan, *, quiet: bool) -> Facts:
     """Plays the session and returns what --json writes."""
     from dorothie_gym.engine.session_engine import SessionEngine
     from dorothie_gym.ontology import AGENT_ROLES
@@ -178,7 +179,7 @@ def _draw(engine: SessionEngine, path: Path) -> None:
     SceneRenderer().save(scene_of(engine.session, caption), path, follow=False)
 
 
-def _facts(engine: SessionEngine, ending: SessionSummary, wall: float, out: Path | None) -> dict[str, Any]:
+def _facts(engine: SessionEngine, ending: SessionSummary, wall: float, out: Path | None) -> Facts:
     return {
         "town": engine.town.name,
         "storyboard": engine.scenario.storyboard.name,

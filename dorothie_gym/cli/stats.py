@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
 from dorothie_gym.cli.options import OWN_NAME, AsJson, Maps
-from dorothie_gym.cli.output import check_picture, fail, print_json, reporting_errors, stdout
+from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.recording import Corpus
@@ -131,7 +131,7 @@ def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
         console.print(f"Picture: {picture}", style="dim", markup=False, soft_wrap=True)
 
 
-def _table2(table: Mapping[str, Any]) -> Table:
+def _table2(table: Facts) -> Table:
     from dorothie_gym.analysis import PAPER
 
     shown = Table(box=None, pad_edge=False)
@@ -168,7 +168,7 @@ def _folds(folds: Mapping[str, int]) -> Table:
     return shown
 
 
-def _anchors(anchors: Mapping[str, Any]) -> Table:
+def _anchors(anchors: Facts) -> Table:
     from dorothie_gym.analysis.corpus_stats import ANCHOR_TOLERANCE
 
     shown = Table(box=None, pad_edge=False)
@@ -187,7 +187,7 @@ def _anchors(anchors: Mapping[str, Any]) -> Table:
     return shown
 
 
-def _diversity(diversity: Mapping[str, Any]) -> Table:
+def _diversity(diversity: Facts) -> Table:
     from dorothie_gym.analysis.diversity import has_language_models
 
     shown = Table(box=None, pad_edge=False)
@@ -245,8 +245,8 @@ def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
     for verdict in verdicts:
         interval = "-" if verdict.low is None else f"{verdict.low:+.3f} to {verdict.high:+.3f}"
         difference = "-" if verdict.difference is None else f"{verdict.difference:+.3f}"
-        told, style = ("holds", "") if verdict.holds else ("not so", "yellow")
-        shown.add_row(verdict.claim.title, difference, interval, told, style=style)
+        verdict_text, style = ("holds", "") if verdict.holds else ("not so", "yellow")
+        shown.add_row(verdict.claim.title, difference, interval, verdict_text, style=style)
     console = stdout()
     console.print(shown)
     console.print(

@@ -6,12 +6,22 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dorothie_gym.cli.options import AsJson
-from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, reporting_errors, stderr, stdout, wide_stdout
+from dorothie_gym.cli.output import (
+    FAILED,
+    INTERRUPTED,
+    Facts,
+    fail,
+    print_json,
+    reporting_errors,
+    stderr,
+    stdout,
+    wide_stdout,
+)
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.experiment import Experiment
@@ -116,12 +126,12 @@ def table(
     )
 
 
-def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> list[dict[str, Any]]:
+def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> list[Facts]:
     """Runs the trainings, and returns their results in the same order."""
     from dorothie_gym.baselines.experiment import run_experiments
     from dorothie_gym.processors import available_processors
 
-    found: dict[Path, dict[str, Any]] = {}
+    found: dict[Path, Facts] = {}
     try:
         with _progress(len(jobs), quiet=quiet) as (on_epoch, on_job):
             for job, result in run_experiments(jobs, workers or available_processors(), on_epoch):

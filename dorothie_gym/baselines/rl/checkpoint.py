@@ -16,7 +16,7 @@ from safetensors.torch import load_file, save_file
 from stable_baselines3.common.vec_env import VecEnv
 
 from dorothie_gym.baselines.rl.environments import make_env
-from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, RunSettings, TrainingSettings
+from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, Page, RunSettings, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import AnyEnv
 from dorothie_gym.errors import ModelFileError, SettingsError
 from dorothie_gym.files import replacing
@@ -27,9 +27,6 @@ Model: TypeAlias = Any
 
 Network: TypeAlias = Any
 """Policy network of a `Model`, for the same reasons without a type."""
-
-Page: TypeAlias = dict[str, Any]
-"""Content of `model.json`; a reader checks the fields that it uses."""
 
 TENSORS: Final = "model.safetensors"
 """File of a model beside `model.json`."""

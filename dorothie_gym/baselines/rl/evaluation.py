@@ -29,7 +29,10 @@ PARALLEL_EPISODES: Final = 8
 Z: Final = 1.96
 """Quantile of the normal distribution for an interval of 95 %."""
 
-Act: TypeAlias = Callable[[Vector, NDArray[np.bool_] | None], Sequence[Any]]
+Action: TypeAlias = Any
+"""Action of an environment: a number or a vector."""
+
+Act: TypeAlias = Callable[[Vector, NDArray[np.bool_] | None], Sequence[Action]]
 """Function from observations (n, ...) and masks (n, m), if environments have them, to actions."""
 
 
@@ -96,9 +99,9 @@ def evaluate_policy(make: MakeEnv, act: Act, episodes: int, seed: int = FIRST_SE
 def greedy_policy(model: Model, *, masked: bool) -> Act:
     """Returns the greedy policy of a model; `masked` models respect the masks."""
 
-    def act(observations: Vector, masks: NDArray[np.bool_] | None) -> Sequence[Any]:
+    def act(observations: Vector, masks: NDArray[np.bool_] | None) -> Sequence[Action]:
         keywords = {"action_masks": masks} if masked and masks is not None else {}
-        actions: Sequence[Any] = model.predict(observations, deterministic=True, **keywords)[0]
+        actions: Sequence[Action] = model.predict(observations, deterministic=True, **keywords)[0]
         return actions
 
     return act

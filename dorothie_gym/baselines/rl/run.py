@@ -8,10 +8,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final, Generic, Self, TypeAlias, TypeVar
+from typing import Final, Generic, Self, TypeAlias, TypeVar
 
 import torch
 
+from dorothie_gym.baselines.rl.settings import Page
 from dorothie_gym.files import write_atomically
 
 PROGRESS: Final = "progress.jsonl"
@@ -35,12 +36,12 @@ class RunEvaluation(ABC):
     seconds: float
 
     @abstractmethod
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> Page:
         """Returns the evaluation in JSON types."""
 
     @classmethod
     @abstractmethod
-    def from_json(cls, page: Mapping[str, Any]) -> Self:
+    def from_json(cls, page: Page) -> Self:
         """Reads the output of `as_json`."""
 
 
@@ -113,7 +114,7 @@ class Run(Generic[Evaluation]):
         lines = "".join(json.dumps(row.as_json()) + "\n" for row in self.rows)
         write_atomically(self.folder / PROGRESS, lines)
 
-    def _write_cloned(self, results: Mapping[str, Any]) -> None:
+    def _write_cloned(self, results: Mapping[str, object]) -> None:
         write_atomically(self.folder / CLONED, json.dumps(results, indent=1) + "\n")
 
     def _result(self, steps: int, *, finished: bool) -> TrainingResult[Evaluation]:

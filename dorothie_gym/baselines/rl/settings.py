@@ -15,6 +15,9 @@ from dorothie_gym.errors import SettingsError
 Arguments: TypeAlias = Mapping[str, Any]
 """Keyword arguments of an environment or an algorithm, of any type; both check them."""
 
+Page: TypeAlias = dict[str, Any]
+"""Object of a JSON or YAML file by field; a reader checks the fields that it uses."""
+
 ALGORITHMS: Mapping[str, tuple[str, str]] = {
     "ppo": ("stable_baselines3", "PPO"),
     "maskable_ppo": ("sb3_contrib", "MaskablePPO"),
@@ -76,7 +79,7 @@ class RunSettings:
         if not 0 <= self.seed < 2**31:
             raise SettingsError(f"seed is {self.seed}; it must be in 0..{2**31 - 1}")
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> Page:
         """Returns the settings in JSON types; the class accepts them as keyword arguments."""
         return {**asdict(self), "network": list(self.network)}
 
@@ -137,7 +140,7 @@ def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSetti
     """
     _check_algorithm(algorithm)
     entries = _read_data(algorithm)
-    tuned = TrainingSettings(algorithm=algorithm, env=env, **entries.get(env, entries[DEFAULT]))
+    tuned = TrainingSettings(algorithm=algorithm, env=env, **entries[env if env in entries else DEFAULT])
     return replace(tuned, **_given(changes))
 
 
@@ -146,13 +149,13 @@ def _check_algorithm(name: str) -> None:
         raise SettingsError(f"algorithm is {name!r}; it must be one of {', '.join(ALGORITHMS)}")
 
 
-def _read_data(name: str) -> dict[str, Any]:
+def _read_data(name: str) -> Page:
     text = resources.files(__package__).joinpath("data", f"{name}.yaml").read_text(encoding="utf-8")
-    entries: dict[str, Any] = yaml.safe_load(text)
+    entries: Page = yaml.safe_load(text)
     return entries
 
 
-def _given(changes: Arguments) -> dict[str, Any]:
+def _given(changes: Arguments) -> Page:
     return {name: value for name, value in changes.items() if value is not None}
 
 
@@ -207,7 +210,7 @@ class SelfPlaySettings(RunSettings):
             left -= value
 
     @property
-    def env_settings(self) -> dict[str, Any]:
+    def env_settings(self) -> Page:
         """Arguments of `SelfPlayEnv`."""
         return {name: getattr(self, name) for name in ENV_FIELDS}
 

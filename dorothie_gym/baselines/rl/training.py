@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
@@ -26,7 +26,7 @@ from dorothie_gym.baselines.rl.run import (
     TrainingResult,
     ignore_stage,
 )
-from dorothie_gym.baselines.rl.settings import TrainingSettings
+from dorothie_gym.baselines.rl.settings import Page, TrainingSettings
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 from dorothie_gym.recording import Fold
@@ -44,12 +44,12 @@ class TrainingEvaluation(RunEvaluation):
 
     outcome: EpisodeStatistics
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> Page:
         """Returns the evaluation in JSON types."""
         return {"steps": self.steps, "seconds": self.seconds, **asdict(self.outcome)}
 
     @classmethod
-    def from_json(cls, page: Mapping[str, Any]) -> TrainingEvaluation:
+    def from_json(cls, page: Page) -> TrainingEvaluation:
         """Reads the output of `as_json`."""
         outcome = {name: value for name, value in page.items() if name not in ("steps", "seconds")}
         return cls(steps=page["steps"], seconds=page["seconds"], outcome=EpisodeStatistics(**outcome))

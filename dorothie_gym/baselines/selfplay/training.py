@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from dorothie_gym.baselines.rl.run import (
     TrainingResult,
     ignore_stage,
 )
-from dorothie_gym.baselines.rl.settings import SELFPLAY, SelfPlaySettings
+from dorothie_gym.baselines.rl.settings import SELFPLAY, Page, SelfPlaySettings
 from dorothie_gym.baselines.selfplay.demonstrations import read_demonstrations
 from dorothie_gym.baselines.selfplay.learner import sample_actions
 from dorothie_gym.baselines.selfplay.multi_agent_rollout import AD_WIZARD, MultiAgentRollout, SelfPlayEnvFactory
@@ -55,12 +55,12 @@ class SelfPlayEvaluation(RunEvaluation):
     learned: EpisodeStatistics
     returns: Mapping[str, float | None]
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> Page:
         """Returns the evaluation in JSON types."""
         return asdict(self)
 
     @classmethod
-    def from_json(cls, page: Mapping[str, Any]) -> SelfPlayEvaluation:
+    def from_json(cls, page: Page) -> SelfPlayEvaluation:
         """Reads the output of `as_json`."""
         outcomes = {name: EpisodeStatistics(**page[name]) for name in OPPONENTS}
         return cls(steps=page["steps"], seconds=page["seconds"], returns=page["returns"], **outcomes)
