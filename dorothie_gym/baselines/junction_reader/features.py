@@ -43,9 +43,14 @@ def ways(texts: Sequence[str]) -> NDArray[np.bool_]:
     """Returns which directions each text names (n, 3): left, right, straight on."""
     table = np.zeros((len(texts), len(_WAYS)), dtype=bool)
     for row, text in zip(table, texts, strict=True):
-        said = set(words(text))
-        row[:] = [bool(said & names) for names in _WAYS]
+        row[:] = _named_ways(text)
     return table
+
+
+@lru_cache(maxsize=16384)
+def _named_ways(text: str) -> tuple[bool, ...]:
+    said = set(words(text))
+    return tuple(bool(said & names) for names in _WAYS)
 
 
 @lru_cache(maxsize=16384)
