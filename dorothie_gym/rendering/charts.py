@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DOTS_PER_INCH: Final = 130
+CHART_RESOLUTION: Final = 130
 """Dots per inch."""
 
 GRID: Final = "#e2ddd1"
@@ -44,7 +44,7 @@ def empty_figure(width: float, height: float) -> Iterator[Figure]:
     from matplotlib.figure import Figure
 
     with rc_context({"font.family": "DejaVu Sans", "text.color": INK, "axes.labelcolor": SOFT}):
-        figure = Figure(figsize=(width, height), dpi=DOTS_PER_INCH, facecolor=SHEET)
+        figure = Figure(figsize=(width, height), dpi=CHART_RESOLUTION, facecolor=SHEET)
         FigureCanvasAgg(figure)
         yield figure
 
