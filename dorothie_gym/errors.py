@@ -31,7 +31,7 @@ from reprlib import Repr
 from typing import Final
 
 MAX_SHOWN: Final = 120
-"""Characters of an offending value that a message shows."""
+"""Characters of a value that a message shows."""
 
 
 class DorothieGymError(Exception):

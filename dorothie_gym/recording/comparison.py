@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import MAX_SHOWN, SessionError
 from dorothie_gym.recording.corpus import layout_of, read_session
 from dorothie_gym.recording.events import encode_event
 from dorothie_gym.recording.json_io import canonical, from_line
@@ -20,9 +20,6 @@ from dorothie_gym.recording.surroundings import SceneTable
 
 _VERSIONS: Final = ("format_version", "package_version")
 """Fields of the header that name the writer of the session."""
-
-_LONGEST: Final = 120
-"""Characters of a value that a difference shows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -275,7 +272,7 @@ def _first(differences: Iterator[Difference | None]) -> Difference | None:
 
 def _shown(value: object) -> str:
     text = repr(value)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
 
 
 def _first_row(one: NDArray[np.generic], other: NDArray[np.generic]) -> int | None:

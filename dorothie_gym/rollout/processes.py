@@ -2,6 +2,8 @@
 
 `concurrent.futures.ProcessPoolExecutor` was tried: when a worker dies, it reports neither the task nor the exit code,
 and before Python 3.14 it cannot end a running task without private attributes, so that Ctrl-C would wait for a session.
+`joblib.Parallel` (loky) was tried as well: it is as fast and ends at Ctrl-C, but it does not name the task of a dead
+worker, and its workers outlive a caller that is killed.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ from dorothie_gym.sim.config import FRAME_RATE
 ANSWER_WINDOW = 15.0
 """Time after a turn within which its answer begins [s]: patience of an exchange, and duration of the answer."""
 
-_LONGEST = 60.0
+_MAX_UTTERANCE_SECONDS = 60.0
 """Longest utterance [s]: turns that began earlier are over."""
 
 _UNKNOWN = (ActionValue.UNKNOWN, StreetName.UNKNOWN, LandmarkName.UNKNOWN, GoalStatus.UNKNOWN)
@@ -162,7 +162,7 @@ class DialogueView:
         """Yields the turns before a turn that ended at most `within` seconds before its start, latest first."""
         for k in range(turn.number - 1, -1, -1):
             other = self.turns[k]
-            if turn.start - other.start > within + _LONGEST:
+            if turn.start - other.start > within + _MAX_UTTERANCE_SECONDS:
                 return
             if turn.start - other.end <= within:
                 yield other
