@@ -43,7 +43,7 @@ OTHERS: list[tuple[int, str, Make]] = [
     (5, "yes", lambda: talk(car(1.0, "on we go", M.QUERY_YN, A.LANE_FOLLOW), human(3.0, "sure", M.REPLY_Y))),
     (6, "confirmed", lambda: talk(car(1.0, "KFC, then", M.CHECK, KFC), human(3.0, "that one", M.CONFIRM))),
     (7, "understood", lambda: talk(human(1.0, "got me", M.ALIGN), car(3.0, "I have", M.ACKNOWLEDGE))),
-    (9, "told", lambda: talk(
+    (9, "instructed", lambda: talk(
         exception(1.0, "place_prop", x=60.0, y=0.0),
         car(8.0, "something lies across our lane", M.EXPLAIN, OBJ.STATIC),
         human(11.0, "round it over Fuller", M.INSTRUCT, FULLER),

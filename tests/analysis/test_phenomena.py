@@ -63,7 +63,7 @@ PRESENT: dict[int, tuple[str, Make]] = {
     2: ("step", lambda: talk(human(1.0, "bear left", M.INSTRUCT, A.J_TURN), car(3.0, "sure", M.ACKNOWLEDGE))),
     3: ("two acts", lambda: talk(said(1.0, HUMAN, ("yep", act(M.REPLY_Y)), ("now right", act(M.INSTRUCT, A.J_TURN))))),
     4: (
-        "told",
+        "answered",
         lambda: talk(car(1.0, "left or right", M.QUERY_W, A.QUERIED), human(3.0, "left", M.REPLY_W, A.J_TURN), TURNED),
     ),
     5: ("unsure", lambda: talk(car(1.0, "drive on", M.QUERY_YN, A.LANE_FOLLOW), human(3.0, "who knows", M.REPLY_U))),
@@ -119,7 +119,7 @@ PRESENT: dict[int, tuple[str, Make]] = {
             human(30.0, "on second thoughts, KFC", M.INSTRUCT, KFC),
         ),
     ),
-    14: ("told", lambda: talk(subgoal(5.0, "KFC", "Complete"), human(7.0, "that's lunch", M.EXPLAIN, S.COMPLETE))),
+    14: ("reported", lambda: talk(subgoal(5.0, "KFC", "Complete"), human(7.0, "that's lunch", M.EXPLAIN, S.COMPLETE))),
     15: (
         "not seen",
         lambda: talk(

@@ -35,7 +35,7 @@ PHENOMENA: Final[tuple[Phenomenon, ...]] = (
         cause="the car turns at a junction",
         has_cause=routes.turns_at_junctions,
         find=routes.asked_at_junction,
-        forms=("told",),
+        forms=("answered",),
     ),
     _always(5, "yes/no question answered", questions.yes_no, "yes", "no", "unsure"),
     _always(6, "check, and its answer", questions.check, "confirmed", "denied"),
@@ -54,7 +54,7 @@ PHENOMENA: Final[tuple[Phenomenon, ...]] = (
         cause="the car comes near an object placed on the road",
         has_cause=changes.meets_roadblock,
         find=changes.roadblock,
-        forms=("proposed", "told"),
+        forms=("proposed", "instructed"),
     ),
     Phenomenon(
         number=10,
@@ -76,7 +76,7 @@ PHENOMENA: Final[tuple[Phenomenon, ...]] = (
         cause="a goal is reached before the end of the drive",
         has_cause=changes.completes,
         find=changes.completion,
-        forms=("told", "asked"),
+        forms=("reported", "asked"),
     ),
     _always(15, "perception asked for", questions.perception, "seen", "not seen"),
     Phenomenon(

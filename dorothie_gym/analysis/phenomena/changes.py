@@ -85,7 +85,7 @@ def roadblock(talk: DialogueView) -> Iterator[Occurrence]:
         instruction = next((t for t in following if t.speaker is HUMAN and t.does(M.INSTRUCT, M.REPLY_W)), None)
         first = proposal or instruction
         if first is not None and _goes_another_way(talk, since=turn.start, until=first.end + SETTLEMENT_WINDOW):
-            yield Occurrence(turn, "proposed" if proposal is not None else "told")
+            yield Occurrence(turn, "proposed" if proposal is not None else "instructed")
 
 
 def _goes_another_way(talk: DialogueView, *, since: float, until: float) -> bool:
@@ -203,7 +203,7 @@ def completion(talk: DialogueView) -> Iterator[Occurrence]:
             places = labels(turn.names(Slot.LANDMARK))
             is_it = not places or str(event.data.get("landmark")) in places
             if turn.speaker is HUMAN and turn.mentions(GoalStatus.COMPLETE) and turn.does(M.EXPLAIN) and is_it:
-                yield Occurrence(turn, "told")
+                yield Occurrence(turn, "reported")
             elif turn.speaker is CAR and asks_where_next(talk, turn.number):
                 yield Occurrence(turn, "asked")
 

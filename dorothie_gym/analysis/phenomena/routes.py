@@ -73,7 +73,7 @@ def asked_at_junction(talk: DialogueView) -> Iterator[Occurrence]:
             continue
         for answer in talk.replies(turn, M.REPLY_W, M.INSTRUCT):
             if answer.names(Slot.ACTION) & _WAYS or answer.names(Slot.STREET):
-                yield Occurrence(turn, "told")
+                yield Occurrence(turn, "answered")
                 break
 
 
