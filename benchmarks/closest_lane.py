@@ -20,7 +20,7 @@ REPEATS = 5
 
 def main(
     town: Annotated[str, typer.Argument(help="name or file of a town")] = "brookside",
-    points: Annotated[int, typer.Option(help="places asked for in each run")] = 300,
+    points: Annotated[int, typer.Option(help="number of lookups per run")] = 300,
     as_json: Annotated[bool, typer.Option("--json")] = False,
 ) -> None:
     """Times both on random places near the roads and prints medians of five runs."""
@@ -56,7 +56,7 @@ def main(
 
 
 def seconds(work: Callable[[], object]) -> float:
-    """Median time of a piece of work."""
+    """Returns the median time of a function [s]."""
     times = []
     for _ in range(REPEATS):
         start = time.perf_counter()

@@ -175,6 +175,6 @@ def _count(number: int, noun: str) -> str:
 
 
 def _sizes(sizes: Sequence[int]) -> str:
-    """Sizes of components with how many there are of each: "142, 3 of 1"."""
+    """Returns the sizes of components with the number of each: "142, 3 of 1"."""
     counts = Counter(sizes)
     return ", ".join(f"{count} of {size}" if count > 1 else str(size) for size, count in counts.items())

@@ -126,7 +126,7 @@ def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
     console.print()
     console.print(_diversity(table["diversity"]))
     if census.incomplete:
-        console.print(f"Cut off, but counted: {', '.join(census.incomplete)}.", style="yellow", markup=False)
+        console.print(f"Incomplete, but counted: {', '.join(census.incomplete)}.", style="yellow", markup=False)
     if picture is not None:
         console.print(f"Picture: {picture}", style="dim", markup=False, soft_wrap=True)
 
@@ -135,7 +135,7 @@ def _table2(table: Facts) -> Table:
     from dorothie_gym.analysis import PAPER
 
     shown = Table(box=None, pad_edge=False)
-    for title in ("", "here", "paper", "a session here", "in the paper"):
+    for title in ("", "here", "paper", "per session here", "in the paper"):
         shown.add_column(title, justify="right" if title else "left", no_wrap=True)
     for title, key in _ROWS:
         mine, paper = table[key], PAPER[key]
@@ -172,8 +172,8 @@ def _anchors(anchors: Facts) -> Table:
     from dorothie_gym.analysis.corpus_stats import ANCHOR_TOLERANCE
 
     shown = Table(box=None, pad_edge=False)
-    for title in ("how easy the tasks are", "here", "allowed", "paper", "unseen"):
-        shown.add_column(title, justify="left" if title.startswith("how") else "right", no_wrap=True)
+    for title in ("majority baselines", "here", "allowed", "paper", "unseen"):
+        shown.add_column(title, justify="left" if title.startswith("majority") else "right", no_wrap=True)
     shown.add_column("", no_wrap=True)
     for title, key in _ANCHORS:
         row = anchors[key]
@@ -191,7 +191,7 @@ def _diversity(diversity: Facts) -> Table:
     from dorothie_gym.analysis.diversity import has_language_models
 
     shown = Table(box=None, pad_edge=False)
-    shown.add_column("how varied the talk is")
+    shown.add_column("diversity of the dialogue")
     shown.add_column("", justify="right")
     shown.add_column("")
     shown.add_row("distinct utterances", _percent(diversity["distinct_utterance_ratio"]), "")
@@ -245,7 +245,7 @@ def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
     for verdict in verdicts:
         interval = "-" if verdict.low is None else f"{verdict.low:+.3f} to {verdict.high:+.3f}"
         difference = "-" if verdict.difference is None else f"{verdict.difference:+.3f}"
-        verdict_text, style = ("holds", "") if verdict.holds else ("not so", "yellow")
+        verdict_text, style = ("holds", "") if verdict.holds else ("does not hold", "yellow")
         shown.add_row(verdict.claim.title, difference, interval, verdict_text, style=style)
     console = stdout()
     console.print(shown)
