@@ -53,14 +53,15 @@ def inlined(function: F) -> F:
 
 
 def _compile(function: F, **options: bool) -> F:
+    # numba's stubs know only some of the options
     try:
-        cached: F = numba.njit(cache=True, fastmath=False, **options)(function)
+        cached: F = numba.njit(cache=True, fastmath=False, **options)(function)  # pyright: ignore[reportCallIssue, reportArgumentType]
         return cached
     except RuntimeError as error:
         if "no locator available" not in str(error):
             raise
     _warn_once()
-    uncached: F = numba.njit(cache=False, fastmath=False, **options)(function)
+    uncached: F = numba.njit(cache=False, fastmath=False, **options)(function)  # pyright: ignore[reportCallIssue, reportArgumentType]
     return uncached
 
 

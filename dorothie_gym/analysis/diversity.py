@@ -111,6 +111,7 @@ def _padded(words: Sequence[str]) -> list[str]:
 class _LanguageModel(Protocol):
     def unmasked_score(self, word: str, context: tuple[str, ...]) -> float:
         """Returns the probability of a word after its context."""
+        ...
 
 
 def _fitted(sentences: Sequence[Sequence[str]]) -> _LanguageModel:

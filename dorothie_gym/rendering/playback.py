@@ -67,7 +67,7 @@ class Playback:
         """Returns the session at a frame (30 Hz)."""
         header, time = self._session.header, frame / FRAME_RATE
         goals = self._goals(frame)
-        states = {header.subgoals[i]["landmark"]: state for i, (_, state) in goals.items()}
+        states: dict[object, SubgoalState] = {header.subgoals[i]["landmark"]: state for i, (_, state) in goals.items()}
         weather = self._session.scene.weather.at(frame)
         car = self._car(frame)
         driven = int(np.searchsorted(self._trail_frames, frame, side="right"))

@@ -29,14 +29,17 @@ class PlannedSession(Protocol):
     @property
     def town(self) -> str:
         """Name or file of the town."""
+        ...
 
     @property
     def seed(self) -> int:
         """Seed of the session."""
+        ...
 
     @property
     def path(self) -> str:
         """Folder of the session within the folder of all sessions."""
+        ...
 
 
 @contextlib.contextmanager

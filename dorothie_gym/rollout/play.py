@@ -22,6 +22,7 @@ class SessionHost(Protocol):
     @property
     def engine(self) -> SessionEngine:
         """Engine of the sessions."""
+        ...
 
     def reset(self, seed: int | None = None) -> object:
         """Begins a session."""

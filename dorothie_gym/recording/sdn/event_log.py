@@ -155,8 +155,11 @@ def _status_of(value: object) -> dict[str, object] | None:
         value = [value.get("landmark"), value.get("status")]
     if not isinstance(value, list) or len(value) != 2:
         return None
+    landmark, status = value
+    if not isinstance(landmark, str) or not isinstance(status, str):
+        return None
     try:
-        return {"landmark": parse_landmark(value[0]).label, "status": parse_goal_status(value[1]).label}
+        return {"landmark": parse_landmark(landmark).label, "status": parse_goal_status(status).label}
     except OntologyError:
         return None
 

@@ -29,14 +29,17 @@ class RecordArray(Protocol[Record]):
     @property
     def dtype(self) -> np.dtype[np.void]:
         """Fields of the records."""
+        ...
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Numbers of records along the axes."""
+        ...
 
     @property
     def nbytes(self) -> int:
         """Memory of the array [bytes]."""
+        ...
 
     def __len__(self) -> int: ...
 
@@ -55,9 +58,11 @@ class RecordArray(Protocol[Record]):
 
     def tolist(self) -> list[tuple[Any, ...]]:
         """Returns the records as tuples of plain numbers."""
+        ...
 
     def tobytes(self) -> bytes:
         """Returns the memory of the records."""
+        ...
 
 
 class RandomBody(Protocol):
