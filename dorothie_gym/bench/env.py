@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 WARM_UP_DECISIONS: Final = 60
 """Decisions before the measurement: 30 s."""
 
-MAX_SECONDS: Final = 86400.0
+UNREACHED_TIME_LIMIT: Final = 86400.0
 """Time limit of measured sessions, which none of them reaches [s]."""
 
 ENV, STOCK, SUMO = "DuoWizardEnv", "intersection-v0", "SUMO"
@@ -45,7 +45,7 @@ class IdleSession:
 
     def __init__(self, town: str, vehicles: int, pedestrians: int, seed: int) -> None:
         world = WorldConfig(vehicles=vehicles, pedestrians=pedestrians)
-        self.env = DuoWizardEnv(town, config=EnvConfig(world=world, max_seconds=MAX_SECONDS))
+        self.env = DuoWizardEnv(town, config=EnvConfig(world=world, max_seconds=UNREACHED_TIME_LIMIT))
         self._actions = {str(role): noop(role, self.env.limits) for role in AGENT_ROLES}
         self.env.reset(seed=seed)
         self.seconds(WARM_UP_DECISIONS, time.process_time)

@@ -270,10 +270,10 @@ def _count(count: int, noun: str) -> str:
 
 # --- Chart ------------------------------------------------------------------------------------------------------------
 
-WIDTH: Final = 9.0
+CHART_WIDTH: Final = 9.0
 """Width of the chart [inches]."""
 
-DOTS_PER_INCH: Final = 150
+CHART_DPI: Final = 150
 """Resolution of the chart."""
 
 _ROW_HEIGHT, _MARGINS = 0.72, 1.95
@@ -298,7 +298,7 @@ def draw(report: Report, path: Path) -> None:
     with rc_context({"font.family": _FONT}):
         rows, notes = _ROW_HEIGHT * len(report.rows), 0.2 * len(report.notes)
         height = rows + _MARGINS + notes
-        figure = Figure(figsize=(WIDTH, height), dpi=DOTS_PER_INCH, facecolor=SHEET)
+        figure = Figure(figsize=(CHART_WIDTH, height), dpi=CHART_DPI, facecolor=SHEET)
         FigureCanvasAgg(figure)
         _write_texts(figure, report, height)
         axes = figure.add_axes(

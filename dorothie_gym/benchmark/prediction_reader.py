@@ -86,9 +86,9 @@ def read_about(path: Path | str) -> dict[str, object]:
         PredictionError: the file is no Parquet file, or its metadata is not valid JSON.
         OSError: it cannot be read.
     """
-    told = (_open(Path(path)).schema.metadata or {}).get(ABOUT)
+    about = (_open(Path(path)).schema.metadata or {}).get(ABOUT)
     try:
-        value = {} if told is None else json.loads(told)
+        value = {} if about is None else json.loads(about)
     except ValueError as error:
         raise PredictionError(
             f"{path}: {ABOUT.decode()} in its metadata is not valid JSON ({error}); {_PAGE}"

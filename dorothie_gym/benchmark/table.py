@@ -138,7 +138,7 @@ class ResultsTable:
     def to_json(self) -> dict[str, object]:
         """Returns everything as JSON types; None where a figure is undefined.
 
-        `models.<name>.<part>.<metric>` = {mean, half_width, seeds, values}; the rest is told in docs/predictions.md.
+        `models.<name>.<part>.<metric>` = {mean, half_width, seeds, values}; docs/predictions.md describes the rest.
         """
         return {
             "version": TABLE_VERSION,

@@ -212,7 +212,7 @@ class WorldEventLog:
     """Collects what happens to the car.
 
     Attributes:
-        infractions: how often each rule has been broken, collisions of whosever making among them.
+        infractions: how often each rule has been broken, including collisions caused by others.
     """
 
     def __init__(self, network: TownNetwork, length: float) -> None:

@@ -44,7 +44,7 @@ from dorothie_gym.spaces import (
     heard_acts,
 )
 
-_TOLD_WAYS: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
+_DIRECTION_VALUES: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 """Slot values whose wording contains a direction."""
 
 _UNSAID: Final = Span("-", DialogueAct(DialogueMove.IRRELEVANT))
@@ -146,8 +146,8 @@ def _understood(model: TownModel, history: History, heard: tuple[Span, ...]) -> 
 def _answer(model: TownModel, history: History, voice: SpeechState, deed: FeasibleAction) -> SpeechState:
     """Returns the speech state with the predicted act, worded by the grammar."""
     act = _act(model.answer(history.said(Role.CO_WIZARD, (_UNSAID,), history.frame + FRAMES_PER_TENTH), Task.RFN))
-    told = deed.direction if any(value in _TOLD_WAYS for value in act.slots) else None
-    return voice.plan(remark(act.move, *act.ordered, wording=Wording(direction=told)))
+    direction = deed.direction if any(value in _DIRECTION_VALUES for value in act.slots) else None
+    return voice.plan(remark(act.move, *act.ordered, wording=Wording(direction=direction)))
 
 
 def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, waits: bool) -> FeasibleAction:
@@ -171,7 +171,7 @@ def _drive(model: TownModel, history: History, view: CoWizardView, town: Town, w
 
 
 def _act(predicted: Predicted) -> DialogueAct:
-    values = [value for value, told in zip(LABELS, predicted.slots[0].tolist(), strict=True) if told]
+    values = [value for value, present in zip(LABELS, predicted.slots[0].tolist(), strict=True) if present]
     return DialogueAct.of(DialogueMove(int(predicted.move)), *values)
 
 

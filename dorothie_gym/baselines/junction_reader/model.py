@@ -139,8 +139,8 @@ class JunctionReader(TOTO):
         named = torch.from_numpy(mentions(texts)).float()
         self.pieces = torch.cat((pieces, pieces.new_full((1, pieces.shape[1]), PAD)))
         self.mentions = torch.cat((named, named.new_zeros(1, len(LABELS))))
-        told = torch.from_numpy(ways(texts)).float()
-        self.ways = torch.cat((told, told.new_zeros(1, told.shape[1])))
+        directions = torch.from_numpy(ways(texts)).float()
+        self.ways = torch.cat((directions, directions.new_zeros(1, directions.shape[1])))
 
     def _keep_exits(self, columns: Columns, towns: Towns) -> None:
         tables = [exit_table(graph) for graph in columns.towns]
@@ -160,9 +160,9 @@ class JunctionReader(TOTO):
         last, exits, there, angles = self._look(inputs, labels.task)
         move, values = self._act(inputs, labels.task, last)
         action, side, direction = self._decision(last)
-        told = F.cross_entropy(move, labels.move.clamp(min=0), reduction="none")
+        moves = F.cross_entropy(move, labels.move.clamp(min=0), reduction="none")
         slots = F.binary_cross_entropy_with_logits(values, labels.slots, reduction="none").sum(-1)
-        act = self.config.loss.move * told + self.config.loss.slot_values * slots
+        act = self.config.loss.move * moves + self.config.loss.slot_values * slots
         choice = self._exit_loss(exits, there, angles, labels)
         turned = F.cross_entropy(side, (labels.angle < 0).long(), reduction="none")
         takes_side = torch.tensor(TAKES_SIDE, device=last.device)[labels.action.clamp(min=0)]
