@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from dorothie_gym.bench.report import (
-    DOTS_PER_INCH,
-    WIDTH,
+    CHART_DPI,
+    CHART_WIDTH,
     Report,
     draw,
     env_report,
@@ -92,7 +92,7 @@ def test_chart_fits_its_texts(report: Any, figures: dict[str, Any], tmp_path: Pa
     path = tmp_path / "chart.png"
     draw(reported(report, figures), path)
     picture = pygame.image.load(str(path))
-    assert picture.get_width() == WIDTH * DOTS_PER_INCH
+    assert picture.get_width() == CHART_WIDTH * CHART_DPI
     for x, y in ((0, 0), (picture.get_width() - 1, 0), (0, picture.get_height() - 1)):
         assert picture.get_at((x, y)) == picture.get_at((3, 3)), "no text crosses the edge"
     assert path.stat().st_size < 150_000
