@@ -112,12 +112,13 @@ class ObservationBuilder:
         if participant is not None or co_wizard is not None:
             true, believed = participant or self._unread[Role.PARTICIPANT], co_wizard or self._unread[Role.CO_WIZARD]
             ego.write_objects(true["objects"], believed["objects"])
+        motion = self._numbers[self.motion()]
         if participant is not None:
             self._build_participant(participant, delivered)
         if co_wizard is not None:
-            self._build_co_wizard(co_wizard, delivered, ego)
+            self._build_co_wizard(co_wizard, delivered, ego, motion)
         if ad_wizard is not None:
-            self._build_ad_wizard(ad_wizard, delivered)
+            self._build_ad_wizard(ad_wizard, delivered, participant, motion)
         return views
 
     def _build_participant(self, view: Observation, delivered: DeliveredMessages) -> None:
@@ -128,18 +129,26 @@ class ObservationBuilder:
         view["speaking"][0] = delivered.speaking[Role.PARTICIPANT]
         self._write_utterance(Role.CO_WIZARD, delivered.heard.get(Role.CO_WIZARD), view)
 
-    def _build_co_wizard(self, view: Observation, delivered: DeliveredMessages, ego: EgoMeasurements) -> None:
+    def _build_co_wizard(
+        self, view: Observation, delivered: DeliveredMessages, ego: EgoMeasurements, motion: np.int64
+    ) -> None:
         self._write_believed_place(view, ego.pose)
         self._write_exits(view["exits"], ego)
         view["lights"] = self._numbers[self._world.ego.lights]
-        view["motion"] = self._numbers[self.motion()]
+        view["motion"] = motion
         view["speaking"][0] = delivered.speaking[Role.CO_WIZARD]
         self._write_driving(view)
         self._write_utterance(Role.PARTICIPANT, delivered.heard.get(Role.PARTICIPANT), view)
 
-    def _build_ad_wizard(self, view: Observation, delivered: DeliveredMessages) -> None:
-        self._write_true_place(view)
-        view["motion"] = self._numbers[self.motion()]
+    def _build_ad_wizard(
+        self, view: Observation, delivered: DeliveredMessages, participant: Observation | None, motion: np.int64
+    ) -> None:
+        if participant is None:
+            self._write_true_place(view)
+        else:
+            view["pose"][:], view["station"][:] = participant["pose"], participant["station"]
+            view["lane"] = participant["lane"]
+        view["motion"] = motion
         view["story"] = self._story
         self._write_props(view["props"])
         for speaker in (Role.PARTICIPANT, Role.CO_WIZARD):

@@ -85,6 +85,7 @@ class LiveSession:
         self.messages: list[tuple[float, str]] = []
         self.trail: list[tuple[float, float]] = [self._ego_position()]
         self._end_reason: str | None = None
+        self._infractions: dict[str, int] | None = None
         self._delivered = self._deliver("")
 
     # --- one decision -----------------------------------------------------------------------------------------------
@@ -98,6 +99,7 @@ class LiveSession:
         spoken = {role: self._speak(role, actions[role]) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
         self._play_co_wizard(actions[Role.CO_WIZARD])
         self._log.add_world_events(self.world.step(self.config.frames))
+        self._infractions = None
         position = self._ego_position()
         if self.world.car.speed <= EGO_STANDING:
             self._subgoals.note_arrivals(*position)
@@ -147,10 +149,12 @@ class LiveSession:
         return self._dialogue.said
 
     @property
-    def infractions(self) -> dict[str, int]:
+    def infractions(self) -> Mapping[str, int]:
         """Number of infractions so far by kind, collisions of any cause included."""
-        counts = self.world.reports.infractions
-        return {name: counts.get(kind, 0) for name, kind in _INFRACTIONS}
+        if self._infractions is None:
+            counts = self.world.reports.infractions
+            self._infractions = {name: counts.get(kind, 0) for name, kind in _INFRACTIONS}
+        return self._infractions
 
     # --- actions of the roles ---------------------------------------------------------------------------------------
 
@@ -244,7 +248,7 @@ class LiveSession:
             arrived=self.task.done,
             subgoals=SubgoalCounts(live=len(self.task.live), reached=self._subgoals.reached),
             collisions=self.world.collisions,
-            infractions=self.infractions,
+            infractions=dict(self.infractions),
             seconds=round(self.world.time, 3),
             utterances=counts["utterances"],
             acts=counts["acts"],
@@ -406,9 +410,9 @@ class SessionEngine:
         """
         session = self.session
         return {
-            "action_mask": self.mask(role),
-            "reward_terms": dict(terms or {}),
-            "refused": list(session.refused[role]),
+            "action_mask": session.masks.mask(role),
+            "reward_terms": dict(terms) if terms else {},
+            "refused": session.refused[role].copy(),
             "infractions": dict(session.infractions),
         }
 

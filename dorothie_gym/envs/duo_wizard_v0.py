@@ -34,6 +34,8 @@ from dorothie_gym.tasks import StoryboardTemplate
 
 _METADATA: dict[str, object] = {"name": "duo_wizard_v0", **METADATA, "is_parallelizable": True}
 
+_AGENTS = {str(role): role for role in AGENT_ROLES}
+
 
 class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
     """Dialogue of three agents while a car drives through a town.
@@ -129,7 +131,7 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
         observations = self.engine.reset(seed, scenario=scenario_option(options))
         self.agents = list(self.possible_agents)
         self._render_window()
-        return observations.of(), {str(role): self.engine.info(role) for role in AGENT_ROLES}
+        return observations.of(), {agent: self.engine.info(role) for agent, role in _AGENTS.items()}
 
     def step(
         self, actions: Mapping[str, ActionMapping]
@@ -150,11 +152,11 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
             return {}, {}, {}, {}, {}
         outcome = self.engine.step(actions)
         terms = outcome.reward_terms
-        rewards = {str(role): float(sum(terms[role].values())) for role in AGENT_ROLES}
-        infos = {str(role): self.engine.info(role, terms[role]) for role in AGENT_ROLES}
+        rewards = {agent: float(sum(terms[role].values())) for agent, role in _AGENTS.items()}
+        infos = {agent: self.engine.info(role, terms[role]) for agent, role in _AGENTS.items()}
         terminations = dict.fromkeys(self.agents, outcome.terminated)
         truncations = dict.fromkeys(self.agents, outcome.truncated)
-        if self.engine.over:
+        if outcome.terminated or outcome.truncated:
             self.agents = []
         self._render_window()
         return self.engine.observations.of(), rewards, terminations, truncations, infos
