@@ -66,18 +66,19 @@ class RewardWeights:
             refusals: number of refused actions, by role.
             spoken: whether an utterance span began, for the roles that speak.
         """
-        shared = {
-            "subgoal": self.subgoal * reached,
-            "success": self.success * success,
-            "collision": self.collision * collisions,
-            "time": self.time / decision_frequency,
-        }
+        subgoal, success_reward = self.subgoal * reached, self.success * success
+        collision, time = self.collision * collisions, self.time / decision_frequency
         terms: dict[Role, RewardTerms] = {}
         for role, sign in _SIGNS:
-            terms[role] = {name: sign * value for name, value in shared.items()}
-            terms[role]["refusal"] = self.refusal * refusals[role]
+            own = terms[role] = {
+                "subgoal": sign * subgoal,
+                "success": sign * success_reward,
+                "collision": sign * collision,
+                "time": sign * time,
+                "refusal": self.refusal * refusals[role],
+            }
             if role in spoken:
-                terms[role]["talk"] = self.talk * spoken[role]
+                own["talk"] = self.talk * spoken[role]
         return terms
 
 

@@ -90,8 +90,8 @@ class ObservationBuilder:
         self._versions = (-1, -1)
         self._write_constants(scenario)
 
-    def build(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[Role, Observation]:
-        """Builds the observations of some roles, each in its observation space.
+    def build(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[str, Observation]:
+        """Builds the observations of some roles, by agent, each in its observation space.
 
         Args:
             delivered: speech and messages of the last decision.
@@ -99,9 +99,9 @@ class ObservationBuilder:
         """
         self._update_templates()
         time, speed = self._world.time, self._world.car.speed
-        views: dict[Role, Observation] = {}
+        views: dict[str, Observation] = {}
         for role in roles:
-            view = views[role] = self._buffers[role].copy()
+            view = views[_NAMES[role]] = self._buffers[role].copy()
             view["time"][0], view["speed"][0] = time, speed
         ego = EgoMeasurements(self._world)
         participant, co_wizard = views.get(Role.PARTICIPANT), views.get(Role.CO_WIZARD)
@@ -114,15 +114,15 @@ class ObservationBuilder:
             ego.write_objects(true["objects"], believed["objects"])
         motion = self._numbers[self.motion()]
         if participant is not None:
-            self._build_participant(participant, delivered)
+            self._build_participant(participant, delivered, ego)
         if co_wizard is not None:
             self._build_co_wizard(co_wizard, delivered, ego, motion)
         if ad_wizard is not None:
-            self._build_ad_wizard(ad_wizard, delivered, participant, motion)
+            self._build_ad_wizard(ad_wizard, delivered, ego, motion)
         return views
 
-    def _build_participant(self, view: Observation, delivered: DeliveredMessages) -> None:
-        self._write_true_place(view)
+    def _build_participant(self, view: Observation, delivered: DeliveredMessages, ego: EgoMeasurements) -> None:
+        self._write_true_place(view, ego)
         view["lights"] = self._numbers[self._world.ego.lights]
         view["story"], view["tasks"] = self._story, self._tasks
         view["message"] = plain_text(delivered.message, MESSAGE_LENGTH) if delivered.message else ""
@@ -141,13 +141,9 @@ class ObservationBuilder:
         self._write_utterance(Role.PARTICIPANT, delivered.heard.get(Role.PARTICIPANT), view)
 
     def _build_ad_wizard(
-        self, view: Observation, delivered: DeliveredMessages, participant: Observation | None, motion: np.int64
+        self, view: Observation, delivered: DeliveredMessages, ego: EgoMeasurements, motion: np.int64
     ) -> None:
-        if participant is None:
-            self._write_true_place(view)
-        else:
-            view["pose"][:], view["station"][:] = participant["pose"], participant["station"]
-            view["lane"] = participant["lane"]
+        self._write_true_place(view, ego)
         view["motion"] = motion
         view["story"] = self._story
         self._write_props(view["props"])
@@ -212,10 +208,10 @@ class ObservationBuilder:
 
     # --- values of the present decision -----------------------------------------------------------------------------
 
-    def _write_true_place(self, view: Observation) -> None:
+    def _write_true_place(self, view: Observation, ego: EgoMeasurements) -> None:
         """Writes the true pose and place of the ego."""
-        car, planner = self._world.car, self._world.planner
-        view["pose"][:2], view["pose"][2] = car.position, car.heading
+        planner = self._world.planner
+        view["pose"][:] = ego.true_pose
         view["lane"] = self._numbers[planner.lane]
         view["station"][0] = planner.station
 
@@ -262,6 +258,7 @@ class ObservationBuilder:
                 view[f"{speaker}_slots"][k] = encode_slots(act.slots)
 
 
+_NAMES = {role: str(role) for role in AGENT_ROLES}
 _TEXT = {role: f"{role}_text" for role in Role}
 
 
@@ -337,9 +334,11 @@ class LazyObservations(Mapping[str, Observation]):
 
     def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
         """Returns the observations of some roles by agent; those that are missing are built together."""
-        missing = [role for role in roles if role not in self._built]
-        if missing:
-            if self._session.decisions != self._decision:
-                raise RuntimeError(f"the session has taken a step since; the observation of {missing[0]} was not read")
-            self._built.update(self._session.observations(missing))
-        return {str(role): self._built[role] for role in roles}
+        missing = [role for role in roles if role not in self._built] if self._built else roles
+        if not missing:
+            return {_NAMES[role]: self._built[role] for role in roles}
+        if self._session.decisions != self._decision:
+            raise RuntimeError(f"the session has taken a step since; the observation of {missing[0]} was not read")
+        found = self._session.observations(missing)
+        self._built.update(found)
+        return found if missing is roles else {_NAMES[role]: self._built[role] for role in roles}

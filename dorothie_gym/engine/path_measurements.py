@@ -217,6 +217,7 @@ class EgoMeasurements:
 
     Attributes:
         pose: estimated pose (x, y, heading) [m, m, rad].
+        true_pose: true pose (x, y, heading) [m, m, rad].
         progress: estimated distance along the planned path [m]; the true distance before `write_path`.
     """
 
@@ -225,8 +226,8 @@ class EgoMeasurements:
         self._world = world
         self.pose = world.localizer.pose
         self._x, self._y, self._heading = self.pose.tolist()
-        self._true_x, self._true_y = car.position.tolist()
-        self._true_heading = float(car.heading)
+        x, y = car.position.tolist()
+        self.true_pose = x, y, car.heading
         self._path, self._near = planner.path, planner.s
         self.progress = self._near
 
@@ -243,7 +244,7 @@ class EgoMeasurements:
                 its start.
         """
         path = self._path
-        error = math.hypot(self._x - self._true_x, self._y - self._true_y)
+        error = math.hypot(self._x - self.true_pose[0], self._y - self.true_pose[1])
         self.progress = write_path(
             path.s, path.points, path.lanes, path.heading, self._near, spacing,
             self._x, self._y, SEARCH + 2.0 * error, waypoints, path_lanes, believed_waypoints,
@@ -254,9 +255,9 @@ class EgoMeasurements:
 
         Distance and bearing in both tables are relative to the ego.
         """
-        turn = self._heading - self._true_heading
+        turn = self._heading - self.true_pose[2]
         write_objects(
-            self._world.senses, self._world.frame, self._true_x, self._true_y, self._true_heading,
+            self._world.senses, self._world.frame, *self.true_pose,
             self._x, self._y, math.cos(turn), math.sin(turn), objects, believed,
         )  # fmt: skip
 

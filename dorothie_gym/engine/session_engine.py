@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,6 @@ from dorothie_gym.spaces import (
 )
 from dorothie_gym.tasks import StoryboardTemplate, TaskState, load_template
 
-_AGENTS = {str(role): role for role in AGENT_ROLES}
 _INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
 
@@ -59,6 +58,7 @@ class LiveSession:
         messages: messages of the Ad-Wizard so far, with their times [s].
         trail: positions of the ego [m], one for each decision.
         decisions: decisions played so far.
+        over: whether the session is closed.
     """
 
     def __init__(
@@ -84,7 +84,8 @@ class LiveSession:
         self.decisions = 0
         self.messages: list[tuple[float, str]] = []
         self.trail: list[tuple[float, float]] = [self._ego_position()]
-        self._end_reason: str | None = None
+        self.over = False
+        self._end_reason = ""
         self._infractions: dict[str, int] | None = None
         self._delivered = self._deliver("")
 
@@ -98,7 +99,8 @@ class LiveSession:
         message = self._play_ad_wizard(actions[Role.AD_WIZARD])
         spoken = {role: self._speak(role, actions[role]) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
         self._play_co_wizard(actions[Role.CO_WIZARD])
-        self._log.add_world_events(self.world.step(self.config.frames))
+        for event in self.world.step(self.config.frames):
+            self._log.add_world_event(event)
         self._infractions = None
         position = self._ego_position()
         if self.world.car.speed <= EGO_STANDING:
@@ -116,17 +118,12 @@ class LiveSession:
 
     def observations(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
         """Builds the observations of some roles, by agent; what several of them need is computed once."""
-        return {str(role): found for role, found in self._observations.build(self._delivered, roles).items()}
+        return self._observations.build(self._delivered, roles)
 
     def end(self, reason: str) -> None:
         """Closes the session."""
         self._log.add(EventType.END, Role.AGENT, {"success": self.success, "reason": reason})
-        self._end_reason = reason
-
-    @property
-    def over(self) -> bool:
-        """Whether the session is closed."""
-        return self._end_reason is not None
+        self.over, self._end_reason = True, reason
 
     @property
     def success(self) -> bool:
@@ -258,7 +255,7 @@ class LiveSession:
             exchanges=self._dialogue.exchanges,
             transactions=self._dialogue.transactions,
         )
-        if self._end_reason is not None:
+        if self.over:
             summary["reason"] = self._end_reason
         return summary
 
@@ -266,8 +263,7 @@ class LiveSession:
 # --- sessions of a town -----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, kw_only=True)
-class StepOutcome:
+class StepOutcome(NamedTuple):
     """Outcome of one decision.
 
     Attributes:
@@ -316,7 +312,7 @@ class SessionEngine:
         self.max_cycles = max_cycles
         self.limits = SpaceLimits.for_town(self.town)
         self._network = TownNetwork(self.town)
-        self._decoders = {role: ActionDecoder(role, self.limits) for role in AGENT_ROLES}
+        self._decoders = {str(role): (role, ActionDecoder(role, self.limits)) for role in AGENT_ROLES}
         self._seeds = np.random.default_rng()
         self._session: LiveSession | None = None
         self._observations: LazyObservations | None = None
@@ -359,14 +355,14 @@ class SessionEngine:
         if session.over:
             raise RuntimeError("the session is over: call reset() first")
         decoded = {}
-        for agent, role in _AGENTS.items():
+        for agent, (role, decoder) in self._decoders.items():
             if agent not in actions:
-                raise ValueError(f"the action of {agent} is missing; it is needed from {', '.join(_AGENTS)}")
-            decoded[role] = self._decoders[role](actions[agent])
+                raise ValueError(f"the action of {agent} is missing; it is needed from {', '.join(self._decoders)}")
+            decoded[role] = decoder(actions[agent])
         self._observations = None
         terms = session.step(decoded)
         terminated = session.task.done
-        truncated = self._out_of_time(session) and not terminated
+        truncated = not terminated and self._out_of_time(session)
         if terminated or truncated:
             session.end("arrived" if terminated else "out of time")
         return StepOutcome(reward_terms=terms, terminated=terminated, truncated=truncated)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import NotRequired, TypeAlias, TypedDict
 
 from dorothie_gym.engine.dialogue_channel import DialogueChannel
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.ontology import AGENT_ROLES, ARRIVAL_DISTANCE, Role
+from dorothie_gym.ontology import ARRIVAL_DISTANCE, Role
 from dorothie_gym.recording import Event, EventType
 from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.world import World
@@ -79,7 +79,7 @@ class EventLog:
     def clear(self) -> None:
         """Begins another decision."""
         self.events: list[Event] = []
-        self.refused: dict[Role, list[str]] = {role: [] for role in AGENT_ROLES}
+        self.refused: dict[Role, list[str]] = {Role.PARTICIPANT: [], Role.CO_WIZARD: [], Role.AD_WIZARD: []}
 
     def add(
         self,
@@ -94,10 +94,9 @@ class EventLog:
         at = self._world.frame if frame is None else frame
         self.events.append(Event(frame=at, type=kind, source=source, flagged=flagged, data=dict(data)))
 
-    def add_world_events(self, events: Iterable[WorldEvent]) -> None:
-        """Logs the events of a step of the world."""
-        for event in events:
-            self.add(_WORLD_EVENTS[event.kind], Role.AGENT, event.data, frame=event.frame)
+    def add_world_event(self, event: WorldEvent) -> None:
+        """Logs an event of the world."""
+        self.add(_WORLD_EVENTS[event.kind], Role.AGENT, event.data, frame=event.frame)
 
     def refuse(self, role: Role, action: str, reason: str) -> None:
         """Logs the refusal of an action."""

@@ -130,7 +130,8 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
         """
         observations = self.engine.reset(seed, scenario=scenario_option(options))
         self.agents = list(self.possible_agents)
-        self._render_window()
+        if self.render_mode == "human":
+            self.render()
         return observations.of(), {agent: self.engine.info(role) for agent, role in _AGENTS.items()}
 
     def step(
@@ -158,16 +159,13 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
         truncations = dict.fromkeys(self.agents, outcome.truncated)
         if outcome.terminated or outcome.truncated:
             self.agents = []
-        self._render_window()
+        if self.render_mode == "human":
+            self.render()
         return self.engine.observations.of(), rewards, terminations, truncations, infos
 
     def render(self) -> NDArray[np.uint8] | None:
         """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
         return self._view.render(self.session)
-
-    def _render_window(self) -> None:
-        if self.render_mode == "human":
-            self.render()
 
     def close(self) -> None:
         """Closes the window, if there is one."""

@@ -67,9 +67,10 @@ class LocalPlanner:
     @property
     def station(self) -> float:
         """Distance along that lane [m]."""
-        k = self.path.index_at(self.s)
-        ahead = self.s - float(self.path.s[k]) if not self.path.manoeuvre[k] else 0.0
-        return float(min(self.path.stations[k] + ahead, self._town.lanes[self.lane].length))
+        path = self.path
+        k = path.index_at(self.s)
+        ahead = self.s - float(path.s[k]) if not path.manoeuvre[k] else 0.0
+        return min(float(path.stations[k]) + ahead, self._town.lanes[int(path.lanes[k])].length)
 
     @property
     def height(self) -> float:
@@ -218,13 +219,15 @@ class LocalPlanner:
     def feasible(self, speed: float) -> FeasibleManoeuvres:
         """Returns the navigation actions that would be carried out at a speed [m/s]."""
         committed = self.is_committed(speed)
-        if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
+        lane = self._town.lanes[self.lane]
+        if self.in_manoeuvre or lane.in_junction:
             return FeasibleManoeuvres(False, False, False, False, not committed)
+        on_leftmost = self._town.neighbour(lane.id, LinkType.LANE_CHANGE_LEFT) is None
         return FeasibleManoeuvres(
             not committed and (self.held or self._manoeuvre is not None),
-            self.may_switch(LinkType.LANE_CHANGE_LEFT, speed),
+            not on_leftmost and self.may_switch(LinkType.LANE_CHANGE_LEFT, speed),
             self.may_switch(LinkType.LANE_CHANGE_RIGHT, speed),
-            self.may_turn_round(speed),
+            on_leftmost and self.may_turn_round(speed),
             not committed,
         )
 
@@ -235,16 +238,17 @@ class LocalPlanner:
     def _plan_switch(self, side: LinkType, speed: float) -> int | str:
         """Returns the lane to switch to, or the reason of a refusal."""
         name = "left" if side is LinkType.LANE_CHANGE_LEFT else "right"
-        if self.in_manoeuvre or self._town.lanes[self.lane].in_junction:
+        lane = self._town.lanes[self.lane]
+        if self.in_manoeuvre or lane.in_junction:
             return "the car is in the middle of a manoeuvre"
-        target = self._town.neighbour(self.lane, side)
+        target = self._town.neighbour(lane.id, side)
         if target is None:
             return f"there is no lane to the {name}"
-        if not has_room_to_switch(self._town.lanes[self.lane].length - self.station):
+        station = self.station
+        if not has_room_to_switch(lane.length - station):
             return f"there is no room left to switch to the {name}"
-        lane = self._town.lanes[target]
-        beside = lane.project(self._town.lanes[self.lane].position(self.station))[0]
-        if switch_is_blocked(self.props, lane, beside, speed):
+        beside = self._town.lanes[target]
+        if self.props and switch_is_blocked(self.props, beside, beside.project(lane.position(station))[0], speed):
             return f"a roadblock is too close on the lane to the {name}"
         return target
 
