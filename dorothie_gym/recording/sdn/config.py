@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology import parse_landmark, parse_street
+from dorothie_gym.ontology import parse_street
 from dorothie_gym.recording.header import LandmarkRow, SessionHeader, SubgoalRow
-from dorothie_gym.recording.json_io import Fields
 from dorothie_gym.recording.sdn.files import (
     CONFIG_FILE,
     DIALOG_FILE,
@@ -18,9 +19,9 @@ from dorothie_gym.recording.sdn.files import (
     number_of,
     plain,
     plain_object,
-    text_of,
     whole_of,
 )
+from dorothie_gym.recording.sdn.landmark_names import landmark_name
 from dorothie_gym.recording.sdn.trajectory import SdnMap
 from dorothie_gym.recording.validation import ReadReport
 
@@ -56,8 +57,11 @@ def header_of(
     environment = _environment(config)
     _note_fields(config, environment, DIALOG_FILE if layout is SdnLayout.HUB else CONFIG_FILE, report)
     given = environment.get("landmarks", config.get("landmarks"))
-    hidden = _hidden(task)
-    landmarks = [_landmark(row, place, hidden, report) for row in _rows(given)]
+    rows = _rows(given)
+    names = [_landmark_name(row, report) for row in rows]
+    destinations = Destinations(task, rows, names)
+    hidden = _hidden(task, destinations, report)
+    landmarks = [_landmark(row, names[k], k in hidden, place, report) for k, row in enumerate(rows)]
     return SessionHeader(
         town=str(plain(town_of(config))) or "unknown",
         storyboard=_text(task.get("template")),
@@ -65,7 +69,7 @@ def header_of(
         decision_frequency=10.0,
         street_names=_streets(environment.get("street_names", config.get("street_names")), report),
         landmarks=landmarks,
-        subgoals=_subgoals(config, task, landmarks, report),
+        subgoals=_subgoals(config, task, destinations, report),
         story=_text(task.get("story")),
         departure=(-1, 0.0),
         config={"sdn": {"first_frame": first_frame, "config": plain_object(config), "task": plain_object(task)}},
@@ -116,15 +120,13 @@ def _dig(row: JsonObject, *path: str) -> JsonObject:
     return row
 
 
-def _landmark(row: JsonObject, place: SdnMap, hidden: frozenset[str], report: ReadReport) -> LandmarkRow:
+def _landmark(row: JsonObject, name: str, hidden: bool, place: SdnMap, report: ReadReport) -> LandmarkRow:
     """Returns a landmark of the release layout (`wp`) or of the sample layout (`location`)."""
-    name = _landmark_name(row, report)
     location = _dig(row, "wp", "Transform", "Location")
     ids = _dig(row, "wp", "OpenDriveID") or row
     x, y = number_of(location.get("x")), number_of(location.get("y"))
-    point = row.get("location")
-    if isinstance(point, list) and len(point) >= 2:
-        x, y = number_of(point[0]), number_of(point[1])
+    if row.get("location") is not None:
+        x, y = _point(row["location"])
     if x is None or y is None:
         report.miss("config.json: place of a landmark")
         x = y = 0.0
@@ -136,63 +138,143 @@ def _landmark(row: JsonObject, place: SdnMap, hidden: frozenset[str], report: Re
         x=x,
         y=y,
         street=found.street,
-        hidden=row.get("is_hidden", row.get("hidden")) is True or name in hidden,
+        hidden=hidden or row.get("is_hidden", row.get("hidden")) is True,
         extra=plain_object(row),
     )
 
 
+def _point(value: object) -> tuple[float | None, float | None]:
+    """Returns the coordinates of a place, given as a list or as an object with x and y."""
+    if isinstance(value, Mapping):
+        return number_of(value.get("x")), number_of(value.get("y"))
+    if isinstance(value, list) and len(value) >= 2:
+        return number_of(value[0]), number_of(value[1])
+    return None, None
+
+
 def _landmark_name(row: JsonObject, report: ReadReport) -> str:
-    for field in ("name", "asset"):
+    try:
+        return landmark_name(row).label
+    except OntologyError:
+        shown = row.get("name", row.get("asset"))
+        report.keep(f"config.json: landmark {str(plain(shown))[:40]!r}")
+        return _UNKNOWN
+
+
+@dataclass(frozen=True)
+class Destinations:
+    """Landmarks that the texts of a storyboard refer to: by variable, name or asset.
+
+    Attributes:
+        task: content of `task.json`, with `assignments` of variables.
+        rows: landmarks of `config.json`.
+        names: their names.
+    """
+
+    task: JsonObject
+    rows: list[JsonObject]
+    names: list[str]
+
+    def find(self, destination: object) -> int | None:
+        """Returns the row of a destination; None if it names none."""
+        value = self._assigned(destination)
+        if isinstance(value, list) and len(value) == 1:
+            value = value[0]
+        if isinstance(value, int) and not isinstance(value, bool):
+            return value if 0 <= value < len(self.rows) else None
+        same = [k for k, row in enumerate(self.rows) if _has_text(row, value)]
         try:
-            return parse_landmark(text_of(row.get(field))).label
+            name = landmark_name(value).label
         except OntologyError:
-            continue
-    report.keep(f"config.json: landmark {str(row.get('name', row.get('asset')))[:40]!r}")
-    return _UNKNOWN
+            return same[0] if same else None
+        found = [k for k, each in enumerate(self.names) if each == name]
+        x, y = _point(value.get("location")) if isinstance(value, Mapping) else (None, None)
+        if found and x is not None and y is not None:
+            return min(found, key=lambda k: self._distance(k, x, y))
+        return next((k for k in found if k in same), found[0] if found else None)
+
+    def _assigned(self, destination: object) -> object:
+        """Returns the value of a variable; other destinations unchanged."""
+        if not isinstance(destination, str):
+            return destination
+        given = self.task.get("assignments")
+        pairs = given.items() if isinstance(given, Mapping) else given if isinstance(given, list) else ()
+        for pair in pairs:
+            if isinstance(pair, list | tuple) and len(pair) == 2 and isinstance(pair[0], str):
+                if pair[0].lstrip("$") == destination.strip().lstrip("$"):
+                    return pair[1]
+        return destination
+
+    def _distance(self, k: int, x: float, y: float) -> float:
+        own_x, own_y = _point(self.rows[k].get("location", _dig(self.rows[k], "wp", "Transform", "Location")))
+        return math.inf if own_x is None or own_y is None else math.hypot(own_x - x, own_y - y)
 
 
-def _hidden(task: JsonObject) -> frozenset[str]:
-    names = task.get("hidden_from_wizard", task.get("hidden_from_co_wizard"))
-    found = (_resolve(name, task) for name in (names if isinstance(names, list) else ()))
-    return frozenset(name for name in found if name is not None)
+def _has_text(row: JsonObject, value: object) -> bool:
+    """Returns whether name or asset of a landmark is literally a text, or that of an object."""
+    texts = [value.get("name")] if isinstance(value, Mapping) else [value]
+    return any(isinstance(text, str) and text in (row.get("name"), row.get("asset")) for text in texts)
 
 
-def _resolve(destination: object, task: JsonObject) -> str | None:
-    """Returns the landmark of a storyboard's destination: a name, or a variable that is assigned to one."""
-    if not isinstance(destination, str):
-        return None
-    assignments = _dig(task, "assignments")
-    variable = destination.lstrip("$")
-    for name in (assignments.get(variable), assignments.get(destination), destination):
-        candidate = name.get("name", name.get("asset")) if isinstance(name, Mapping) else name
-        try:
-            return parse_landmark(candidate if isinstance(candidate, str) else "").label
-        except OntologyError:
-            continue
-    return None
+def _hidden(task: JsonObject, destinations: Destinations, report: ReadReport) -> frozenset[int]:
+    """Returns the landmarks that the storyboard hides."""
+    found = set()
+    for field in ("hidden_from_wizard", "hidden_from_co_wizard"):
+        names = task.get(field)
+        for name in names if isinstance(names, list) else ():
+            row = destinations.find(name)
+            if row is None:
+                report.keep(f"task.json: {field} {str(plain(name))[:40]!r}")
+            else:
+                found.add(row)
+    return frozenset(found)
 
 
-def _subgoals(
-    config: JsonObject, task: JsonObject, landmarks: list[LandmarkRow], report: ReadReport
-) -> list[SubgoalRow]:
-    numbers = {landmark["name"]: k for k, landmark in reversed(list(enumerate(landmarks)))}
+def _subgoals(config: JsonObject, task: JsonObject, destinations: Destinations, report: ReadReport) -> list[SubgoalRow]:
+    """Returns the subgoals of `task.json` and `config.json`; fields that one file lacks are those of the other."""
+    own, others = _rows(task.get("subgoals")), _rows(_dig(config, "task").get("subgoals"))
+    if len(own) == len(others):
+        own = [{**other, **row} for row, other in zip(own, others, strict=True)]
+    rows = own or others
+    found = [destinations.find(row.get("destination", row.get("landmark"))) for row in rows]
+    numbers = {k: number for number, k in enumerate(k for k, landmark in enumerate(found) if landmark is not None)}
     subgoals = []
-    for row in _rows(task.get("subgoals")) or _rows(_dig(config, "task").get("subgoals")):
-        destination = row.get("destination", row.get("landmark"))
-        name = _resolve(destination, task)
-        if name not in numbers:
-            report.keep(f"task: subgoal to {str(destination)[:40]!r}")
+    for k, row in enumerate(rows):
+        landmark = found[k]
+        if landmark is None:
+            report.keep(f"task: subgoal to {str(plain(row.get('destination', row.get('landmark'))))[:40]!r}")
             continue
-        fields = Fields(row, "task")
+        until = row.get("delete_after_subgoal")
+        has_until = not isinstance(until, bool) and whole_of(until) is not None
         subgoals.append(
             SubgoalRow(
                 description=_text(row.get("description")),
-                landmark=numbers[name],
-                after=[],
-                trigger=bool(row.get("trigger")),
-                delete=bool(row.get("delete")),
+                landmark=landmark,
+                after=_after(row.get("after"), k, numbers, report),
+                trigger=_flag(row.get("trigger")),
+                delete=_flag(row.get("delete")) or has_until,
                 change=_text(row.get("change")) or None,
-                extra=plain_object(fields.others(("description", "trigger", "delete", "change"))),
+                extra=plain_object({name: value for name, value in row.items() if name not in _SUBGOAL_FIELDS}),
             )
         )
     return subgoals
+
+
+_SUBGOAL_FIELDS: Final = ("description", "trigger", "delete", "change", "after")
+
+
+def _after(value: object, own: int, numbers: dict[int, int], report: ReadReport) -> list[int]:
+    """Returns the subgoals that come before, in the numbers of those that are kept."""
+    after = set()
+    for item in value if isinstance(value, list) else [] if value is None else [value]:
+        number = None if isinstance(item, bool) else whole_of(item)
+        if number is None or number == own or number not in numbers:
+            report.keep(f"task: after {str(plain(item))[:40]} of a subgoal")
+        else:
+            after.add(numbers[number])
+    return sorted(after)
+
+
+def _flag(value: object) -> bool:
+    """Returns a flag, which some files give as a text or a number."""
+    return str(value).strip().casefold() in ("true", "1", "1.0", "yes")

@@ -18,12 +18,13 @@ from dorothie_gym.ontology import (
     PhysicalAction,
     Role,
     parse_goal_status,
-    parse_landmark,
     parse_mental_action,
     parse_physical_action,
     parse_role,
 )
+from dorothie_gym.ontology.vocabulary import normalise
 from dorothie_gym.recording.events import Event, EventType, check_event
+from dorothie_gym.recording.sdn.audio import AudioFiles
 from dorothie_gym.recording.sdn.files import (
     MORE,
     OURS,
@@ -35,6 +36,7 @@ from dorothie_gym.recording.sdn.files import (
     plain_object,
     whole_of,
 )
+from dorothie_gym.recording.sdn.landmark_names import landmark_name
 from dorothie_gym.recording.sdn.moves import MoveReader, read_speech
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.recording.validation import ReadReport
@@ -44,6 +46,9 @@ RIGHT: Final = 2
 
 LEFT: Final = 3
 """Value written for a LaneSwitch to the left; the published code reads it as +90 degrees."""
+
+_SIDES: Final = {"left": LEFT, "right": RIGHT, "directionleft": LEFT, "directionright": RIGHT}
+_ARGUMENTS: Final = ("angle", "roadid", "direction", "speed", "light")
 
 _ON: Final = {"on": True, "off": False, "true": True, "false": False, "1": True, "0": False}
 
@@ -78,9 +83,10 @@ class ActionReader:
             action = parse_physical_action(str(name))
         angle: float | None = None
         up: bool | None = None
-        kind, value = action.argument, val.get("slot_val")
+        slot_type, value = _argument(val)
+        kind = action.argument
         if kind is ArgumentKind.ANGLE:
-            angle = self._turn(val)
+            angle = self._turn(slot_type, value)
         elif kind is ArgumentKind.SIDE:
             angle = self._side(value)
         elif kind is ArgumentKind.SPEED_STEP:
@@ -114,11 +120,10 @@ class ActionReader:
             return {"action": action.label, "sdn": plain_object(val)}
         return {"action": action.label, **arguments}
 
-    def _turn(self, val: JsonObject) -> float | None:
+    def _turn(self, slot_type: object, value: object) -> float | None:
         turn = self.turns
         self.turns += 1
-        value = val.get("slot_val")
-        if str(val.get("slot_type")).strip().casefold() == "roadid":
+        if normalise(str(slot_type)) == "roadid":
             road = whole_of(value)
             if road is not None:
                 self.roads[turn] = road
@@ -127,17 +132,30 @@ class ActionReader:
         return None if angle is None else (angle + 180.0) % 360.0 - 180.0
 
     def _side(self, value: object) -> float | None:
-        number = whole_of(value)
+        number = _SIDES.get(normalise(value), whole_of(value)) if isinstance(value, str) else whole_of(value)
         self.lane_switches[str(value)[:20]] += 1
         if number is None or number not in (1, RIGHT, LEFT):
             return None
         return LANE_SWITCH_RIGHT if number == RIGHT else LANE_SWITCH_LEFT
 
 
+def _argument(val: JsonObject) -> tuple[object, object]:
+    """Returns type and value of the argument of an action, which some files put into an object."""
+    slot_type, value = val.get("slot_type"), val.get("slot_val")
+    if not isinstance(value, Mapping):
+        return slot_type, value
+    if "slot_type" in value:
+        return value["slot_type"], value.get("slot_val")
+    if len(value) == 1:
+        return next(iter(value.items()))
+    named = next((name for name in value if normalise(str(name)) in _ARGUMENTS), None)
+    return (slot_type, None) if named is None else (named, value[named])
+
+
 def plan_of(value: object) -> dict[str, object] | None:
     """Returns the junctions of a plan; None if the value is no plan."""
     items = value if isinstance(value, list) else [value]
-    junctions = [whole_of(item) for item in items]
+    junctions = [whole_of(item.get("junction_id") if isinstance(item, Mapping) else item) for item in items]
     return None if None in junctions else {"junctions": junctions}
 
 
@@ -145,28 +163,26 @@ def goals_of(value: object) -> dict[str, object] | None:
     """Returns the landmarks of goals; None if the value holds none."""
     items = value if isinstance(value, list) else [value]
     try:
-        return {"landmarks": [parse_landmark(str(item)).label for item in items]}
+        return {"landmarks": [landmark_name(item).label for item in items]}
     except OntologyError:
         return None
 
 
 def _status_of(value: object) -> dict[str, object] | None:
     if isinstance(value, Mapping):
-        value = [value.get("landmark"), value.get("status")]
+        value = [value.get("landmark", value), value.get("status")]
     if not isinstance(value, list) or len(value) != 2:
         return None
     landmark, status = value
-    if not isinstance(landmark, str) or not isinstance(status, str):
-        return None
     try:
-        return {"landmark": parse_landmark(landmark).label, "status": parse_goal_status(status).label}
+        return {"landmark": landmark_name(landmark).label, "status": parse_goal_status(str(status)).label}
     except OntologyError:
         return None
 
 
 def _guess_of(value: object) -> dict[str, object] | None:
     if isinstance(value, Mapping):
-        landmark = value.get("landmark")
+        landmark = value.get("landmark", value.get("asset"))
         value = [value.get("x"), value.get("y"), *([] if landmark is None else [landmark])]
     if not isinstance(value, list) or len(value) not in (2, 3):
         return None
@@ -174,9 +190,9 @@ def _guess_of(value: object) -> dict[str, object] | None:
     if x is None or y is None:
         return None
     guess: dict[str, object] = {"x": x, "y": y}
-    if len(value) == 3 and isinstance(value[2], str):
+    if len(value) == 3 and isinstance(value[2], str | Mapping):
         try:
-            guess["landmark"] = parse_landmark(value[2]).label
+            guess["landmark"] = landmark_name(value[2]).label
         except OntologyError:
             return None
     return guess
@@ -224,11 +240,17 @@ class LogReader:
         first_frame: frame (10 Hz) at which the session begins.
         name: name of the file, for the report.
         report: receives missing, unknown and repaired values.
-        audio: whether events name the audio files; sessions of this package have none.
+        audio: the audio files of the session; None for sessions of this package, which have none.
     """
 
     def __init__(
-        self, rows: Sequence[JsonObject], first_frame: int, name: str, report: ReadReport, *, audio: bool = True
+        self,
+        rows: Sequence[JsonObject],
+        first_frame: int,
+        name: str,
+        report: ReadReport,
+        *,
+        audio: AudioFiles | None,
     ) -> None:
         self._rows = rows
         self._first = first_frame

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import bisect
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology import DialogueAct, Role, parse_act, parse_move, parse_slot_value
-from dorothie_gym.ontology import parse_slot as slot_of
+from dorothie_gym.ontology import DialogueMove, Role, parse_act, parse_move
+from dorothie_gym.recording.sdn.audio import AudioFiles
 from dorothie_gym.recording.sdn.files import (
     MORE,
     JsonObject,
@@ -21,6 +20,7 @@ from dorothie_gym.recording.sdn.files import (
     transcript_of,
     whole_of,
 )
+from dorothie_gym.recording.sdn.slots import LEFT_OUT, SlotReader
 from dorothie_gym.recording.trajectory import TENTHS
 from dorothie_gym.recording.validation import ReadReport
 
@@ -33,6 +33,9 @@ MAX_SPEECH_GAP: Final = 20
 MAX_CANDIDATES: Final = 50
 """Latest stretches of one speaker that are candidates for a move."""
 
+_SAMPLE_FIELDS: Final = {
+    "utterance", "act", "slot_type", "slot_val", "is_sog", "is_eog", "is_sot", "is_eot", MORE,
+}  # fmt: skip
 _ACT_FIELDS: Final = {"move", "slots", "exchange", "transaction", "span", "utterance", "start", "end", MORE}
 
 
@@ -53,10 +56,12 @@ class MoveReader:
         speech: the stretches of speech of the session.
         first_frame: frame (10 Hz) at which the session begins.
         report: receives missing, unknown and guessed values.
-        audio: whether the data name the audio files.
+        audio: the audio files of the session; None for sessions without any, whose data name none.
     """
 
-    def __init__(self, speech: Iterable[Speech], first_frame: int, report: ReadReport, *, audio: bool = True) -> None:
+    def __init__(
+        self, speech: Iterable[Speech], first_frame: int, report: ReadReport, *, audio: AudioFiles | None
+    ) -> None:
         self._audio = audio
         self._files = {stretch.file: stretch for stretch in speech}
         self._by_speaker: dict[Role, list[Speech]] = defaultdict(list)
@@ -79,18 +84,16 @@ class MoveReader:
         if text is None:
             self._report.miss("utterance_gt (the recogniser's transcript stands in for it)")
             text = recognised or ""
-        data = self._said(row, act, frame, speaker, text)
+        slots = SlotReader(self._report)
+        slots.read(act.get("slots"))
+        data = self._said(row, act, slots, frame, speaker, text)
         if recognised is not None:
             data["recognised"] = recognised
         else:
             self._report.miss("utterance (the recogniser's transcript)")
         if (transaction := whole_of(act.get("transaction"))) is not None:
             data["transaction"] = transaction
-        rest = {name: plain(value) for name, value in act.items() if name not in _ACT_FIELDS}
-        for name in rest:
-            self._report.keep(f"act: field {str(name)!r}")
-        if rest:
-            data["sdn_act"] = plain(rest)
+        self._keep_rest(data, act, _ACT_FIELDS)
         return data
 
     def sample(self, row: JsonObject, val: JsonObject, frame: int, speaker: Role) -> dict[str, object]:
@@ -100,18 +103,31 @@ class MoveReader:
                 self._open[name] = True
                 setattr(self, f"_{name}", getattr(self, f"_{name}") + 1)
         text = transcript_of(val.get("utterance"), self._report) or ""
-        act: dict[str, object] = {"move": val.get("act"), "slots": slots_of(val.get("slot_type"), val.get("slot_val"))}
-        data = self._said(row, act, frame, speaker, text)
+        slots = SlotReader(self._report)
+        slots.read_pair(val.get("slot_type"), val.get("slot_val"))
+        data = self._said(row, {"move": val.get("act")}, slots, frame, speaker, text)
         data["exchange"] = self._exchange if self._open["exchange"] else None
         if self._open["transaction"]:
             data["transaction"] = self._transaction
         for name, mark in (("exchange", "g"), ("transaction", "t")):
             if val.get(f"is_eo{mark}") is True:
                 self._open[name] = False
+        self._keep_rest(data, val, _SAMPLE_FIELDS)
         return data
 
-    def _said(self, row: JsonObject, act: JsonObject, frame: int, speaker: Role, text: str) -> dict[str, object]:
-        parsed = self._parse(act)
+    def _keep_rest(self, data: dict[str, object], act: JsonObject, known: Container[str]) -> None:
+        """Keeps and reports the unknown fields of an act."""
+        rest = {str(plain(name)): plain(value) for name, value in act.items() if name not in known}
+        for name in rest:
+            self._report.keep(f"act: field {name!r}")
+        kept = data.get("sdn_act")
+        if rest:
+            data["sdn_act"] = {**rest, **(kept if isinstance(kept, dict) else {})}
+
+    def _said(
+        self, row: JsonObject, act: JsonObject, slots: SlotReader, frame: int, speaker: Role, text: str
+    ) -> dict[str, object]:
+        parsed = parse_act(_move_of(act.get("move")).label, slots.found)
         stretch = self._stretch(row, frame, speaker)
         file = stretch.file if stretch is not None else None
         given = whole_of(act.get("utterance"))
@@ -119,9 +135,10 @@ class MoveReader:
         if same != self._last:
             self._number += 1
             self._last = same
-        start, end = self._times(act, stretch, frame, text)
+        recorded = None if stretch is not None else self._recorded(row, frame)
+        start, end = self._times(act, stretch, frame, text, recorded)
         span = transcript_of(act.get("span"), self._report)
-        data = {
+        data: dict[str, object] = {
             "utterance": self._number,
             "text": str(plain(text)),
             "span": str(plain(text if span is None else span)),
@@ -131,25 +148,13 @@ class MoveReader:
             "start": start,
             "end": end,
         }
-        if file is not None and self._audio:
+        if recorded is not None:
+            file = recorded[0]
+        if file is not None and self._audio is not None:
             data["audio"] = str(plain(file))
+        if slots.left:
+            data["sdn_act"] = {LEFT_OUT: plain(slots.left)}
         return {**data, **more_of(act)}
-
-    def _parse(self, act: JsonObject) -> DialogueAct:
-        move, slots = act.get("move"), act.get("slots")
-        slots = slots if isinstance(slots, Mapping) else {}
-        try:
-            return parse_act(str(move), slots)
-        except (OntologyError, TypeError):
-            parse_move(str(move))
-        known: dict[str, list[str]] = {}
-        for slot, values in slots.items():
-            for value in values if isinstance(values, list) else [values]:
-                if _is_known(slot, value):
-                    known.setdefault(slot, []).append(value)
-                else:
-                    self._report.keep(f"slot value {str(slot)[:40]}={str(value)[:40]} (left out)")
-        return parse_act(str(move), known)
 
     def _stretch(self, row: JsonObject, frame: int, speaker: Role) -> Speech | None:
         file = row.get("utterance_filename")
@@ -164,15 +169,26 @@ class MoveReader:
         best = min(near, default=None)
         return self._files[best[2]] if best is not None and best[0] <= MAX_SPEECH_GAP else None
 
-    def _times(self, act: JsonObject, stretch: Speech | None, frame: int, text: str) -> tuple[float, float]:
+    def _recorded(self, row: JsonObject, frame: int) -> tuple[str, float] | None:
+        """Returns name and duration of the audio file of a row without a stretch of speech."""
+        name = row.get("utterance_filename")
+        return None if self._audio is None else self._audio.find(name if isinstance(name, str) else None, frame)
+
+    def _times(
+        self, act: JsonObject, stretch: Speech | None, frame: int, text: str, recorded: tuple[str, float] | None
+    ) -> tuple[float, float]:
+        """Returns start and end of an utterance [s], neither before the session; the frame of a row is the end."""
         start, end = number_of(act.get("start")), number_of(act.get("end"))
         if start is not None and end is not None:
             return start, end
         if stretch is not None:
-            return (stretch.start - self._first) / TENTHS, (stretch.end - self._first) / TENTHS
-        self._report.repair("times of utterances without audio were guessed from their words")
-        over = (frame - self._first) / TENTHS
-        return round(over - max(len(text.split()), 1) / SDN_WORDS_PER_SECOND, 3), over
+            begun = max(stretch.start - self._first, 0)
+            return begun / TENTHS, max(stretch.end - self._first, begun) / TENTHS
+        over = max(frame - self._first, 0) / TENTHS
+        if recorded is None:
+            self._report.repair("times of utterances without audio were guessed from their words")
+        length = max(len(text.split()), 1) / SDN_WORDS_PER_SECOND if recorded is None else recorded[1]
+        return max(round(over - length, 3), 0.0), over
 
 
 def read_speech(
@@ -197,24 +213,9 @@ def read_speech(
     return tuple(sorted(found.values(), key=lambda stretch: (stretch.start, stretch.file)))
 
 
-def slots_of(types: object, values: object) -> dict[str, list[object]]:
-    """Returns slots of the sample layout: one type and value, or lists of both."""
-    names = types if isinstance(types, list) else [types]
-    given = values if isinstance(values, list) and len(names) > 1 else [values]
-    slots: dict[str, list[object]] = {}
-    for k, name in enumerate(names):
-        if not isinstance(name, str) or not name.strip():
-            continue
-        value = given[k] if k < len(given) else None
-        slots.setdefault(name, []).extend(value if isinstance(value, list) else [value])
-    return {name: [value for value in found if isinstance(value, str)] for name, found in slots.items()}
-
-
-def _is_known(slot: object, value: object) -> bool:
-    if not isinstance(slot, str) or not isinstance(value, str):
-        return False
-    try:
-        parse_slot_value(slot_of(slot), value)
-    except OntologyError:
-        return False
-    return True
+def _move_of(value: object) -> DialogueMove:
+    """Returns the move of a name, or of its number in SDN; raises `OntologyError` for others."""
+    number = None if isinstance(value, str | bool) else whole_of(value)
+    if number is not None and number in DialogueMove._value2member_map_:
+        return DialogueMove(number)
+    return parse_move(str(value))

@@ -15,7 +15,6 @@ from dorothie_gym.ontology import (
     Role,
     parse_exception,
     parse_goal_status,
-    parse_landmark,
     parse_prop,
 )
 from dorothie_gym.recording.events import Event, EventType
@@ -35,6 +34,7 @@ from dorothie_gym.recording.sdn.files import (
     text_of,
     whole_of,
 )
+from dorothie_gym.recording.sdn.landmark_names import landmark_name
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.recording.validation import ReadReport
 
@@ -76,7 +76,7 @@ class ViewReader:
         events = []
         for row in self._rows(PLAN_FILE):
             try:
-                landmark = parse_landmark(text_of(row.get("landmark"))).label
+                landmark = landmark_name(row.get("landmark")).label
                 status = parse_goal_status(text_of(row.get("status"))).label
             except OntologyError as error:
                 self._report.keep(f"{PLAN_FILE}: row left out ({error})")

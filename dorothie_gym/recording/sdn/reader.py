@@ -12,6 +12,7 @@ from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording.events import Event
 from dorothie_gym.recording.file_names import MAX_FRAME
 from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.recording.sdn.audio import AudioFiles
 from dorothie_gym.recording.sdn.config import header_of, town_of
 from dorothie_gym.recording.sdn.event_log import LogReader, sorted_rows
 from dorothie_gym.recording.sdn.files import (
@@ -126,7 +127,7 @@ def raw_session(folder: Path, maps: Path | None) -> RawSession:
         report.miss(f"map of {town or 'the town'!r} (lanes, and angles of turns into a road, are unknown)")
     header = header_of(config, task, layout, place, first, report)
     ours = isinstance(config.get(OURS), Mapping)
-    log = LogReader(rows, first, name, report, audio=not ours)
+    log = LogReader(rows, first, name, report, audio=None if ours else AudioFiles(folder, report))
     events, unknown = with_roads(log.events(), log.actions.roads, places, first, place)
     if log.actions.roads:
         report.facts["turns_into_a_road"] = {"found": len(log.actions.roads) - unknown, "unknown": unknown}

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps import NO_STREET, Town
+from dorothie_gym.maps import NO_STREET, LinkType, Town
 from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES
 from dorothie_gym.recording.frames import read_frames, write_frames
 from dorothie_gym.recording.sdn.files import number_of, read_csv
@@ -23,6 +25,9 @@ from dorothie_gym.recording.validation import ReadReport
 
 MAX_LANE_DISTANCE: Final = 10.0
 """Largest distance of a position from the lane that it is assigned to [m]."""
+
+EQUALLY_CLOSE: Final = 2.0
+"""Difference of distances up to which the numbers of a position choose its lane, about half a lane's width [m]."""
 
 
 @dataclass(frozen=True)
@@ -48,43 +53,113 @@ class SdnMap:
             self._by_ids[lane.road_id, lane.lane_id].append(lane.id)
 
     def locate(self, x: float, y: float, road: int | None = None, lane: int | None = None) -> LanePosition:
-        """Returns the position closest to (x, y) [m], on lanes with the given numbers if the town has them."""
+        """Returns the position closest to (x, y) [m].
+
+        The numbers only choose between lanes that are about equally close, as they are placeholders in some files.
+        """
         if self.town is None:
             return LanePosition()
-        known = self._by_ids.get((road, lane)) if road is not None and lane is not None else None
         position = np.array([x, y])
-        found = [(*self.town.lanes[k].project(position), k) for k in known or range(len(self.town.lanes))]
-        station, lateral, number = min(found, key=lambda item: (abs(item[1]), item[2]))
-        if known is None and abs(lateral) > MAX_LANE_DISTANCE:
+        found = [(*self.town.lanes[k].project(position), k) for k in self._near(x, y)]
+        if not found:
+            return LanePosition()
+        closest = min(abs(lateral) for _, lateral, _ in found)
+        same = [row for row in found if abs(row[1]) <= closest + EQUALLY_CLOSE and row[2] in self._numbered(road, lane)]
+        station, lateral, number = min(same or found, key=lambda item: (abs(item[1]), item[2]))
+        if abs(lateral) > MAX_LANE_DISTANCE:
             return LanePosition()
         return LanePosition(number, station, self.town.lanes[number].street)
+
+    def _numbered(self, road: int | None, lane: int | None) -> Sequence[int]:
+        return () if road is None or lane is None else self._by_ids.get((road, lane), ())
+
+    def _near(self, x: float, y: float) -> list[int]:
+        """Returns the lanes whose bounding boxes are within reach of (x, y)."""
+        inside = np.all((self._boxes[:, :2] <= (x, y)) & (self._boxes[:, 2:] >= (x, y)), axis=1)
+        return [int(k) for k in np.flatnonzero(inside)]
+
+    @cached_property
+    def _boxes(self) -> NDArray[np.float64]:
+        """Smallest x and y, and largest x and y, of the surroundings of each lane, (n, 4) [m]."""
+        points = [lane.points[:, :2] for lane in self.town.lanes] if self.town is not None else []
+        boxes = [(*each.min(axis=0), *each.max(axis=0)) for each in points]
+        reach = MAX_LANE_DISTANCE * np.array([-1.0, -1.0, 1.0, 1.0])
+        return np.array(boxes, dtype=np.float64).reshape(len(boxes), 4) + reach
 
     def lane_of(self, x: float, y: float, road: int, lane: int) -> int:
         """Returns the lane with the given numbers at (x, y), or -1; fast enough for every frame."""
         known = self._by_ids.get((road, lane), ())
-        if len(known) == 1:
-            return known[0]
+        if len(known) == 1 and self.town is not None:
+            box = self._boxes[known[0]]
+            if box[0] <= x <= box[2] and box[1] <= y <= box[3]:
+                lateral = self.town.lanes[known[0]].project(np.array([x, y]))[1]
+                if abs(lateral) <= MAX_LANE_DISTANCE:
+                    return known[0]
         return self.locate(x, y, road, lane).lane if known else NO_LANE
 
-    def turn_angle(self, lane: int, road: int) -> float | None:
-        """Returns the angle [degrees, positive left] of the turn from a lane into a road, through one junction.
+    def turn_angle(self, lane: int, road: int, junction: int | None = None) -> float | None:
+        """Returns the angle [degrees, positive left] of the turn into a road.
+
+        It is that of the exit from the car's lane, else from a lane beside it, that leads into the road. Where there is
+        none, or the lane is unknown, it is that of the only approach from which a connector leads into the road.
 
         Args:
-            lane: lane of the car.
+            lane: lane of the car; -1 for an unknown one.
             road: number of the target road, or of the connecting road to it.
+            junction: junction that the car crosses next; None or -1 for an unknown one.
         """
         town = self.town
-        if town is None or lane < 0:
+        if town is None:
             return None
-        for _ in range(len(town.lanes)):  # along the road to the junction
-            exits = town.exits(lane)
-            for way in exits:
-                if road in (town.lanes[way.lane].road_id, town.lanes[way.connector].road_id):
-                    return float(way.angle)
-            if len(exits) != 1 or exits[0].junction_id >= 0:
-                return None
-            lane = exits[0].lane
+        if lane >= 0:
+            found = self._angle_ahead(lane, road)
+            if found is not None:
+                return found
+        approaches = self._approaches(road)
+        at_next = {key: angle for key, angle in approaches.items() if key[0] == junction}
+        for choice in (at_next, approaches):
+            own = {key: angle for key, angle in choice.items() if lane >= 0 and key[1] == town.lanes[lane].road_id}
+            for only in (own, choice):
+                if len(only) == 1:
+                    return next(iter(only.values()))
         return None
+
+    def _angle_ahead(self, lane: int, road: int) -> float | None:
+        """Returns the angle into a road at the next junction ahead, from a lane or from those beside it."""
+        assert self.town is not None
+        town, lanes = self.town, self._side_by_side(lane)
+        for _ in range(len(town.lanes)):  # along the road to the junction
+            for beside in lanes:
+                for way in town.exits(beside):
+                    if road in (town.lanes[way.lane].road_id, town.lanes[way.connector].road_id):
+                        return float(way.angle)
+            onward = [exits[0].lane for each in lanes if len(exits := town.exits(each)) == 1]
+            if any(way.junction_id >= 0 for each in lanes for way in town.exits(each)) or not onward:
+                return None
+            lanes = list(dict.fromkeys(onward))
+        return None
+
+    def _side_by_side(self, lane: int) -> list[int]:
+        """Returns a lane and those that lane changes lead to, nearest first."""
+        assert self.town is not None
+        found = [lane]
+        for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
+            beside = self.town.neighbour(lane, side)
+            while beside is not None and beside not in found:
+                found.append(beside)
+                beside = self.town.neighbour(beside, side)
+        return found
+
+    def _approaches(self, road: int) -> dict[tuple[int, int], float]:
+        """Returns the angle into a road for each junction and road from which connectors lead there."""
+        assert self.town is not None
+        found: dict[tuple[int, int], float] = {}
+        for lane in self.town.lanes:
+            for way in self.town.exits(lane.id):
+                connector = self.town.lanes[way.connector]
+                if way.junction_id >= 0 and road in (self.town.lanes[way.lane].road_id, connector.road_id):
+                    found.setdefault((way.junction_id, lane.road_id), float(way.angle))
+        return found
 
 
 # --- SDN's `trajectory.csv`: pose of the car at 10 Hz ----------------------------------------------------------------

@@ -112,8 +112,9 @@ def with_roads(
     for event in events:
         number += _is_turn(event)
         if _is_turn(event) and number in roads:
-            lane = _lane_at(places, event.frame // FRAMES_PER_TENTH + first_frame, place)
-            angle = place.turn_angle(lane, roads[number])
+            frame = event.frame // FRAMES_PER_TENTH + first_frame
+            lane = _lane_at(places, frame, place)
+            angle = place.turn_angle(lane, roads[number], _junction_after(places, frame))
             unknown += angle is None
             event = _turned(event, angle, road=roads[number])
         result.append(event)
@@ -126,6 +127,15 @@ def _lane_at(places: CarPoses, frame: int, place: SdnMap) -> int:
     k = max(int(np.searchsorted(places.frames, frame, side="right")) - 1, 0)
     ids = (int(places.ids["road_id"][k]), int(places.ids["lane_id"][k]))
     return place.locate(float(places.x[k]), float(places.y[k]), *ids).lane
+
+
+def _junction_after(places: CarPoses, frame: int) -> int | None:
+    """Returns the junction that the car enters next, or crosses; None without one in time."""
+    start = int(np.searchsorted(places.frames, frame))
+    end = int(np.searchsorted(places.frames, frame + MAX_TURN_DELAY))
+    junctions = places.ids["junction_id"][start:end]
+    inside = np.flatnonzero(junctions >= 0)
+    return int(junctions[inside[0]]) if len(inside) else None
 
 
 def _is_turn(event: Event) -> bool:

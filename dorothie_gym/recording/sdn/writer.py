@@ -40,6 +40,7 @@ from dorothie_gym.recording.sdn.files import (
     SCENE_FILE,
     whole_of,
 )
+from dorothie_gym.recording.sdn.landmark_names import asset_of
 from dorothie_gym.recording.sdn.trajectory import CSV_COLUMNS, write_scene
 from dorothie_gym.recording.session import Session, new_session_folder
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, TENTHS
@@ -323,7 +324,7 @@ def _own_config(session: Session, town: Town | None) -> dict[str, object]:
 
 def _landmark(row: LandmarkRow, town: Town | None) -> dict[str, object]:
     return {
-        "asset": row["name"],
+        "asset": asset_of(row["name"]),
         "name": row["name"],
         "is_hidden": row["hidden"],
         "wp": _waypoint(row["lane"], row["station"], row["x"], row["y"], town),

@@ -145,6 +145,7 @@ def test_a_known_town_gives_opendrive_numbers(tmp_path: Path) -> None:
     rows = ({"name": "KFC", "lane": lane.id, "station": 1.0, "x": 0.0, "y": 0.0, "street": -1, "hidden": False},)
     played = session(town="brookside", landmarks=rows, subgoals=(), departure=(lane.id, 2.0))
     played.trajectory["lane"] = lane.id
+    played.trajectory["x"], played.trajectory["y"] = lane.position(1.0)
     folder = write_sdn(played, tmp_path / "log_1")
     config = written(folder, "config.json")["environment"]
     numbers = {"lane_id": lane.lane_id, "road_id": lane.road_id, "junction_id": lane.junction_id}
