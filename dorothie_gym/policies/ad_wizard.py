@@ -10,11 +10,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from dorothie_gym.dialogue import load_lexicon
 from dorothie_gym.maps import Town
-from dorothie_gym.ontology import ExceptionKind, LandmarkName, PropKind, Role, Sensor, WeatherParameter
+from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar
 from dorothie_gym.policies.policy import Policy, replace
+from dorothie_gym.policies.task_exceptions import plays_every_exception, story_exception, task_message
 from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, ObservationMapping, PropColumn, SpaceLimits
 
 
@@ -166,6 +166,8 @@ Outcome: TypeAlias = tuple[AdWizardAction | None, AdWizardState]
 class ScriptedAdWizard(Policy[AdWizardState]):
     """Plays one to four tricks in a session: roadblocks, weather, changed tasks, faulty sensors, crowds.
 
+    Of a storyboard that is not shipped, it plays every change of the task that the storyboard marks.
+
     Every change of a task comes with a message that gives the participant a reason. Bad weather clears up, and
     roadblocks are removed after a while.
     """
@@ -196,6 +198,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
         if unknown:
             raise ValueError(f"kinds holds {unknown[0]!r}; the kinds are {', '.join(Trick)}")
         self._rate, self._kinds = rate, tuple(Trick(kind) for kind in kinds)
+        self._plays_tasks = rate > 0.0 and Trick.TASK in self._kinds
         self._config = AdWizardConfig() if config is None else config
 
     def initial_state(self, seed: int, town: Town) -> AdWizardState:
@@ -217,9 +220,16 @@ class ScriptedAdWizard(Policy[AdWizardState]):
         rng = np.random.default_rng((state.seed, state.count))
         now = scalar(observation, "time")
         action, state = _restore(state, observation, now)
+        if action is None and self._plays_tasks and plays_every_exception(observation["story"]):
+            action = story_exception(observation, state.town, now, _story_is_due(state, now), rng)
+            state = state if action is None else replace(state, last_at=now)
         if action is None:
             action, state = _play(state, observation, now, rng)
         return (action or AdWizardAction()).encode(self.limits), state
+
+
+def _story_is_due(state: AdWizardState, now: float) -> bool:
+    return now >= state.config.first_at and state.is_due(now)
 
 
 def _play(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
@@ -338,39 +348,3 @@ _TRICKS: dict[Trick, Callable[[AdWizardState, ObservationMapping, float, np.rand
     Trick.SENSOR: _sensor,
     Trick.CROWD: _crowd,
 }
-
-
-_SENDERS = ("Your friend texts", "A message comes in", "Your phone rings", "Your sister writes", "A call from home")
-
-_BODIES: Mapping[ExceptionKind, tuple[str, ...]] = {
-    ExceptionKind.TASK_TRIGGER: (
-        "could you stop at {landmark} as well?",
-        "there is one more thing to do at {landmark}.",
-        "please don't forget to come by {landmark} too.",
-        "can you fit in {landmark} on the way?",
-    ),
-    ExceptionKind.TASK_DELETE: (
-        "no need to go to {landmark} any more.",
-        "somebody else has taken care of {landmark}.",
-        "you can leave out {landmark} today.",
-    ),
-    ExceptionKind.TASK_CHANGE: (
-        "{landmark} does not work out, have a look at the new plan.",
-        "don't go to {landmark}, there is another place for that.",
-        "there is a change: not {landmark}, see your list.",
-    ),
-}
-
-
-def task_message(kind: ExceptionKind, landmark: LandmarkName, rng: np.random.Generator) -> str:
-    """Returns a message to the participant with the reason for a change of its tasks.
-
-    Args:
-        kind: one of the task exceptions.
-        landmark: place of the task.
-        rng: random generator of the decision.
-    """
-    name = load_lexicon().forms(landmark, "say")[0]
-    sender = _SENDERS[int(rng.integers(len(_SENDERS)))]
-    bodies = _BODIES[kind]
-    return f"{sender}: {bodies[int(rng.integers(len(bodies)))].format(landmark=name)}"

@@ -3,7 +3,7 @@
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.tasks.binding import bind
 from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue
-from dorothie_gym.tasks.parsing import load_template, parse_template, template_names
+from dorothie_gym.tasks.parsing import is_shipped_story, load_template, parse_template, template_names
 from dorothie_gym.tasks.state import TaskState
 from dorothie_gym.tasks.storyboard import (
     Dependent,
@@ -30,6 +30,7 @@ __all__ = [
     "Variable",
     "bind",
     "catalogue",
+    "is_shipped_story",
     "load_template",
     "parse_template",
     "template_names",

@@ -45,6 +45,7 @@ def cast(template: StoryboardTemplate, rng: np.random.Generator | None = None) -
         for ref in template.destinations()
         if variable_of(ref) is None and (kind := find_kind(ref)) is not None
     }
+    _check_categories(template)
     candidates = [_candidates(template, variable) for variable in template.variables]
     chosen = _assign(candidates, tuple(fixed.values()), rng)
     if chosen is None:
@@ -53,12 +54,18 @@ def cast(template: StoryboardTemplate, rng: np.random.Generator | None = None) -
     return fixed | dict(zip(names, chosen, strict=True))
 
 
+def _check_categories(template: StoryboardTemplate) -> None:
+    """Raises a `StoryboardError` that lists the kinds of places that the ontology lacks."""
+    lacking = [variable for variable in template.variables if not kinds_in(variable.category)]
+    if lacking:
+        kinds = ", ".join(f"{variable.category!r} ({variable.name})" for variable in lacking)
+        known = ", ".join(("places", *categories()))
+        reason = f"no landmark is of category {kinds}; use one of {known}"
+        raise StoryboardError(template.name, f"variables.{lacking[0].name}", reason)
+
+
 def _candidates(template: StoryboardTemplate, variable: Variable) -> tuple[LandmarkKind, ...]:
     kinds = kinds_in(variable.category)
-    if not kinds:
-        known = ", ".join(("places", *categories()))
-        reason = f"no landmark is of category {variable.category!r}; use one of {known}"
-        raise StoryboardError(template.name, f"variables.{variable.name}", reason)
     dependents = [row for row in template.dependents if row.variable == variable.name]
     for attribute, number in Counter(row.attribute for row in dependents).items():
         field = f"dependents.{next(row.name for row in dependents if row.attribute == attribute)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 from collections.abc import Collection, Iterable, Iterator
@@ -83,8 +84,8 @@ def _check_number(template: StoryboardTemplate) -> None:
     if len(template.subgoals) < 2:
         reason = f"a template has at least 2 subgoals, the last one being the destination, not {len(template.subgoals)}"
         raise StoryboardError(template.name, "subgoals", reason)
-    if not 1 <= live <= MAX_LIVE_SUBGOALS:
-        reason = f"1 to {MAX_LIVE_SUBGOALS} subgoals must be without `trigger`, not {live}"
+    if live > MAX_LIVE_SUBGOALS:
+        reason = f"at most {MAX_LIVE_SUBGOALS} subgoals may be without `trigger`, not {live}"
         raise StoryboardError(template.name, "subgoals", reason)
 
 
@@ -281,6 +282,28 @@ _SUBGOAL_FIELDS = (
 def template_names() -> tuple[str, ...]:
     """Returns the names of the templates of the package, sorted."""
     return tuple(sorted(entry.name.removesuffix(".json") for entry in _SHIPPED.iterdir()))
+
+
+@functools.cache
+def _shipped_stories() -> re.Pattern[str]:
+    """Returns a pattern of the stories of the package's templates; variables and marks stand for any text."""
+    stories = (load_template(name).story for name in template_names())
+    return re.compile("|".join(_pattern(story) for story in stories))
+
+
+def _pattern(story: str) -> str:
+    """Returns a pattern of a story that matches it with other accents and typographic marks, and cut off."""
+    words = (".+" if references(part) or not part.isascii() else re.escape(part) for part in story.split())
+    return " ".join(words)
+
+
+def is_shipped_story(story: str) -> bool:
+    """Returns whether the story of a session is that of a template of the package.
+
+    Args:
+        story: the text with values, as observations give it.
+    """
+    return _shipped_stories().fullmatch(" ".join(story.split())) is not None
 
 
 def load_template(name_or_path: str | Path) -> StoryboardTemplate:

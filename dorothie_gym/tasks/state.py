@@ -14,7 +14,8 @@ class TaskState:
 
     A subgoal is live unless it awaits its trigger or has been deleted. The last live subgoal of the storyboard is the
     final destination: it is reached after all others and ends the task. A triggered subgoal that follows it in the
-    storyboard becomes the new final destination. Only live subgoals count for `after`.
+    storyboard becomes the new final destination. Only live subgoals count for `after`. If every subgoal of a template
+    awaits its trigger, the task begins with the first trigger.
 
     Attributes:
         storyboard: the storyboard of the session.
@@ -34,18 +35,18 @@ class TaskState:
 
     @property
     def destination(self) -> int:
-        """Index of the last live subgoal."""
-        return self.live[-1]
+        """Index of the last live subgoal; -1 before the first trigger of a task that begins with one."""
+        return self.live[-1] if self.live else -1
 
     @property
     def done(self) -> bool:
         """Returns whether the final destination has been reached, which ends the task."""
-        return self._reached[self.destination]
+        return bool(self.live) and self._reached[self.destination]
 
     @property
     def success(self) -> bool:
         """Returns whether every live subgoal has been reached."""
-        return all(self._reached[i] for i in self.live)
+        return bool(self.live) and all(self._reached[i] for i in self.live)
 
     def reached(self, i: int) -> bool:
         """Returns whether a subgoal has been reached."""

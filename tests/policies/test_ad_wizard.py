@@ -1,11 +1,17 @@
+import json
+
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from dorothie_gym.cli import app
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import ExceptionKind, LandmarkName
 from dorothie_gym.policies import ScriptedAdWizard, Trick
-from dorothie_gym.policies.ad_wizard import task_message
+from dorothie_gym.policies.task_exceptions import task_message
+from dorothie_gym.recording import EventType, Session
 from dorothie_gym.spaces import AdWizardAction, SpaceLimits
+from dorothie_gym.tasks import TaskState, bind, parse_template
 from tests.policies.walk import play
 
 TOWN = load_town("brookside")
@@ -45,3 +51,61 @@ def test_bad_weather_comes_and_clears_up():
     )
     values = [e.data["value"] for e in played.events if e.type == "Exception" and e.data["kind"] == "weather"]
     assert len(values) == 2 and values[0] != values[1]
+
+
+ON_CALL = {
+    "variables": [["P1", "people"], ["P2", "places.cafe"]],
+    "story": "You are on patrol today and wait for a call.",
+    "subgoals": [
+        {"destination": "$P1", "description": "Pick up the child", "trigger": True},
+        {"destination": "$P2", "description": "Bring the child to $P2", "trigger": True},
+    ],
+}
+FULL_DAY = {
+    "variables": [
+        ["A", "places.stores"],
+        ["B", "places.restaurants"],
+        ["C", "places.cafe"],
+        ["D", "places.residential"],
+    ],
+    "story": "The list is long today, and the telephone does not stop.",
+    "subgoals": [
+        {"destination": "$A", "description": "Shop", "delete": True},
+        {"destination": "$B", "description": "Eat", "change": "Eat something else, at $C", "change_destination": "$C"},
+        {"destination": "$C", "description": "Coffee", "trigger": True},
+        {"destination": "$D", "description": "Home"},
+    ],
+}
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        (ON_CALL, [("task_trigger", 0), ("task_trigger", 1)]),
+        (FULL_DAY, [("task_change", 1), ("task_delete", 0), ("task_trigger", 2)]),
+    ],
+)
+def test_every_exception_of_a_template_of_ones_own_is_played(tmp_path, fields, expected, seed):
+    path = tmp_path / "own.json"
+    path.write_text(json.dumps(fields))
+    result = CliRunner().invoke(
+        app,
+        ["run", "--town", "brookside", "--seed", str(seed), "--storyboard", str(path), "--json"]
+        + ["--out", str(tmp_path / "s")],
+    )
+    assert result.exit_code == 0, result.output
+    session = Session.load(tmp_path / "s")
+    exceptions = [event.data for event in session.of_type(EventType.EXCEPTION)]
+    played = [(data["kind"], data["subgoal"]) for data in exceptions if str(data["kind"]).startswith("task_")]
+    assert sorted(played) == expected
+    assert json.loads(result.output)["subgoals"]["live"] == len(fields["subgoals"]) - (fields is FULL_DAY)
+
+
+def test_nothing_is_to_be_done_before_the_first_trigger():
+    template = parse_template(json.dumps(ON_CALL), "on_call")
+    state = TaskState(bind(template, TOWN.sites, np.random.default_rng(0)))
+    assert state.live == () and not state.done and not state.success
+    assert state.arrive(state.landmark_of(0)) == []
+    state.trigger(0)
+    assert state.live == (0,) and state.arrive(state.landmark_of(0)) == [0] and state.done

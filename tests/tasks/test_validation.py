@@ -1,6 +1,10 @@
+import numpy as np
 import pytest
 
 from dorothie_gym.errors import StoryboardError
+from dorothie_gym.maps import load_town
+from dorothie_gym.spaces.limits import STORY_LENGTH, plain_text
+from dorothie_gym.tasks import bind, is_shipped_story, load_template, template_names
 
 from .builders import parse, plain
 
@@ -8,7 +12,7 @@ STORE = ["P", "places.stores"]
 REFUSED = {
     "unknown category": (
         plain({}, {}, variables=[["P", "places.hospital"]]),
-        r"variables\.P: no landmark is of category 'places.hospital'; use one of places, people",
+        r"variables\.P: no landmark is of category 'places.hospital' \(P\); use one of places, people",
     ),
     "destination undefined": (
         plain({}, {"destination": "$Q"}, variables=[STORE]),
@@ -33,8 +37,7 @@ REFUSED = {
     ),
     "one subgoal": (plain({}), "subgoals: a template has at least 2 subgoals"),
     "no subgoal": (plain(), "subgoals: a template has at least 2 subgoals"),
-    "none live": (plain({"trigger": True}, {"trigger": True}), "subgoals: 1 to 6 subgoals must be without `trigger`"),
-    "seven live": (plain({}, {}, {}, {}, {}, {}, {}), "subgoals: 1 to 6 subgoals .* not 7"),
+    "seven live": (plain({}, {}, {}, {}, {}, {}, {}), "subgoals: at most 6 subgoals .* not 7"),
     "after out of range": (plain({}, {"after": [2]}), r"subgoals\[1\]\.after: there is no subgoal 2; use 0 to 1"),
     "after negative": (plain({}, {"after": [-1]}), r"subgoals\[1\]\.after: there is no subgoal -1"),
     "after itself": (plain({"after": [0]}, {}), r"subgoals\[0\]\.after: subgoal 0 refers to itself"),
@@ -70,3 +73,25 @@ def test_after_may_refer_to_later_subgoal_that_is_never_final():
 
 def test_price_in_dollars_is_no_reference():
     assert parse(plain({}, {}, story="It costs $5.")).story == "It costs $5."
+
+
+def test_kinds_of_places_that_the_ontology_lacks_are_listed():
+    variables = [["A", "places.hospital"], ["B", "places.stores"], ["C", "places.airport"]]
+    message = (
+        r"variables\.A: no landmark is of category 'places.hospital' \(A\), 'places.airport' \(C\); use one of places,"
+    )
+    with pytest.raises(StoryboardError, match="^storyboard test: " + message):
+        parse(plain({}, {}, variables=variables))
+
+
+def test_every_subgoal_may_await_its_trigger():
+    template = parse(plain({"trigger": True}, {"trigger": True}))
+    assert [subgoal.trigger for subgoal in template.subgoals] == [True, True]
+
+
+@pytest.mark.parametrize("name", template_names())
+def test_stories_of_shipped_templates_are_recognised_and_others_are_not(name):
+    template = load_template(name)
+    board = bind(template, load_town("midtown").sites, np.random.default_rng(3))
+    assert is_shipped_story(plain_text(board.story, STORY_LENGTH))
+    assert not is_shipped_story("Another story. " + board.story)
