@@ -27,6 +27,8 @@ DorothieGymError
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from reprlib import Repr
 from typing import Final
 
@@ -140,3 +142,10 @@ def short_repr(value: object) -> str:
     """Returns the `repr` of an offending value, cut to `MAX_SHOWN` characters."""
     text = _ShortRepr().repr(value)
     return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
+
+
+def did_you_mean(given: str, known: Iterable[str]) -> str:
+    """Returns "did you mean 'NAME'? " for the known name that is most like a given one; "" if none is alike."""
+    names = {name.casefold(): name for name in known}
+    found = get_close_matches(str(given)[:MAX_SHOWN].casefold(), names, n=1, cutoff=0.6)
+    return f"did you mean {names[found[0]]!r}? " if found else ""

@@ -22,7 +22,7 @@ NAMES: Final[Mapping[Role, str]] = {
 
 _HANDLED: Final = {Handled.ENVIRONMENTAL: " (env)", Handled.TASK: " (task)", Handled.NONE: ""}
 _MENTAL: Final = {action.label: action.label for action in MentalAction if action is not MentalAction.PLAN_UPDATE}
-_HEAD: Final = ("time", "speaker", "words [acts] or event", "exchange", "transaction")
+_HEAD: Final = ("begins", "speaker", "words [acts] or event", "exchange", "transaction")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +31,10 @@ class Film:
 
     Between two decisions, the car follows its recorded trajectory; other actors are interpolated linearly.
 
+    Attributes:
+        frames: frames drawn so far.
+        seconds: time spent on them [s].
+
     Args:
         path: file to write; its suffix chooses the format.
 
@@ -38,7 +43,7 @@ class Film:
     """
 
     def __init__(self, path: Path) -> None:
-        self.frames = 0
+        self.frames, self.seconds = 0, 0.0
         self._renderer = SceneRenderer()
         self._writer: VideoWriter = video_writer(path, FRAMES_PER_SECOND)
         self._last: Scene | None = None
@@ -55,6 +60,11 @@ class Film:
 
     def __call__(self, engine: SessionEngine) -> None:
         """Appends the frames of the last decision."""
+        begun = time.perf_counter()
+        self._append_decision(engine)
+        self.seconds += time.perf_counter() - begun
+
+    def _append_decision(self, engine: SessionEngine) -> None:
         scene = scene_of(engine.session)
         if self._last is None:
             self._append(scene)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
@@ -20,7 +20,11 @@ from dorothie_gym.ontology import GoalStatus, Role
 from dorothie_gym.recording import Event, EventType
 from dorothie_gym.recording.events import move_record
 from dorothie_gym.recording.json_io import Fields
+from dorothie_gym.rendering.exception_words import exception_words
 from dorothie_gym.tasks import TaskState
+
+if TYPE_CHECKING:
+    from dorothie_gym.cli.film import Film
 
 EventData: TypeAlias = Mapping[str, Any]
 """Data of an event, whose fields depend on its type."""
@@ -96,18 +100,7 @@ def _physical(data: EventData) -> tuple[str, str]:
 
 
 def _exception(data: EventData) -> tuple[str, str]:
-    kind = data["kind"].replace("_", " ")
-    details = {
-        "weather": lambda: f"{data['parameter']} becomes {data['value']:g}",
-        "spawn_vehicles": lambda: f"{data['count']} appear",
-        "spawn_pedestrians": lambda: f"{data['count']} appear",
-        "place_prop": lambda: f"{data['prop']} on the road",
-        "move_prop": lambda: f"{data['prop']} stands elsewhere",
-        "delete_prop": lambda: f"{data['prop']} is gone",
-        "sensor_fault": lambda: f"{data['sensor']} {'begins' if data['on'] else 'is over'}",
-    }
-    detail = details.get(data["kind"], lambda: str(data["landmark"]))()
-    return f"{kind}: {detail}", "magenta"
+    return exception_words(data), "magenta"
 
 
 def _hazard(data: EventData) -> tuple[str, str]:
@@ -159,6 +152,32 @@ def clock(seconds: float) -> str:
     return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
 
 
+class Pace:
+    """Delays a session to a multiple of real time; pass it to `play_session` as `on_step`.
+
+    Attributes:
+        seconds: time spent waiting [s].
+
+    Args:
+        speed: simulated seconds per second.
+    """
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._begun: float | None = None
+        self.seconds = 0.0
+
+    def __call__(self, engine: SessionEngine) -> None:
+        """Waits until the time of the present decision."""
+        now = time.perf_counter()
+        if self._begun is None:
+            self._begun = now
+        wait = self._begun + engine.session.world.time / self._speed - now
+        if wait > 0.0:
+            time.sleep(wait)
+            self.seconds += time.perf_counter() - now
+
+
 class LiveShow:
     """Shows a session while it is played; pass it to `play_session` as `on_step`.
 
@@ -166,10 +185,12 @@ class LiveShow:
 
     Args:
         console: console for the output.
+        film: video of the session, whose progress is shown.
+        pace: delay of the session.
     """
 
-    def __init__(self, console: Console) -> None:
-        self._console = console
+    def __init__(self, console: Console, film: Film | None = None, pace: Pace | None = None) -> None:
+        self._console, self._film, self._pace = console, film, pace
         self._width = min(console.width, _WIDEST)
         self._live = Live(console=console, refresh_per_second=8, transient=True) if console.is_terminal else None
         self._begun: float | None = None
@@ -201,7 +222,8 @@ class LiveShow:
     def _standing(self, engine: SessionEngine) -> RenderableType:
         assert self._begun is not None
         task, seconds = engine.session.task, engine.session.world.time
-        wall = max(time.perf_counter() - self._begun, 1e-6)
+        apart = sum(each.seconds for each in (self._film, self._pace) if each is not None)
+        wall = max(time.perf_counter() - self._begun - apart, 1e-6)
         reached = sum(task.reached(i) for i in task.live)
         bar = Table.grid(padding=(0, 1))
         bar.add_row(
@@ -216,6 +238,9 @@ class LiveShow:
             Text(f"{reached} of {len(task.live)} tasks"),
             Text(f"{seconds / wall:.0f} x real time", style="dim"),
         )
+        if self._film is not None:
+            drawn = f"video: {self._film.frames} frames drawn in {clock(self._film.seconds)}"
+            bar.add_row("", Text(drawn, style="dim"))
         return Group(Text(""), tasks(task, self._console), bar)
 
 

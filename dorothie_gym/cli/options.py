@@ -8,12 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 from typer.core import TyperCommand
 
+from dorothie_gym.cli.completion import complete_policy
 from dorothie_gym.cli.output import fail
 
 if TYPE_CHECKING:
     from dorothie_gym.engine.config import EnvConfig
     from dorothie_gym.ontology import Role
     from dorothie_gym.policies import Player
+
+
+def needs(extra: str) -> str:
+    """Returns "needs dorothie-gym[EXTRA]" for help texts, which are rich's markup."""
+    return rf"needs dorothie-gym\[{extra}]"
 
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
@@ -27,7 +33,9 @@ Players = Annotated[int | None, typer.Option(min=1, help="Number of worker proce
 Participant = Annotated[
     str,
     typer.Option(
-        metavar="scripted|silent|random|FILE", help="Policy of the participant; a file holds a learned policy."
+        metavar="scripted|silent|random|FILE",
+        help="Policy of the participant; a file holds a learned policy.",
+        autocompletion=complete_policy("participant"),
     ),
 ]
 
@@ -36,12 +44,17 @@ CoWizard = Annotated[
     typer.Option(
         metavar="scripted|silent|random|lane-follow|FILE",
         help="Policy of the Co-Wizard; a file holds a learned policy.",
+        autocompletion=complete_policy("co_wizard"),
     ),
 ]
 
 AdWizard = Annotated[
     str,
-    typer.Option(metavar="scripted|silent|random|FILE", help="Policy of the Ad-Wizard; a file holds a learned policy."),
+    typer.Option(
+        metavar="scripted|silent|random|FILE",
+        help="Policy of the Ad-Wizard; a file holds a learned policy.",
+        autocompletion=complete_policy("ad_wizard"),
+    ),
 ]
 
 MaxSeconds = Annotated[
@@ -61,7 +74,7 @@ Ray = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Play on a Ray cluster: auto, HOST:PORT, ray://HOST:PORT or local (needs dorothie-gym[ray]).",
+        help=f"Play on a Ray cluster: auto, HOST:PORT, ray://HOST:PORT or local ({needs('ray')}).",
     ),
 ]
 

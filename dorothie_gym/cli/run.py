@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import AdWizard, AsJson, CoWizard, Participant, WordErrors, env_config, find_cast
+from dorothie_gym.cli.completion import complete_storyboard, complete_town
+from dorothie_gym.cli.options import AdWizard, AsJson, CoWizard, Participant, WordErrors, env_config, find_cast, needs
 from dorothie_gym.cli.output import (
     INTERRUPTED,
     Facts,
@@ -26,6 +27,8 @@ from dorothie_gym.cli.output import (
 )
 
 if TYPE_CHECKING:
+    from dorothie_gym.cli.film import Film
+    from dorothie_gym.cli.live import Pace
     from dorothie_gym.engine.session_engine import SessionEngine
     from dorothie_gym.engine.session_log import SessionSummary
 
@@ -46,15 +49,23 @@ class _Plan:
     players: tuple[str, str, str]
     max_seconds: float | None
     word_errors: float
+    speed: float | None
 
 
 def run(
     town: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).")
+        str,
+        typer.Option(
+            metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).", autocompletion=complete_town
+        ),
     ] = "brookside",
     storyboard: Annotated[
         str | None,
-        typer.Option(metavar="NAME|FILE", help="Name of a storyboard, or a file (.json); default: drawn."),
+        typer.Option(
+            metavar="NAME|FILE",
+            help="Name of a storyboard, or a file (.json); default: drawn.",
+            autocompletion=complete_storyboard,
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed; equal seeds give equal sessions.")] = 0,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Record the session into this new folder.")] = None,
@@ -64,7 +75,7 @@ def run(
     ] = None,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw no picture.")] = False,
     video: Annotated[
-        Path | None, typer.Option(metavar="V.mp4", help="Write a video of the session (needs dorothie-gym[video]).")
+        Path | None, typer.Option(metavar="V.mp4", help=f"Write a video of the session ({needs('video')}).")
     ] = None,
     participant: Participant = "scripted",
     co_wizard: CoWizard = "scripted",
@@ -73,9 +84,21 @@ def run(
         float | None, typer.Option(min=1.0, max=86400.0, help="Truncate the session after this simulated time [s].")
     ] = None,
     word_errors: WordErrors = 0.0,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1,
+            max=1000.0,
+            metavar="FACTOR",
+            help="Play at this multiple of real time (1 to watch); default: as fast as possible.",
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Play one session with the three roles."""
+    """Play one session with the three roles.
+
+    The times of the dialogue, on the terminal and in pictures, are those at which an utterance is heard, at its end.
+    """
     if no_picture and picture is not None:
         fail("--picture and --no-picture exclude each other; give one of them")
     plan = _Plan(
@@ -88,6 +111,7 @@ def run(
         players=(participant, co_wizard, ad_wizard),
         max_seconds=max_seconds,
         word_errors=word_errors,
+        speed=speed,
     )
     _check_outputs(plan)
     with reporting_errors():
@@ -127,7 +151,7 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
         fail(str(error))
     begun = time.perf_counter()
     with ExitStack() as stack:
-        watchers = _watchers(plan, stack, quiet=quiet)
+        film, pace, watchers = _watchers(plan, stack, quiet=quiet)
 
         def watch(engine: SessionEngine) -> None:
             for watcher in watchers:
@@ -138,24 +162,35 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
         except KeyboardInterrupt:
             stack.close()
             _exit_interrupted(engine, plan)
-    wall = time.perf_counter() - begun
+    drawing, waiting = film.seconds if film is not None else 0.0, pace.seconds if pace is not None else 0.0
+    wall = time.perf_counter() - begun - drawing - waiting
     if plan.picture is not None:
         _draw(engine, plan.picture)
     return _facts(engine, ending, wall, plan.out)
 
 
-def _watchers(plan: _Plan, stack: ExitStack, *, quiet: bool) -> list[Callable[[SessionEngine], None]]:
-    """Returns the observers of the session: the display on the terminal, and the video."""
+def _watchers(
+    plan: _Plan, stack: ExitStack, *, quiet: bool
+) -> tuple[Film | None, Pace | None, list[Callable[[SessionEngine], None]]]:
+    """Returns the video, the delay, and all observers of the session, with the display on the terminal."""
+    film: Film | None = None
+    pace: Pace | None = None
     watchers: list[Callable[[SessionEngine], None]] = []
     if plan.video is not None:
         from dorothie_gym.cli.film import Film
 
-        watchers.append(stack.enter_context(Film(plan.video)))
+        film = stack.enter_context(Film(plan.video))
+        watchers.append(film)
+    if plan.speed is not None:
+        from dorothie_gym.cli.live import Pace
+
+        pace = Pace(plan.speed)
+        watchers.append(pace)
     if not quiet:
         from dorothie_gym.cli.live import LiveShow
 
-        watchers.append(stack.enter_context(LiveShow(stdout())))
-    return watchers
+        watchers.append(stack.enter_context(LiveShow(stdout(), film, pace)))
+    return film, pace, watchers
 
 
 def _exit_interrupted(engine: SessionEngine, plan: _Plan) -> None:
@@ -172,11 +207,11 @@ def _exit_interrupted(engine: SessionEngine, plan: _Plan) -> None:
 def _draw(engine: SessionEngine, path: Path) -> None:
     """Draws the whole town at the end of the session, with route and dialogue."""
     from dorothie_gym.engine.session_scene import scene_of
-    from dorothie_gym.rendering.frames import SceneRenderer
+    from dorothie_gym.rendering.frames import PICTURE_SIZE, SceneRenderer
 
     scenario = engine.scenario
     caption = f"{engine.town.name} · {scenario.storyboard.name} · seed {scenario.seed}"
-    SceneRenderer().save(scene_of(engine.session, caption), path, follow=False)
+    SceneRenderer(PICTURE_SIZE, transcript=True).save(scene_of(engine.session, caption), path, follow=False)
 
 
 def _facts(engine: SessionEngine, ending: SessionSummary, wall: float, out: Path | None) -> Facts:

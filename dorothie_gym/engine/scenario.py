@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TypeAlias
 
+import gymnasium
 import numpy as np
 
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.errors import did_you_mean, short_repr
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.recording import SessionHeader
@@ -41,6 +44,16 @@ ResetOptions: TypeAlias = Mapping[str, object]
 """Options of an environment's `reset`."""
 
 
+def check_options(options: ResetOptions | None, *known: str) -> None:
+    """Warns of the options of a reset that an environment does not know; it ignores them."""
+    for name in options or {}:
+        if name not in known:
+            hint = did_you_mean(str(name), known)
+            gymnasium.logger.warn(
+                f"reset option {short_repr(name)} is unknown and ignored; {hint}known: {', '.join(known)}"
+            )
+
+
 def scenario_option(options: ResetOptions | None) -> Scenario | None:
     """Returns the option `scenario` of a reset, or None; other options are ignored.
 
@@ -51,6 +64,22 @@ def scenario_option(options: ResetOptions | None) -> Scenario | None:
     if scenario is not None and not isinstance(scenario, Scenario):
         raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
     return scenario
+
+
+def template_option(storyboard: str | Path | StoryboardTemplate | None) -> StoryboardTemplate | None:
+    """Returns the template that an argument `storyboard` names; None draws one of the shipped templates.
+
+    Raises:
+        StoryboardError: the template does not exist or is invalid.
+        ValueError: the argument is of another type.
+    """
+    if storyboard is None or isinstance(storyboard, StoryboardTemplate):
+        return storyboard
+    if not isinstance(storyboard, str | Path):
+        raise ValueError(
+            f"storyboard is a {type(storyboard).__name__}; it must be a name, a path or a StoryboardTemplate"
+        )
+    return load_template(storyboard)
 
 
 def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) -> Scenario:

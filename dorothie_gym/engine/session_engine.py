@@ -17,7 +17,7 @@ from dorothie_gym.engine.exception_executor import ExceptionExecutor
 from dorothie_gym.engine.masks import ActionMasks, RoleMask
 from dorothie_gym.engine.observations import DeliveredMessages, LazyObservations, ObservationBuilder
 from dorothie_gym.engine.path_measurements import UpcomingJunction
-from dorothie_gym.engine.scenario import Scenario, draw_scenario, header_of
+from dorothie_gym.engine.scenario import Scenario, draw_scenario, header_of, template_option
 from dorothie_gym.engine.session_log import EventLog, SessionSummary, SubgoalCounts, SubgoalTracker
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import AGENT_ROLES, NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, Role
@@ -39,7 +39,7 @@ from dorothie_gym.spaces import (
     SpaceLimits,
     StepInfo,
 )
-from dorothie_gym.tasks import StoryboardTemplate, TaskState, load_template
+from dorothie_gym.tasks import StoryboardTemplate, TaskState
 
 _INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
@@ -56,6 +56,7 @@ class LiveSession:
         beliefs: goals and places of hidden landmarks as the Co-Wizard has stated them.
         masks: masks of the actions that would be carried out now.
         messages: messages of the Ad-Wizard so far, with their times [s].
+        exceptions: times [s] of the exceptions so far, positions of the ego [m], and data of their events.
         trail: positions of the ego [m], one for each decision.
         decisions: decisions played so far.
         over: whether the session is closed.
@@ -83,6 +84,7 @@ class LiveSession:
         self._subgoals = SubgoalTracker(scenario, self.task, self._dialogue, self._log)
         self.decisions = 0
         self.messages: list[tuple[float, str]] = []
+        self.exceptions: list[tuple[float, tuple[float, float], Mapping[str, object]]] = []
         self.trail: list[tuple[float, float]] = [self._ego_position()]
         self.over = False
         self._end_reason = ""
@@ -166,7 +168,9 @@ class LiveSession:
             return ""
         if action.exception is not ExceptionKind.MESSAGE:
             self._log.counts["exceptions"] += 1
-            self._log.add(EventType.EXCEPTION, Role.AD_WIZARD, {"kind": name, **outcome})
+            data = {"kind": name, **outcome}
+            self.exceptions.append((self.world.time, self._ego_position(), data))
+            self._log.add(EventType.EXCEPTION, Role.AD_WIZARD, data)
         if action.exception.is_task:
             self._subgoals.note_changes(name)
         if action.message:
@@ -306,8 +310,12 @@ class SessionEngine:
     ) -> None:
         if max_cycles is not None and max_cycles < 1:
             raise ValueError(f"max_cycles is {max_cycles}; it must be at least 1")
+        if config is not None and not isinstance(config, EnvConfig):
+            raise ValueError(
+                f"config is a {type(config).__name__}; it must be an EnvConfig, such as EnvConfig(max_seconds=600.0)"
+            )
         self.town = town if isinstance(town, Town) else load_town(town)
-        self.template = load_template(storyboard) if isinstance(storyboard, str | Path) else storyboard
+        self.template = template_option(storyboard)
         self.config = config or EnvConfig()
         self.max_cycles = max_cycles
         self.limits = SpaceLimits.for_town(self.town)

@@ -13,16 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.engine.path_measurements import UpcomingJunction
-from dorothie_gym.engine.scenario import ResetOptions, Scenario, draw_scenario, scenario_option
+from dorothie_gym.engine.scenario import (
+    ResetOptions,
+    Scenario,
+    check_options,
+    draw_scenario,
+    scenario_option,
+    template_option,
+)
 from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.envs.navigation_config import NavigationConfig
-from dorothie_gym.envs.session_view import METADATA, SessionView
+from dorothie_gym.envs.session_view import SessionView, metadata_at
+from dorothie_gym.envs.time_limit import TimeLimitedEnv, decisions_in
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, UNDER_WAY, NavigationAction, prepares
-from dorothie_gym.policies.navigation.instructor import Guidance, Instructor
+from dorothie_gym.policies.navigation.instructor import Guidance, Instructor, NavigationInstruction, words_of
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder, Vector
 from dorothie_gym.policies.observation_parser import read_landmarks
@@ -45,7 +53,7 @@ from dorothie_gym.spaces import (
     SpaceLimits,
     StepInfo,
 )
-from dorothie_gym.tasks import StoryboardTemplate, load_template
+from dorothie_gym.tasks import StoryboardTemplate
 
 NEARER = 1.0
 """Decrease of the cost to go that counts as progress for `patience` [m]."""
@@ -251,21 +259,27 @@ class DrivingSession:
 Action = TypeVar("Action")
 
 
-class DrivingEnv(gym.Env[Vector, Action]):
+class DrivingEnv(TimeLimitedEnv[Vector, Action]):
     """Base class of the navigation environments; subclasses define observations and actions."""
-
-    metadata = METADATA
 
     def __init__(
         self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
-        render_mode: str | None,
+        render_mode: str | None, view: str,
     ) -> None:  # fmt: skip
         self.config = config
-        self.render_mode, self._view = render_mode, SessionView(render_mode)
+        self.metadata = metadata_at(config.decision_frequency)
+        self.render_mode = render_mode
+        self._view = SessionView.of_role(Role.CO_WIZARD, view, render_mode, config.decision_frequency)
+        self._shown: NavigationInstruction | None = None
         self.town = town if isinstance(town, Town) else load_town(town)
-        self.template = load_template(storyboard) if isinstance(storyboard, str | Path) else storyboard
+        self.template = template_option(storyboard)
         self._network = TownNetwork(self.town)
         self._drive: DrivingSession | None = None
+
+    @property
+    def decision_limit(self) -> int:
+        """Decisions until truncation."""
+        return decisions_in(self.config.max_seconds, self.config.decision_frequency)
 
     @property
     def drive(self) -> DrivingSession:
@@ -277,16 +291,31 @@ class DrivingEnv(gym.Env[Vector, Action]):
     def begin(self, seed: int | None, options: ResetOptions | None) -> DrivingSession:
         """Begins a session, see `reset`."""
         super().reset(seed=seed)
+        check_options(options, "scenario")
         session = seed if seed is not None else int(self.np_random.integers(2**31))
         self._drive = DrivingSession.begin(
             self.town, self._network, self.template, self.config, session, scenario_option(options)
         )
-        if self.render_mode == "human":
-            self.render()
+        self._view.begin(self._drive.session)
+        self.show()
         return self._drive
 
+    def show(self) -> None:
+        """Notes the present decision for `render()`, and draws it in human mode."""
+        drive = self.drive
+        instruction = drive.heard.instruction
+        if instruction is not None and instruction is not self._shown:
+            self._view.note_instruction(instruction.time, words_of(instruction), str(instruction.act))
+        self._shown = instruction
+        self._view.note(drive.seen[Role.CO_WIZARD])
+        if self.render_mode == "human":
+            self.render()
+
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
+        """Draws what the Co-Wizard observes, or the session (see `view`), as `DuoWizardEnv.render`.
+
+        The instructions of the participant are part of the picture.
+        """
         return self._view.render(self.drive.session)
 
     def close(self) -> None:

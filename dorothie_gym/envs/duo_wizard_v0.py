@@ -17,7 +17,7 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import ResetOptions, Scenario, scenario_option
 from dorothie_gym.engine.session_engine import LiveSession, SessionEngine
 from dorothie_gym.engine.session_log import SessionSummary
-from dorothie_gym.envs.session_view import METADATA, SessionView
+from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.recording import Event, SessionHeader
@@ -76,7 +76,7 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
     - `max_cycles`: decisions until truncation, instead of `config.max_seconds`.
 
     `reset(options={"scenario": Scenario})` plays a given scenario, whose seed is then the session's; other options
-    are ignored.
+    are ignored, as PettingZoo's API test expects.
 
     ## Version History
     - v0: first version.
@@ -94,7 +94,9 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
         max_cycles: int | None = None,
     ) -> None:
         self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
-        self.render_mode, self._view = render_mode, SessionView(render_mode)
+        rate = self.engine.config.decision_frequency
+        self.metadata = {**_METADATA, **metadata_at(rate)}
+        self.render_mode, self._view = render_mode, SessionView(render_mode, frames_per_second=rate)
         self.possible_agents = [str(role) for role in AGENT_ROLES]
         self.agents: list[str] = []
         self.observation_spaces = {
@@ -123,12 +125,13 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
 
         Args:
             seed: seed of the session; without one, the next of the series that the last given seed began.
-            options: `scenario` plays a given `Scenario`; other options are ignored.
+            options: `scenario` plays a given `Scenario`; other options are ignored, as PettingZoo's API test expects.
 
         Returns:
             Observations and infos by agent.
         """
         observations = self.engine.reset(seed, scenario=scenario_option(options))
+        self._view.begin(self.session)
         self.agents = list(self.possible_agents)
         if self.render_mode == "human":
             self.render()
@@ -164,7 +167,7 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
         return self.engine.observations.of(), rewards, terminations, truncations, infos
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
+        """Draws the whole session: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
         return self._view.render(self.session)
 
     def close(self) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.driving_session import DrivingEnv, DrivingSession, NavigationMask
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ActionValue, ObjectClass, PhysicalAction, Role, WeatherParameter
 from dorothie_gym.policies.navigation.actions import LEFT, RIGHT
@@ -211,6 +212,8 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
     - v0: first version.
     """
 
+    metadata = metadata_at(10.0)
+
     def __init__(
         self,
         town: str | Path | Town = "brookside",
@@ -223,12 +226,13 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         patience: float = 60.0,
         decision_frequency: float = 10.0,
         render_mode: str | None = None,
+        view: str = "role",
     ) -> None:
         config = NavigationConfig(
             traffic=traffic, exceptions=exceptions, weights=weights_of(reward), max_seconds=max_seconds,
             patience=patience, decision_frequency=decision_frequency,
         )  # fmt: skip
-        super().__init__(town, storyboard, config, render_mode)
+        super().__init__(town, storyboard, config, render_mode, view)
         self.action_space = spaces.Box(-1.0, 1.0, (len(CONTROL_SPECS),), dtype=np.float32)
         self.observation_space = spaces.Box(-1.0, 1.0, (sum(CONTINUOUS_FIELDS.values()),), dtype=np.float32)
         self._controls: NavigationMask | None = None
@@ -255,8 +259,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         drive.session.world.ego.manual = VehicleControl(throttle=throttle, steer=steer, brake=brake)
         drive.play(CoWizardAction(physical=self._prepare(drive)))
         self._keep_path(drive)
-        if self.render_mode == "human":
-            self.render()
+        self.show()
         return self._observe(drive), drive.reward, drive.terminated, drive.truncated, drive.info()
 
     def _observe(self, drive: DrivingSession) -> Vector:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.driving_session import DrivingEnv, NavigationMask
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation.actions import ACTIONS, NavigationAction, physical_of
 from dorothie_gym.policies.navigation.instructor import Guidance
-from dorothie_gym.policies.navigation.observation_vector import Vector, navigation_space
+from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, Vector, navigation_space
 from dorothie_gym.spaces import CoWizardAction, StepInfo
 from dorothie_gym.tasks import StoryboardTemplate
 
@@ -58,6 +59,8 @@ class NavigationEnv(DrivingEnv[np.int64]):
     - `reward`: "dense", "sparse" or `NavigationWeights`.
     - `max_seconds`, `patience`: see above [s].
     - `render_mode`: None, `"rgb_array"` or `"human"`.
+    - `view`: picture of `render()`: `"role"` (what the Co-Wizard observes, and the instructions) or `"session"`
+      (everything).
 
     `reset(seed=...)` plays the scenario of `DuoWizardEnv` for this seed; `reset(options={"scenario": Scenario})`
     plays a given one.
@@ -65,6 +68,8 @@ class NavigationEnv(DrivingEnv[np.int64]):
     ## Version History
     - v0: first version.
     """
+
+    metadata = metadata_at(DECISION_FREQUENCY)
 
     def __init__(
         self,
@@ -78,12 +83,13 @@ class NavigationEnv(DrivingEnv[np.int64]):
         max_seconds: float = 600.0,
         patience: float = 60.0,
         render_mode: str | None = None,
+        view: str = "role",
     ) -> None:
         config = NavigationConfig(
             guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
             max_seconds=max_seconds, patience=patience,
         )  # fmt: skip
-        super().__init__(town, storyboard, config, render_mode)
+        super().__init__(town, storyboard, config, render_mode, view)
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = navigation_space()
         self._controls: NavigationMask | None = None
@@ -94,7 +100,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
 
         Args:
             seed: seed of the session; None draws one.
-            options: `scenario` plays a given `Scenario`; other options are ignored.
+            options: `scenario` plays a given `Scenario`; other options cause a warning.
         """
         drive = self.begin(seed, options)
         self._controls = NavigationMask(drive.session.world, drive.exits)
@@ -112,8 +118,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
             raise ValueError(f"action is {action}; it must be in 0..{len(ACTIONS) - 1}, see NavigationAction")
         physical = physical_of(NavigationAction(int(action)), drive.seen[Role.CO_WIZARD], drive.exits)
         drive.play(CoWizardAction(physical=physical))
-        if self.render_mode == "human":
-            self.render()
+        self.show()
         return self._observe(), drive.reward, drive.terminated, drive.truncated, self._info()
 
     def action_masks(self) -> NDArray[np.bool_]:

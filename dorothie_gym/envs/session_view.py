@@ -1,4 +1,4 @@
-"""`render()` of the environments: the aerial view of a session as an array or in a window."""
+"""`render()` of the environments: a session from above, for one role or for all, as an array or in a window."""
 
 from __future__ import annotations
 
@@ -8,15 +8,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.engine.session_engine import LiveSession
+from dorothie_gym.ontology import Role
+from dorothie_gym.spaces import Observation
 
 if TYPE_CHECKING:
-    from dorothie_gym.engine.session_scene import SessionRenderer
+    from dorothie_gym.engine.role_scene import RoleView
+    from dorothie_gym.rendering.frames import HumanWindow, SceneRenderer
+    from dorothie_gym.rendering.scene import Scene, SpokenLine
 
 RENDER_MODES: Final[tuple[str, ...]] = ("human", "rgb_array")
 """Render modes of the environments that play sessions."""
 
-METADATA: Final[dict[str, object]] = {"render_modes": list(RENDER_MODES), "render_fps": 2}
-"""Metadata of these environments for Gymnasium."""
+VIEWS: Final[tuple[str, ...]] = ("role", "session")
+"""Views of the environments of one role: what the role observes, or the whole session."""
+
+
+def metadata_at(decision_frequency: float) -> dict[str, object]:
+    """Returns the metadata of these environments for Gymnasium; they render one frame per decision [Hz]."""
+    rate = int(decision_frequency) if decision_frequency == int(decision_frequency) else decision_frequency
+    return {"render_modes": list(RENDER_MODES), "render_fps": rate}
+
+
+METADATA: Final[dict[str, object]] = metadata_at(2.0)
+"""Metadata of the environments with two decisions per second."""
 
 
 class SessionView:
@@ -24,13 +38,49 @@ class SessionView:
 
     Args:
         render_mode: None, "human" or "rgb_array".
+        frames_per_second: highest frame rate of the window [1/s].
+        role: role whose observations are drawn; None draws the whole session.
+
+    Raises:
+        ValueError: the render mode is unknown.
     """
 
-    def __init__(self, render_mode: str | None) -> None:
+    def __init__(self, render_mode: str | None, *, frames_per_second: float, role: Role | None = None) -> None:
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or one of {', '.join(RENDER_MODES)}")
-        self._mode = render_mode
-        self._renderer: SessionRenderer | None = None
+        self._mode, self._rate, self._role = render_mode, frames_per_second, role
+        self._seen: RoleView | None = None
+        self._heard: list[SpokenLine] = []
+        self._renderer: SceneRenderer | None = None
+        self._window: HumanWindow | None = None
+
+    @classmethod
+    def of_role(cls, role: Role, view: str, render_mode: str | None, frames_per_second: float) -> SessionView:
+        """Returns the view of an environment of one role; raises `ValueError` if `view` is not one of `VIEWS`."""
+        if view not in VIEWS:
+            raise ValueError(f"view is {view!r}; it must be one of {', '.join(VIEWS)}")
+        return cls(render_mode, frames_per_second=frames_per_second, role=role if view == "role" else None)
+
+    def begin(self, session: LiveSession) -> None:
+        """Begins a session; what was noted of the last one is forgotten."""
+        self._heard = []
+        if self._mode is not None and self._role is not None:
+            from dorothie_gym.engine.role_scene import RoleView
+
+            self._seen = RoleView(self._role, session.world.town)
+
+    def note(self, seen: Observation) -> None:
+        """Notes the role's observation of a decision."""
+        if self._seen is not None:
+            self._seen.note(seen)
+
+    def note_instruction(self, time: float, text: str, acts: str) -> None:
+        """Notes an instruction of the participant that is not an utterance of the session; its time is in seconds."""
+        if self._mode is None:
+            return
+        from dorothie_gym.rendering.scene import SpokenLine
+
+        self._heard.append(SpokenLine(time=time, speaker=Role.PARTICIPANT, text=text, acts=acts))
 
     def render(self, session: LiveSession) -> NDArray[np.uint8] | None:
         """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
@@ -38,13 +88,31 @@ class SessionView:
             raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
         if self._renderer is None:
             # Imported here: pygame's fonts and surfaces are slow to import, and most sessions are never drawn.
-            from dorothie_gym.engine.session_scene import SessionRenderer
+            from dorothie_gym.rendering.frames import SceneRenderer
 
-            self._renderer = SessionRenderer(human=self._mode == "human")
-        return self._renderer.draw(session)
+            self._renderer = SceneRenderer()
+        frame = self._renderer.draw(self._scene(session))
+        if self._mode != "human":
+            return frame
+        if self._window is None:
+            from dorothie_gym.rendering.frames import HumanWindow
+
+            height, width, _ = frame.shape
+            self._window = HumanWindow((width, height), "dorothie_gym")
+        self._window.show(frame, self._rate)
+        return None
+
+    def _scene(self, session: LiveSession) -> Scene:
+        from dorothie_gym.engine.session_scene import scene_of, utterances_of
+
+        if self._seen is None:
+            return scene_of(session, heard=self._heard)
+        own = [line for line in utterances_of(session) if line.speaker is self._role]
+        return self._seen.scene([*self._heard, *own])
 
     def close(self) -> None:
         """Closes the window, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+        self._renderer = None

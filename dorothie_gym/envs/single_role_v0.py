@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
 
-import gymnasium as gym
 import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.scenario import ResetOptions, scenario_option
+from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_option
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.envs.session_view import METADATA, SessionView
+from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
+from dorothie_gym.envs.time_limit import TimeLimitedEnv, decisions_in
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
@@ -23,7 +23,7 @@ from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, StepInfo
 from dorothie_gym.tasks import StoryboardTemplate
 
 
-class SingleRole(gym.Env[Observation, ActionDict]):
+class SingleRole(TimeLimitedEnv[Observation, ActionDict]):
     """One of the three roles for the agent; policies play the other two.
 
     ## Description
@@ -53,6 +53,7 @@ class SingleRole(gym.Env[Observation, ActionDict]):
     ## Arguments
     - `role`: role of the agent, `"participant"`, `"co_wizard"` or `"ad_wizard"`.
     - `town`, `storyboard`, `config`, `render_mode`, `max_cycles`: as of `DuoWizardEnv`.
+    - `view`: picture of `render()`: `"role"` (what the role observes) or `"session"` (everything).
     - `partners`: policy of each other role: `"scripted"` (default), `"silent"`, `"random"`, or a `Policy`.
 
     `reset(seed=...)` plays the session that `DuoWizardEnv` has for this seed; the seeds of the partners follow from it.
@@ -73,18 +74,27 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         partners: Mapping[str, str | AnyPolicy] | None = None,
         render_mode: str | None = None,
         max_cycles: int | None = None,
+        view: str = "role",
     ) -> None:
         if role not in AGENT_ROLES:
             raise ValueError(f"role is {str(role)!r}; it must be one of {', '.join(AGENT_ROLES)}")
         self.role = Role(role)
         self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
-        self.render_mode, self._view = render_mode, SessionView(render_mode)
+        rate = self.engine.config.decision_frequency
+        self.metadata = metadata_at(rate)
+        self.render_mode, self._view = render_mode, SessionView.of_role(self.role, view, render_mode, rate)
         limits = self.engine.limits
         self.observation_space = deepcopy(observation_space(self.role, limits, self.engine.config.observe_acts))
         self.action_space = deepcopy(action_space(self.role, limits))
         self.partners = self._cast(partners or {})
         self._observing = (self.role, *(role for role, policy in self.partners.items() if policy.observes))
         self._states: dict[Role, object] = {}
+
+    @property
+    def decision_limit(self) -> int:
+        """Decisions until truncation."""
+        config = self.engine.config
+        return self.engine.max_cycles or decisions_in(config.max_seconds, config.decision_frequency)
 
     @property
     def noop_action(self) -> ActionDict:
@@ -96,9 +106,10 @@ class SingleRole(gym.Env[Observation, ActionDict]):
 
         Args:
             seed: seed of the session; without one it is drawn.
-            options: `scenario` plays a given `Scenario`; other options are ignored.
+            options: `scenario` plays a given `Scenario`; other options cause a warning.
         """
         super().reset(seed=seed)
+        check_options(options, "scenario")
         session = seed if seed is not None else int(self.np_random.integers(2**31))
         observations = self.engine.reset(session, scenario=scenario_option(options))
         scenario = self.engine.scenario
@@ -106,8 +117,10 @@ class SingleRole(gym.Env[Observation, ActionDict]):
             role: policy.initial_state(policy_seed(scenario.seed, role), self.engine.town)
             for role, policy in self.partners.items()
         }
-        self._render_window()
-        return observations.of(self._observing)[self.role], self.engine.info(self.role)
+        observation = observations.of(self._observing)[self.role]
+        self._view.begin(self.engine.session)
+        self._show(observation)
+        return observation, self.engine.info(self.role)
 
     def step(self, action: ActionMapping) -> tuple[Observation, float, bool, bool, StepInfo]:
         """Plays one decision of all roles.
@@ -126,16 +139,17 @@ class SingleRole(gym.Env[Observation, ActionDict]):
         info = self.engine.info(self.role, terms)
         if self.engine.over:
             info["is_success"] = self.engine.session.success
-        self._render_window()
         reward = float(sum(terms.values()))
         observation = self.engine.observations.of((self.role,) if self.engine.over else self._observing)[self.role]
+        self._show(observation)
         return observation, reward, outcome.terminated, outcome.truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws the aerial view, see `DuoWizardEnv.render`."""
+        """Draws what the role observes, or the session (see `view`): an array (800, 1280, 3), or None in human mode."""
         return self._view.render(self.engine.session)
 
-    def _render_window(self) -> None:
+    def _show(self, observation: Observation) -> None:
+        self._view.note(observation)
         if self.render_mode == "human":
             self.render()
 

@@ -18,7 +18,7 @@ from dorothie_gym.benchmark.metrics import (
     SlotScorePaper,
 )
 from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
-from dorothie_gym.engine.scenario import ResetOptions
+from dorothie_gym.engine.scenario import ResetOptions, check_options
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town
@@ -104,6 +104,7 @@ class TeacherForcedEnv(PointEnv):
         self._count = 0
 
     def _begin(self, seed: int | None, options: ResetOptions) -> Iterator[Point]:
+        check_options(options, "session")
         wanted = options.get("session")
         order = self.np_random.permutation(len(self._library)).tolist() if wanted is None else [self._number(wanted)]
         for number in order:

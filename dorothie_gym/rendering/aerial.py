@@ -11,13 +11,19 @@ from numpy.typing import NDArray
 from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.rendering import MapPainter, palette
 from dorothie_gym.rendering.figures import (
+    PIN_LENGTH,
     Canvas,
     draw_actor,
     draw_car,
+    draw_direction,
+    draw_estimate,
+    draw_exception,
     draw_headlights,
     draw_pin,
+    draw_start,
     draw_trail,
     draw_waypoints,
+    pin_direction,
 )
 from dorothie_gym.rendering.scene import Pin, Scene
 from dorothie_gym.rendering.text import font
@@ -108,7 +114,6 @@ def _value(weather: Mapping[str, float], parameter: WeatherParameter) -> float:
 _WINDOW = 160.0  # [m] across the shorter side when the view follows the car
 _COUNTRY_AROUND = 30.0  # [m] of country around the base map of that view
 _PIN_TYPE = 13  # [px]
-_PIN_HEIGHT = 31  # [px] from the tip to the top
 _TOWNS_KEPT = 2
 
 
@@ -173,11 +178,20 @@ class AerialView:
         if car.lights:
             draw_headlights(canvas, at, car.heading, car.length, car.width)
         draw_trail(canvas, scene.trail)
+        draw_direction(canvas, scene.trail)
+        if len(scene.trail):
+            draw_start(canvas, scene.trail[0])
         draw_waypoints(canvas, scene.waypoints)
+        for estimate in scene.estimates:
+            colour = palette.STATE["none"] if estimate.label else palette.CAR
+            draw_estimate(canvas, np.array([estimate.x, estimate.y]), estimate.covariance, colour)
         for actor in scene.others:
             if canvas.shows((actor.x, actor.y), -30.0):
                 place = np.array([actor.x, actor.y])
                 draw_actor(canvas, actor.kind, place, actor.heading, actor.length, actor.width)
+        for number, mark in enumerate(scene.exceptions, 1):
+            if canvas.shows((mark.x, mark.y), -12.0):
+                draw_exception(canvas, np.array([mark.x, mark.y]), number)
         draw_car(canvas, at, car.heading, car.length, car.width)
 
     def _draw_pins(self, canvas: Canvas, scene: Scene, follow: bool, names: list[_Box]) -> None:
@@ -192,8 +206,8 @@ class AerialView:
             colour = palette.STATE[pin.state]
             done = pin.state == "complete"
             draw_pin(canvas, np.array([pin.x, pin.y]), np.array(pin.waypoint), colour, pin.hidden and not done, done)
-            x, y = canvas.pixel((pin.x, pin.y)).tolist()
-            taken.append((x - 12, y - _PIN_HEIGHT, 24, _PIN_HEIGHT))
+            x, y = _head(canvas, pin).tolist()
+            taken.append((x - 12, y - 12, 24, 24))
         for pin in seen:
             self._write_name(canvas, pin, taken, names)
         if follow:
@@ -202,14 +216,13 @@ class AerialView:
 
     def _write_name(self, canvas: Canvas, pin: Pin, taken: list[_Box], names: list[_Box]) -> None:
         """Draws the name of a pin on the side where it covers least."""
-        x, y = canvas.pixel((pin.x, pin.y)).tolist()
+        x, y = _head(canvas, pin).tolist()
         width, height = font(_PIN_TYPE, True).size(pin.label)[0] + 14, 22
-        head = y - 19 - height / 2
         options: list[_Box] = [
-            (x + 15, head, width, height),
-            (x - 15 - width, head, width, height),
-            (x - width / 2, y - _PIN_HEIGHT - 5 - height, width, height),
-            (x - width / 2, y + 6, width, height),
+            (x + 15, y - height / 2, width, height),
+            (x - 15 - width, y - height / 2, width, height),
+            (x - width / 2, y - 17 - height, width, height),
+            (x - width / 2, y + 17, width, height),
         ]
         box = min(options, key=lambda b: sum(_overlap(b, other) for other in (*taken, *names)) + self._lost(b))
         taken.append(box)
@@ -249,6 +262,12 @@ class AerialView:
         _x, _y, width, height = box
         inside = _overlap(box, (0.0, 0.0, float(self.size[0]), float(self.size[1])))
         return 2.0 * (width * height - inside)
+
+
+def _head(canvas: Canvas, pin: Pin) -> NDArray[np.float64]:
+    """Returns the middle of the head of a pin (2,) [px]."""
+    at = np.array([pin.x, pin.y])
+    return canvas.pixel(at) + PIN_LENGTH * pin_direction(at, np.array(pin.waypoint))
 
 
 _Box = tuple[float, float, float, float]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -184,6 +185,19 @@ def draw_trail(canvas: Canvas, trail: Array) -> None:
             canvas.line(points[run], width, palette.TRAIL)
 
 
+_REGION = math.sqrt(-2.0 * math.log(0.05))  # Mahalanobis radius of the region of 95 % of a plane normal distribution
+
+
+def draw_estimate(canvas: Canvas, centre: Array, covariance: tuple[float, float, float], colour: Colour) -> None:
+    """Draws the region around an estimate (2,) [m] that holds 95 %; `covariance` is (xx, xy, yy) [m^2]."""
+    xx, xy, yy = covariance
+    spread, axes = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
+    angles = np.linspace(0.0, 2.0 * np.pi, 73)
+    circle = np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+    region = centre + _REGION * (circle * np.sqrt(np.maximum(spread, 0.0))) @ axes.T
+    canvas.line(canvas.pixel(region), 1.6, colour)
+
+
 def draw_waypoints(canvas: Canvas, waypoints: Array) -> None:
     """Draws the planned path (n, 2) [m] as dots, at least eight pixels apart."""
     last = np.full(2, -np.inf)
@@ -194,17 +208,33 @@ def draw_waypoints(canvas: Canvas, waypoints: Array) -> None:
         canvas.dot(point, 2.4, palette.WAYPOINT)
 
 
+PIN_LENGTH = 19.0
+"""Distance between the tip of a pin and the middle of its head [px]."""
+
+PIN_RADIUS = 10.0
+"""Radius of the head [px]."""
+
+
+def pin_direction(at: Array, waypoint: Array) -> Array:
+    """Returns the unit vector (2,) from the tip of a pin to its head: away from the road, so that it covers no name."""
+    away = at - waypoint
+    length = float(np.hypot(*away))
+    return np.asarray(away / length) if length > 0.5 else np.array([0.0, -1.0])
+
+
 def draw_pin(canvas: Canvas, at: Array, waypoint: Array, colour: Colour, hollow: bool, done: bool) -> None:
     """Draws a pin with its tip on a landmark (2,) [m]: hollow and dashed if hidden, with a tick once reached."""
     tip = canvas.pixel(at)
     stop = canvas.pixel(waypoint)
     canvas.line(np.stack((tip, stop)), 1.2, colour)
     canvas.ring(stop, 4.0, 1.5, colour)
-    head = tip + np.array([0.0, -19.0])
-    radius = 10.0
+    ahead = pin_direction(at, waypoint)
+    side = np.array([-ahead[1], ahead[0]])
+    head = tip + PIN_LENGTH * ahead
+    radius = PIN_RADIUS
     for grow, ink in ((2.0, palette.PAPER), (0.0, colour)):
-        side = np.array([[-0.82, 0.55], [0.82, 0.55]]) * (radius + grow)
-        canvas.pixel_polygon(np.concatenate((head + side, [tip + np.array([0.0, 1.5 * grow])])), ink)
+        wide, back = 0.82 * (radius + grow) * side, -0.55 * (radius + grow) * ahead
+        canvas.pixel_polygon(np.array([head + back - wide, head + back + wide, tip - 1.5 * grow * ahead]), ink)
         canvas.dot(head, radius + grow, ink)
     if hollow:
         canvas.dot(head, radius - 2.2, palette.PAPER)
@@ -217,3 +247,44 @@ def draw_pin(canvas: Canvas, at: Array, waypoint: Array, colour: Colour, hollow:
         canvas.line(tick, 2.4, palette.PAPER)
     else:
         canvas.dot(head, 3.8, palette.PAPER)
+
+
+_CHEVRON = np.array([[-3.4, -3.6], [2.6, 0.0], [-3.4, 3.6]])  # [px]
+_CHEVRON_SPACING = 70.0  # [px]
+
+
+def draw_direction(canvas: Canvas, trail: Array) -> None:
+    """Draws chevrons along the driven path (n, 2) [m] that point in the direction of the drive."""
+    points = canvas.pixel(trail.reshape(-1, 2))
+    if len(points) < 2:
+        return
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    stations = np.concatenate(([0.0], np.cumsum(lengths)))
+    for station in np.arange(0.5 * _CHEVRON_SPACING, stations[-1], _CHEVRON_SPACING):
+        before, after = (
+            np.array([np.interp(station + d, stations, points[:, k]) for k in (0, 1)]) for d in (-3.0, 3.0)
+        )
+        step = after - before
+        if float(np.hypot(*step)) < 1.0:
+            continue
+        angle = float(np.arctan2(step[1], step[0]))
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        canvas.line((before + after) / 2.0 + _CHEVRON @ turn.T, 1.8, palette.DIRECTION)
+
+
+def draw_start(canvas: Canvas, at: Array) -> None:
+    """Draws a ring with a dot where a drive (2,) [m] began."""
+    centre = canvas.pixel(at)
+    canvas.dot(centre, 8.0, palette.PAPER)
+    canvas.ring(centre, 7.0, 2.4, palette.DIRECTION)
+    canvas.dot(centre, 2.6, palette.DIRECTION)
+
+
+def draw_exception(canvas: Canvas, at: Array, number: int) -> None:
+    """Draws a numbered diamond where the car (2,) [m] was at an exception."""
+    centre = canvas.pixel(at)
+    for radius, ink in ((11.0, palette.PAPER), (9.5, palette.EXCEPTION)):
+        canvas.pixel_polygon(centre + radius * np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]), ink)
+    text = str(number)
+    wide = words(text, 10 * SUPERSAMPLING, palette.PAPER, True).get_width() / SUPERSAMPLING
+    canvas.text(text, float(centre[0]) - wide / 2.0, float(centre[1]), 10, palette.PAPER, bold=True)

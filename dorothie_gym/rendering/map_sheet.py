@@ -17,7 +17,7 @@ from dorothie_gym.rendering.ground import town_bounds
 from dorothie_gym.rendering.icons import ICON_SUPERSAMPLING, pin_icon, sign_icon, stamp
 from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.markings import one_way_arrow, one_way_places, turn_arrow
-from dorothie_gym.rendering.text import words
+from dorothie_gym.rendering.text import font, words
 from dorothie_gym.rendering.town_map import BAR_LENGTHS, GROUND, MapPainter
 
 if TYPE_CHECKING:
@@ -141,7 +141,8 @@ def sheet_size(town: Town) -> tuple[int, int]:
     # a narrow town needs room for title and legend
     width = max(width, 0.7 * height)
     unit = _unit(width)
-    whole = np.array([width + 4.0 * unit, height + 2.0 * unit + _strip(unit)])
+    key = site_key(town, [street.name for street in town.streets], unit, width)
+    whole = np.array([width + 4.0 * unit, height + 2.0 * unit + _strip(unit, len(key))])
     whole *= min(1.0, _LARGEST / whole.max())
     return round(float(whole[0])), round(float(whole[1]))
 
@@ -160,7 +161,8 @@ def sheet_painter(
         ValueError: the size is too small for a title and a map.
     """
     size = sheet_size(town) if size is None else size
-    _, edge, strip = _measures(size[0])
+    names = [street.name for street in town.streets] if street_names is None else street_names
+    _, edge, strip = _measures(town, names, size[0])
     if size[1] < 3 * strip:
         raise ValueError(f"size: {size} is too small for a title and a map")
     x0, y0, x1, y1 = town_bounds(town, GROUND)
@@ -217,10 +219,11 @@ def town_picture(
     return painter
 
 
-def _measures(width: int) -> tuple[float, int, int]:
+def _measures(town: Town, street_names: Sequence[str], width: int) -> tuple[float, int, int]:
     """Returns unit, edge around the map and strip below it [px] for a sheet of a width [px]."""
     unit = _unit(width)
-    return unit, round(2.0 * unit), round(_strip(unit))
+    edge = round(2.0 * unit)
+    return unit, edge, round(_strip(unit, len(site_key(town, street_names, unit, width - 2 * edge))))
 
 
 def _unit(width: float) -> float:
@@ -228,16 +231,55 @@ def _unit(width: float) -> float:
     return max(9.0, width / 110.0)
 
 
-def _strip(unit: float) -> float:
-    """Returns the height of the strip below the map [px]."""
-    return 11.0 * unit
+def _strip(unit: float, key_lines: int) -> float:
+    """Returns the height of the strip below the map [px], with the key of the sites below the legend."""
+    return (11.0 + (0.6 + _KEY_LINE * key_lines if key_lines else 0.0)) * unit
+
+
+_KEY_LINE = 1.7  # [units] height of a line of the key
+_KEY_TITLE = "Landmark sites:"
+
+
+def site_key(town: Town, street_names: Sequence[str], unit: float, width: float) -> list[str]:
+    """Returns the key of the numbered landmark sites: the street of each, in lines no wider than a width [px]."""
+    numbers: dict[str, list[int]] = {}
+    for site in town.sites:
+        known = 0 <= site.street < len(street_names)
+        numbers.setdefault(street_names[site.street] if known else "no street", []).append(site.id + 1)
+    if not numbers:
+        return []
+    entries = [f"{_ranges(found)} {street}" for street, found in numbers.items()]
+    face = font(_key_type(unit))
+    lines = [_KEY_TITLE]
+    for k, entry in enumerate(entries):
+        longer = f"{lines[-1]}  {entry}" + ("  ·" if k + 1 < len(entries) else "")
+        if face.size(longer)[0] <= width or lines[-1] == _KEY_TITLE:
+            lines[-1] = longer
+        else:
+            lines.append(longer.removeprefix(lines[-1]).strip())
+    return lines
+
+
+def _key_type(unit: float) -> int:
+    return max(9, round(1.15 * unit))
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Returns ascending numbers with their runs: "1-3, 7"."""
+    runs: list[list[int]] = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}–{run[-1]}" for run in runs)
 
 
 def _draw_sheet(surface: pygame.Surface, painter: MapPainter, fold: str | None) -> None:
     import pygame
 
     width, height = painter.size
-    unit, edge, strip = _measures(width)
+    unit, edge, strip = _measures(painter.town, painter.street_names, width)
     inner = pygame.Rect(edge, edge, width - 2 * edge, height - edge - strip)
     for box in ((0, 0, width, edge), (0, 0, edge, height), (width - edge, 0, edge, height)):
         surface.fill(palette.SHEET, box)
@@ -250,6 +292,9 @@ def _draw_sheet(surface: pygame.Surface, painter: MapPainter, fold: str | None) 
     after = _draw_title(surface, painter.town, unit, left, top, fold)
     before = _draw_scale(surface, painter.scale, unit, float(inner.right), top)
     Legend(painter.town, painter.plan, unit).draw(surface, after + 3.5 * unit, before - 3.0 * unit, top)
+    for k, line in enumerate(site_key(painter.town, painter.street_names, unit, width - 2 * edge)):
+        text = words(line, _key_type(unit), palette.INK)
+        surface.blit(text, (round(left + 0.2 * unit), round(top + (9.0 + _KEY_LINE * k) * unit)))
 
 
 def _draw_title(surface: pygame.Surface, town: Town, unit: float, left: float, top: float, fold: str | None) -> float:

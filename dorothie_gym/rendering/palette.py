@@ -66,6 +66,8 @@ CYCLIST: Colour = (18, 150, 150)
 PEDESTRIAN: Colour = (214, 92, 140)
 PROP: Colour = (230, 126, 34)
 HEADLIGHT: Colour = (255, 226, 130)
+DIRECTION: Colour = (22, 70, 160)
+EXCEPTION: Colour = (160, 60, 150)
 
 # Goals, by their state.
 STATE: dict[str, Colour] = {
@@ -82,4 +84,6 @@ PANEL_EDGE: Colour = (222, 224, 228)
 BUBBLE_PARTICIPANT: Colour = (255, 240, 214)
 BUBBLE_CO_WIZARD: Colour = (221, 233, 255)
 BUBBLE_AD_WIZARD: Colour = (252, 226, 226)
+INK_PARTICIPANT: Colour = (140, 84, 10)
+INK_CO_WIZARD: Colour = (26, 78, 176)
 NOTE: Colour = (190, 62, 62)

@@ -13,7 +13,9 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, PhysicalAction, Role, parse_landmark
 from dorothie_gym.recording import FRAME_RATE, ActorKind, EventType, Session
 from dorothie_gym.recording.header import LandmarkRow
-from dorothie_gym.rendering.scene import Actor, CarView, FigureKind, Pin, Scene, SpokenLine, SubgoalState
+from dorothie_gym.rendering.exception_words import exception_words
+from dorothie_gym.rendering.scene import Actor, CarView, ExceptionMark, FigureKind, Pin, Scene, SpokenLine, SubgoalState
+from dorothie_gym.tasks import map_labels
 
 _KINDS: Final[dict[int, FigureKind]] = {
     int(ActorKind.VEHICLE): "vehicle",
@@ -42,7 +44,13 @@ class Playback:
     def __init__(self, session: Session, town: Town) -> None:
         self._session, self._town = session, town
         self._lines = _lines(session)
+        self._labels = map_labels([parse_landmark(row["name"]) for row in session.header.landmarks])
         self._waypoints = [_waypoint(row, town) for row in session.header.landmarks]
+        self._exceptions = [
+            ExceptionMark(time=event.time, text=exception_words(event.data), x=car.x, y=car.y)
+            for event in session.of_type(EventType.EXCEPTION)
+            for car in (self._car(event.frame),)
+        ]
         rows = session.trajectory
         self._first_frame = int(rows["frame"][0]) if len(rows) else 0
         step = max(round(_TRAIL * FRAME_RATE), 1)
@@ -80,17 +88,20 @@ class Playback:
             others=self._others(frame),
             landmarks=[
                 Pin(
-                    label=parse_landmark(row["name"]).label,
+                    label=label,
                     x=row["x"],
                     y=row["y"],
                     waypoint=waypoint,
                     state=states.get(k, "none"),
                     hidden=row["hidden"],
                 )
-                for k, (row, waypoint) in enumerate(zip(header.landmarks, self._waypoints, strict=True))
+                for k, (row, label, waypoint) in enumerate(
+                    zip(header.landmarks, self._labels, self._waypoints, strict=True)
+                )
             ],
             subgoals=list(goals.values()),
             utterances=[line for line in self._lines if line.time <= time],
+            exceptions=[mark for mark in self._exceptions if mark.time <= time],
             notes=self._notes(frame),
             weather={} if weather is None else {name: float(weather[name][0]) for name in weather.dtype.names or ()},
             caption=header.storyboard,
@@ -195,10 +206,10 @@ def _waypoint(row: LandmarkRow, town: Town) -> tuple[float, float]:
 
 
 def _lines(session: Session) -> list[SpokenLine]:
-    """Returns all utterances and messages in order of time."""
+    """Returns all utterances and messages in the order in which they were heard."""
     lines = [
         SpokenLine(
-            time=said.start,
+            time=said.frame / FRAME_RATE,
             speaker=said.speaker,
             text=said.text,
             acts=" ".join(_short(move.act) for move in said.moves),

@@ -4,16 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology import GoalStatus, Role
 
 FigureKind: TypeAlias = Literal["vehicle", "cyclist", "pedestrian", "prop"]
 SubgoalState: TypeAlias = Literal["none", "pending", "ongoing", "complete", "abandoned"]
+
+
+SUBGOAL_STATES: Mapping[GoalStatus, SubgoalState] = MappingProxyType(
+    {
+        GoalStatus.COMPLETE: "complete",
+        GoalStatus.ONGOING: "ongoing",
+        GoalStatus.PENDING: "pending",
+        GoalStatus.ABANDONED: "abandoned",
+    }
+)
+"""States of subgoals in pictures."""
 
 
 def _no_points() -> NDArray[np.float64]:
@@ -66,13 +78,33 @@ class Pin:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """Estimated position (x, y) [m] with its covariance (xx, xy, yy) [m^2]; without a label that of the car."""
+
+    x: float
+    y: float
+    covariance: tuple[float, float, float]
+    label: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
 class SpokenLine:
-    """Utterance or message: time [s], speaker, text, and dialogue acts in short form."""
+    """Utterance or message: time at which it is heard, at its end [s], speaker, text, and acts in short form."""
 
     time: float
     speaker: Role
     text: str
     acts: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExceptionMark:
+    """Exception of the Ad-Wizard: time [s], words, and position (x, y) of the car [m]."""
+
+    time: float
+    text: str
+    x: float
+    y: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,14 +116,16 @@ class Scene:
         town: the town.
         car: the car.
         street_names: by street index; the town's own where None.
-        trail: path driven so far (n, 2) [m].
+        trail: path driven so far (n, 2) [m], from the start.
         waypoints: planned path (m, 2) [m].
         others: other road users and objects.
         landmarks: landmarks with pins.
-        subgoals: (description, state) of each task.
+        subgoals: (description, state) of each task, deleted ones included.
         utterances: utterances and messages, oldest first.
         notes: warnings, such as a hazard or an exception.
+        exceptions: exceptions so far.
         weather: the ten parameters by name; missing ones have their values of a clear noon.
+        estimates: estimated positions, drawn as regions that hold the true one with a probability of 95 %.
         caption: first line of the panel, such as the name of the storyboard.
     """
 
@@ -106,7 +140,9 @@ class Scene:
     subgoals: Sequence[tuple[str, SubgoalState]] = ()
     utterances: Sequence[SpokenLine] = ()
     notes: Sequence[str] = ()
+    exceptions: Sequence[ExceptionMark] = ()
     weather: Mapping[str, float] = field(default_factory=dict)
+    estimates: Sequence[Estimate] = ()
     caption: str = ""
 
     def __post_init__(self) -> None:

@@ -2,7 +2,7 @@
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.tasks.binding import bind
-from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue
+from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, map_label, map_labels
 from dorothie_gym.tasks.parsing import is_shipped_story, load_template, parse_template, template_names
 from dorothie_gym.tasks.state import TaskState
 from dorothie_gym.tasks.storyboard import (
@@ -32,6 +32,8 @@ __all__ = [
     "catalogue",
     "is_shipped_story",
     "load_template",
+    "map_label",
+    "map_labels",
     "parse_template",
     "template_names",
 ]

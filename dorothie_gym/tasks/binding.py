@@ -10,7 +10,7 @@ import numpy as np
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import LandmarkName
-from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, categories, find_kind, kinds_in
+from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, categories, find_kind, kinds_in, map_labels
 from dorothie_gym.tasks.storyboard import (
     Landmark,
     LandmarkSite,
@@ -217,16 +217,14 @@ def _place(
     """Assigns landmarks to sites; those with an index in `first` come first."""
     order = [*first, *(index for index in range(len(names)) if index not in first)]
     sites = dict(zip(order, spread_places(places, len(names), rng), strict=True))
-    numbers: Counter[LandmarkName] = Counter()
     landmarks = []
-    for index, name in enumerate(names):
+    for index, (name, label) in enumerate(zip(names, map_labels(names), strict=True)):
         kind, site = catalogue()[name], sites[index]
-        numbers[name] += 1
         landmarks.append(
             Landmark(
                 index=index,
                 name=name,
-                label=kind.label if names.count(name) == 1 else f"{kind.label} {numbers[name]}",
+                label=label,
                 category=kind.category,
                 site=site.id,
                 lane=site.lane,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 
@@ -70,6 +71,22 @@ def catalogue() -> Mapping[LandmarkName, LandmarkKind]:
         for name in names
         for row in (rows[name.label],)
     }
+
+
+def map_label(name: LandmarkName) -> str:
+    """Returns the name of a landmark on maps, such as "7-Eleven"; that of the ontology where it is no place."""
+    kind = catalogue().get(name)
+    return name.label if kind is None else kind.label
+
+
+def map_labels(names: Sequence[LandmarkName]) -> tuple[str, ...]:
+    """Returns the names of landmarks on maps; those that occur more than once are numbered."""
+    numbers: Counter[LandmarkName] = Counter()
+    labels = []
+    for name in names:
+        numbers[name] += 1
+        labels.append(map_label(name) if names.count(name) == 1 else f"{map_label(name)} {numbers[name]}")
+    return tuple(labels)
 
 
 def categories() -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import NoReturn
 
-from dorothie_gym.errors import StoryboardError
+from dorothie_gym.errors import StoryboardError, did_you_mean
 from dorothie_gym.files import JsonValue
 from dorothie_gym.tasks.binding import cast
 from dorothie_gym.tasks.catalogue import find_kind
@@ -320,8 +320,9 @@ def load_template(name_or_path: str | Path) -> StoryboardTemplate:
         return parse_template(text, name_or_path)
     path = Path(name_or_path)
     if isinstance(name_or_path, str) and path.suffix == "" and path.name == name_or_path and not path.exists():
-        known = ", ".join(template_names())
-        raise StoryboardError(name_or_path, "name", f"there is no such template; use one of {known}, or a .json file")
+        known, hint = ", ".join(template_names()), did_you_mean(name_or_path, template_names())
+        reason = f"there is no such template; {hint}use one of {known}, or a .json file"
+        raise StoryboardError(name_or_path, "name", reason)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:

@@ -27,6 +27,7 @@ from dorothie_gym.policies.observation_parser import (
 from dorothie_gym.policies.route_progress import RouteJunction, RouteProgress, RouteState
 from dorothie_gym.sim.ego.limits import U_TURN_SPEED
 from dorothie_gym.spaces import ObjectColumn, Observation
+from dorothie_gym.tasks import map_label
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -280,3 +281,29 @@ class Instructor:
 
 def _send_on(waits: bool, distance: float = 0.0) -> GuidanceStep | None:
     return GuidanceStep(("on",), (ActionValue.START,), None, distance) if waits else None
+
+
+_DIRECTIONS = ("back", "sharp right", "right", "half right", "straight on", "half left", "left", "sharp left")
+_VERBS = {
+    ActionValue.J_TURN: "Turn",
+    ActionValue.LANE_SWITCH: "Switch lanes",
+    ActionValue.U_TURN: "Make a U-turn",
+    ActionValue.STOP: "Stop",
+    ActionValue.START: "Drive on",
+}
+
+
+def words_of(instruction: NavigationInstruction) -> str:
+    """Returns an instruction in words for pictures, such as "Turn left in 60 m, into Baits"."""
+    action, street, landmark = instruction.action, instruction.street, instruction.landmark
+    if action is None:
+        return f"Drive to {map_label(landmark)}" if landmark is not None else str(instruction.act)
+    words = _VERBS.get(action, action.label)
+    if instruction.sector is not None:
+        straight = action is ActionValue.J_TURN and _DIRECTIONS[instruction.sector] == "straight on"
+        words = "Go straight on" if straight else f"{words} {_DIRECTIONS[instruction.sector]}"
+    if instruction.distance >= 1.0:
+        words += f" in {instruction.distance:.0f} m"
+    if landmark is not None:
+        words += f", at {map_label(landmark)}"
+    return words if street is None else f"{words}, into {street.label}"

@@ -1,0 +1,45 @@
+"""Base class of the environments that limit the time of their episodes themselves."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import replace
+from typing import TypeVar
+
+import gymnasium as gym
+from gymnasium.envs.registration import EnvSpec
+
+ObsType = TypeVar("ObsType")
+ActType = TypeVar("ActType")
+
+
+class TimeLimitedEnv(gym.Env[ObsType, ActType]):
+    """Environment whose `spec.max_episode_steps` is the number of decisions after which it truncates an episode.
+
+    The number follows from the arguments. The ids are registered without one, because `gymnasium.make` would then
+    add a `TimeLimit` of the default arguments and cut episodes that are to last longer.
+    """
+
+    _spec: EnvSpec | None = None
+
+    @property
+    @abstractmethod
+    def decision_limit(self) -> int:
+        """Decisions until truncation."""
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Specification of the environment; None if it was not made by `gymnasium.make`."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        if spec is not None and spec.max_episode_steps is None:
+            spec = replace(spec, max_episode_steps=self.decision_limit)
+        self._spec = spec
+
+
+def decisions_in(seconds: float, decision_frequency: float) -> int:
+    """Returns the number of decisions in a time [s] at a frequency [Hz]."""
+    return math.ceil(seconds * decision_frequency - 1e-9)

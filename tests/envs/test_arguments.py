@@ -1,0 +1,90 @@
+"""Arguments, reset options and specifications of the environments, through `gymnasium.make`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import pytest
+
+import dorothie_gym
+from dorothie_gym import EnvConfig
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "message"),
+    [
+        ("CoWizard-v0", {"config": {"a": 1}}, "config is a dict; it must be an EnvConfig"),
+        ("Participant-v0", {"config": "fast"}, "config is a str; it must be an EnvConfig"),
+        ("AdWizard-v0", {"storyboard": 3}, "storyboard is a int; it must be a name, a path or a StoryboardTemplate"),
+        ("Navigation-v0", {"storyboard": ["x"]}, "storyboard is a list"),
+        ("CoWizard-v0", {"town": "Brooksid"}, "did you mean 'brookside'"),
+        ("Town-v0", {"config": 7}, "config is a int; it must be a dictionary"),
+        ("Town-v0", {"town": "midtown", "config": {"town": "brookside"}}, "town is 'midtown', but config has the town"),
+    ],
+)
+def test_wrong_argument_is_named(name: str, arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        gym.make(f"dorothie_gym/{name}", **arguments)
+
+
+def test_duo_wizard_names_a_wrong_config() -> None:
+    with pytest.raises(ValueError, match="config is a dict"):
+        dorothie_gym.DuoWizardEnv(config={"a": 1})  # type: ignore[arg-type]  # a user's mistake
+
+
+def test_town_is_an_argument_of_the_plain_environment() -> None:
+    by_argument = gym.make("dorothie_gym/Town-v0", town="midtown")
+    by_setting = gym.make("dorothie_gym/Town-v0", config={"town": "midtown"})
+    (first, _), (second, _) = by_argument.reset(seed=3), by_setting.reset(seed=3)
+    assert (first == second).all()
+    assert by_argument.unwrapped.config["town"] == "midtown"  # type: ignore[attr-defined]  # of highway-env
+    batch = gym.make_vec("dorothie_gym/Town-v0", num_envs=2, town="midtown")
+    assert batch.reset(seed=3)[0].shape[0] == 2
+
+
+@pytest.mark.parametrize("name", ["CoWizard-v0", "Navigation-v0", "Navigation-continuous-v0", "Town-v0"])
+def test_unknown_reset_option_causes_a_warning(name: str) -> None:
+    env = gym.make(f"dorothie_gym/{name}")
+    with pytest.warns(UserWarning, match="reset option 'scenaro' is unknown and ignored"):
+        env.reset(seed=0, options={"scenaro": 1})
+    env.reset(seed=0, options={})
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "steps"),
+    [
+        ("CoWizard-v0", {}, 1800),
+        ("CoWizard-v0", {"max_cycles": 7}, 7),
+        ("CoWizard-v0", {"config": EnvConfig(max_seconds=3000.0)}, 6000),
+        ("Navigation-v0", {}, 1200),
+        ("Navigation-v0", {"max_seconds": 900.0}, 1800),
+        ("Navigation-continuous-v0", {}, 6000),
+        ("UfN-v0", {"corpus": "x"}, None),
+    ],
+)
+def test_specification_has_the_limit_of_the_episodes(name: str, arguments: dict[str, Any], steps: int | None) -> None:
+    if "corpus" in arguments:
+        assert gym.spec(f"dorothie_gym/{name}").max_episode_steps is None
+        return
+    env = gym.make(f"dorothie_gym/{name}", **arguments)
+    assert env.spec is not None and env.spec.max_episode_steps == steps
+    assert "TimeLimit" not in str(env), "the environment truncates its episodes itself"
+    again = gym.make(env.spec)
+    assert again.spec is not None and again.spec.max_episode_steps == steps
+
+
+def test_episode_ends_at_the_limit_of_the_specification() -> None:
+    env = gym.make("dorothie_gym/CoWizard-v0", max_cycles=5, partners={"participant": "silent", "ad_wizard": "silent"})
+    env.reset(seed=0)
+    ends = [env.step(env.unwrapped.noop_action)[3] for _ in range(5)]  # type: ignore[attr-defined]  # of SingleRole
+    assert ends == [False] * 4 + [True]
+
+
+def test_a_limit_given_to_make_is_kept() -> None:
+    env = gym.make("dorothie_gym/Navigation-v0", max_episode_steps=50)
+    assert env.spec is not None and env.spec.max_episode_steps == 50
+
+
+def test_driving_has_a_reward_threshold() -> None:
+    assert gym.spec("dorothie_gym/Navigation-v0").reward_threshold == 20.0
