@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +18,7 @@ from typer.testing import CliRunner
 
 from dorothie_gym.cli.app import app
 from dorothie_gym.rollout.closed_loop import METRICS
+from dorothie_gym.rollout.closed_loop.results import print_result
 
 SHORT = ("--co-wizard", "lane-follow", "--towns", "brookside", "--max-seconds", "6", "--workers", "1")
 
@@ -82,3 +85,18 @@ def test_ctrl_c_names_the_results_and_the_command_that_resumes(tmp_path: Path) -
     page = json.loads((out / "rollout.json").read_text())
     assert f"Interrupted with {page['sessions']} of 40 sessions finished" in errors
     assert f"--towns brookside --sessions 40 --seed 0 --max-seconds 40 --out {out}" in errors
+
+
+def test_tables_keep_all_digits_on_a_narrow_terminal() -> None:
+    from rich.console import Console
+
+    from tests.rollout.closed_loop.test_results import result
+
+    found = result()
+    wide, narrow = (Console(width=width, record=True, file=io.StringIO()) for width in (400, 80))
+    for console in (wide, narrow):
+        print_result(found, console)
+    shown, whole = (console.export_text().split("\n", 1)[1] for console in (narrow, wide))
+    assert "…" not in shown and max(map(len, shown.splitlines())) <= 80
+    numbers = re.findall(r"\d+\.\d+", whole)
+    assert numbers and sorted(re.findall(r"\d+\.\d+", shown)) == sorted(numbers)

@@ -196,6 +196,6 @@ def test_the_examples_of_the_closed_loop_page_run(
     for block in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL):
         exec(compile(block, "closed-loop.md", "exec"), names)
     printed = capsys.readouterr().out
-    assert printed.startswith("0.0 0.0 0.0 0\n[0.")
+    assert re.match(r"0\.0 0\.0 0\.65\d+ 0\n\[0\.", printed)  # none of two succeeded
     for metric in (*METRICS, RecoverySeconds()):
         assert f"| {metric.title} | `{metric.key}` |" in text

@@ -1,4 +1,4 @@
-"""Confidence intervals: percentile bootstrap over sessions (Efron, 1979), and Student's t over seeds.
+"""Confidence intervals: Wilson's for shares, percentile bootstrap over sessions (Efron, 1979), Student's t over seeds.
 
 `scipy.stats.bootstrap` is not used: it draws new samples for each figure instead of one set for all, and a single
 sample with an undefined figure (no exception met, say) makes its interval undefined.
@@ -20,6 +20,8 @@ CONFIDENCE: Final = 0.95
 RESAMPLES: Final = 2000
 """Number of bootstrap samples."""
 
+_Z: Final = 1.959963984540054  # 0.975 quantile of the normal distribution
+
 TAILS: Final = (0.025, 0.975)
 """Quantiles between which `CONFIDENCE` of the bootstrap samples lie."""
 
@@ -34,6 +36,23 @@ def percentile_interval(figures: NDArray[np.float64]) -> tuple[float, float]:
     """Returns the ends of the interval of a figure from its bootstrap samples (n,); NaN is left out."""
     low, high = np.nanquantile(figures, TAILS)
     return float(low), float(high)
+
+
+def wilson_interval(successes: float, trials: float) -> tuple[float, float]:
+    """Returns the 95 % interval of a share (Wilson 1927, JASA 22, 209-212); of 0 trials, (0, 1).
+
+    Unlike the bootstrap interval, it has a width where all trials succeeded, or none: 4 of 4 give (0.51, 1).
+    """
+    if not trials:
+        return 0.0, 1.0
+    share = successes / trials
+    middle = share + _Z**2 / (2 * trials)
+    half = _Z * math.sqrt(share * (1 - share) / trials + _Z**2 / (4 * trials**2))
+    scale = 1 + _Z**2 / trials
+    # the ends at a bound are exact; rounding must not move them off it
+    low = 0.0 if successes == 0 else (middle - half) / scale
+    high = 1.0 if successes == trials else (middle + half) / scale
+    return max(low, 0.0), min(high, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dorothie_gym.cli.completion import complete_towns
 from dorothie_gym.cli.options import (
     AdWizard,
     AsJson,
@@ -45,7 +46,12 @@ def rollout(
     participant: Participant = "scripted",
     ad_wizard: AdWizard = "scripted",
     sessions: Annotated[int, typer.Option(min=1, help="Number of sessions in all towns together.")] = 20,
-    towns: Annotated[str, typer.Option(metavar="seen|unseen|all|NAME,...", help="Towns, which take turns.")] = "unseen",
+    towns: Annotated[
+        str,
+        typer.Option(
+            metavar="seen|unseen|all|NAME,...", help="Towns, which take turns.", autocompletion=complete_towns
+        ),
+    ] = "unseen",
     workers: Players = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scenarios, for any policies.")] = 0,
     out: Annotated[
@@ -117,7 +123,11 @@ def _exit_interrupted(folder: Path, settings: RolloutSettings) -> None:
 
 # --- Leaderboard ------------------------------------------------------------------------------------------------------
 
-PAGE = Path("docs/leaderboard.md")
+PAGE = Path("leaderboard.md")
+"""Default page of the leaderboard, in the present folder."""
+
+DEFINITIONS = "closed-loop.md"
+"""Page with the definitions of the metrics; linked where it lies beside the leaderboard, as in docs."""
 
 
 def leaderboard(
@@ -125,14 +135,20 @@ def leaderboard(
         list[Path], typer.Argument(metavar="DIR...", help="Folders of rollouts, or folders that contain them.")
     ],
     out: Annotated[
-        Path, typer.Option(metavar="FILE.md", help="Page to write; its picture is written beside it as .png.")
+        Path,
+        typer.Option(metavar="FILE.md", help="Page to write; its picture is written beside it as .png."),
     ] = PAGE,
     as_json: AsJson = False,
 ) -> None:
     """Rank policies by their rollouts, on a page with intervals, cost and commands, and in a picture."""
     with reporting_errors():
         from dorothie_gym.errors import RolloutError
-        from dorothie_gym.rollout.closed_loop.leaderboard import draw_leaderboard, leaderboard_page, read_entries
+        from dorothie_gym.rollout.closed_loop.leaderboard import (
+            draw_leaderboard,
+            labels_of,
+            leaderboard_page,
+            read_entries,
+        )
 
         if out.suffix != ".md":
             fail(f"{out}: the page is Markdown; give a name that ends in .md")
@@ -142,14 +158,15 @@ def leaderboard(
         except RolloutError as error:
             fail(str(error))
         picture = draw_leaderboard(entries, out.with_suffix(".png"))
-        out.write_text(leaderboard_page(entries, picture.name), encoding="utf-8")
+        definitions = DEFINITIONS if (out.parent / DEFINITIONS).is_file() else None
+        out.write_text(leaderboard_page(entries, picture.name, definitions), encoding="utf-8")
     if as_json:
         rows = [{"policy": entry.policy, "towns": entry.part, **entry.table.to_json()} for entry in entries]
         print_json({"page": str(out), "picture": str(picture), "rows": rows})
         return
-    console = stdout()
+    console, labels = stdout(), labels_of(entries)
     for entry in entries:
         success = entry.table.figures["success"]["mean"]
         share = "-" if success is None else f"{100 * success:.1f} %"
-        console.print(f"{entry.part:7} {entry.policy}: success {share}", markup=False, soft_wrap=True)
+        console.print(f"{entry.part:7} {labels[entry.policy]}: success {share}", markup=False, soft_wrap=True)
     console.print(f"Written: {out}, {picture}", style="dim", markup=False, soft_wrap=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.analysis.intervals import wilson_interval
 from dorothie_gym.baselines.rl.checkpoint import Model, load_model
 from dorothie_gym.baselines.rl.environments import masks_of
 from dorothie_gym.baselines.rl.settings import NAVIGATION
@@ -26,8 +26,6 @@ FIRST_SEED: Final = 1_000_000
 PARALLEL_EPISODES: Final = 8
 """Number of episodes played in parallel: networks are faster on batches."""
 
-Z: Final = 1.96
-"""Quantile of the normal distribution for an interval of 95 %."""
 
 Action: TypeAlias = Any
 """Action of an environment: a number or a vector."""
@@ -89,7 +87,7 @@ def evaluate_policy(make: MakeEnv, act: Act, episodes: int, seed: int = FIRST_SE
                     following += 1
     for env in envs:
         env.close()
-    low, high = wilson(int(successes.sum()), episodes)
+    low, high = wilson_interval(int(successes.sum()), episodes)
     return EpisodeStatistics(
         success=float(successes.mean()), low=low, high=high, reward=float(rewards.mean()),
         length=float(lengths.mean()), episodes=episodes,
@@ -105,15 +103,6 @@ def greedy_policy(model: Model, *, masked: bool) -> Act:
         return actions
 
     return act
-
-
-def wilson(successes: int, trials: int) -> tuple[float, float]:
-    """Returns the 95 % interval of a share (Wilson 1927, JASA 22, 209-212)."""
-    share = successes / trials
-    middle = share + Z**2 / (2 * trials)
-    half = Z * math.sqrt(share * (1 - share) / trials + Z**2 / (4 * trials**2))
-    scale = 1 + Z**2 / trials
-    return max((middle - half) / scale, 0.0), min((middle + half) / scale, 1.0)
 
 
 # --- Models of `train-rl` as Co-Wizards ------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Closed-loop metrics (spec: metrics) and their figures over sessions, with bootstrap intervals.
+"""Closed-loop metrics (spec: metrics) and their figures over sessions, with confidence intervals.
 
 Over several sessions a metric is the ratio of the sums of its two parts. For metrics that a session has once (success,
 driving score) the ratio is the mean over sessions; for metrics per subgoal, exchange or exception it is the mean over
@@ -17,7 +17,7 @@ from typing import ClassVar, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.analysis.intervals import bootstrap_weights, percentile_interval
+from dorothie_gym.analysis.intervals import bootstrap_weights, percentile_interval, wilson_interval
 from dorothie_gym.rollout.closed_loop.session_record import TIMEOUT, SessionRecord
 
 PENALTIES: Final[Mapping[str, float]] = MappingProxyType(
@@ -35,12 +35,14 @@ class ClosedLoopMetric(ABC):
         title: name of the metric in tables.
         worst: value of a session that ended in an error; None leaves such sessions out.
         is_share: whether tables show the metric in per cent.
+        counts_sessions: whether the metric is 0 or 1 for a session.
     """
 
     key: ClassVar[str]
     title: ClassVar[str]
     worst: ClassVar[float | None] = None
     is_share: ClassVar[bool] = True
+    counts_sessions: ClassVar[bool] = False
 
     @abstractmethod
     def parts(self, record: SessionRecord) -> tuple[float, float]:
@@ -60,6 +62,7 @@ class Success(ClosedLoopMetric):
     key: ClassVar[str] = "success"
     title: ClassVar[str] = "success"
     worst: ClassVar[float | None] = 0.0
+    counts_sessions: ClassVar[bool] = True
 
     def parts(self, record: SessionRecord) -> tuple[float, float]:
         """Returns 1 for a success, else 0; and 1."""
@@ -297,7 +300,10 @@ FigurePage: TypeAlias = dict[str, float | None]
 
 @dataclass(frozen=True, kw_only=True)
 class MetricInterval:
-    """Metric over sessions with its 95 % bootstrap interval.
+    """Metric over sessions with its 95 % interval.
+
+    The interval is Wilson's for a share of sessions (success), and for shares that are 0, or 1, in all sessions, where
+    the sessions count as trials. It is the percentile bootstrap over sessions for everything else.
 
     Attributes:
         mean: value over all sessions; None if undefined.
@@ -334,7 +340,11 @@ def interval_of(metric: ClosedLoopMetric, records: Sequence[SessionRecord], erro
     if not any(lower for _, lower in parts):
         return MetricInterval(mean=None)
     sums = np.array(parts, dtype=np.float64)  # (n, 2)
-    upper, lower = sums.sum(axis=0)
+    upper, lower = sums.sum(axis=0).tolist()
+    if metric.is_share and len(parts) > 1 and (metric.counts_sessions or upper in (0.0, lower)):
+        sessions = sum(part > 0.0 for _, part in parts)
+        low, high = wilson_interval(sessions * upper / lower, sessions)
+        return MetricInterval(mean=upper / lower, low=low, high=high)
     drawn = bootstrap_weights(len(parts), seed=BOOTSTRAP_SEED) @ sums  # (RESAMPLES, 2)
     drawn = drawn[drawn[:, 1] > 0.0]
     return _between(float(upper / lower), drawn[:, 0] / drawn[:, 1], len(parts))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -242,8 +242,12 @@ def print_result(result: RolloutResult, console: Console) -> None:
     errors = f", {table.errored} of them ended in an error" if table.errored else ""
     console.print(f"{table.sessions} sessions{errors}: {cast}", markup=False, soft_wrap=True)
     console.print(_overall(table))
-    console.print(_parts("town", result.per_town(), TOWN_METRICS))
-    console.print(_parts("exception", result.per_exception(), EXCEPTION_METRICS))
+    for name, parts, keys in (
+        ("town", result.per_town(), TOWN_METRICS),
+        ("exception", result.per_exception(), EXCEPTION_METRICS),
+    ):
+        for part in _parts(name, parts, keys, console.width):
+            console.print(part)
     seeds = [str(row.seed) for row in result.rows]
     more = "" if len(seeds) <= MAX_PRINTED_SEEDS else f", ... ({len(seeds)} in all, see --json)"
     console.print(f"Seeds (of --seed {settings['seed']}): {', '.join(seeds[:MAX_PRINTED_SEEDS])}{more}", soft_wrap=True)
@@ -271,10 +275,46 @@ def _overall(page: RolloutTable) -> Table:
     return table
 
 
-def _parts(name: str, parts: Mapping[str, RolloutTable], keys: tuple[str, ...]) -> Table:
-    chosen = [metric for metric in ALL_METRICS if metric.key in keys]
-    table = Table(name, "sessions", "errored", *(metric.title for metric in chosen), title=f"By {name}")
-    for part, page in parts.items():
-        cells = (figure_text(metric, page.figures[metric.key]).replace(" [", "\n[") for metric in chosen)
-        table.add_row(part.replace("_", " "), str(page.sessions), str(page.errored), *cells)
+_BORDER: Final = 3
+"""Width of a table's border and padding per column; one more at its end [columns]."""
+
+
+def _parts(name: str, parts: Mapping[str, RolloutTable], keys: tuple[str, ...], width: int) -> Iterator[Table]:
+    """Yields tables of the metrics of each part, each with as many metrics as a width [columns] has room for."""
+    first: dict[str, list[str]] = {
+        name: [part.replace("_", " ") for part in parts],
+        "sessions": [str(page.sessions) for page in parts.values()],
+        "errored": [str(page.errored) for page in parts.values()],
+    }
+    figures = {
+        metric.title: [figure_text(metric, page.figures[metric.key]).replace(" [", "\n[") for page in parts.values()]
+        for metric in ALL_METRICS
+        if metric.key in keys
+    }
+    taken, chosen = _width(first) + 1, dict[str, list[str]]()
+    for title, cells in figures.items():
+        if chosen and taken + _width({**chosen, title: cells}) > width:
+            yield _table(name, {**first, **chosen}, width)
+            chosen = {}
+        chosen[title] = cells
+    yield _table(name, {**first, **chosen}, width)
+
+
+def _narrowest(title: str, cells: Sequence[str]) -> int:
+    """Returns the width of a column that breaks no word of its title and no line of its cells."""
+    return max(len(part) for part in (*title.split(), *(line for cell in cells for line in cell.split("\n"))))
+
+
+def _width(columns: Mapping[str, Sequence[str]]) -> int:
+    return sum(_narrowest(title, cells) + _BORDER for title, cells in columns.items())
+
+
+def _table(name: str, columns: Mapping[str, Sequence[str]], width: int) -> Table:
+    """Returns a table; its titles are wrapped if it would otherwise be wider than a width [columns]."""
+    whole = sum(max(len(title), _narrowest(title, cells)) + _BORDER for title, cells in columns.items()) + 1
+    table = Table(title=f"By {name}")
+    for title, cells in columns.items():
+        table.add_column(title, width=_narrowest(title, cells) if whole > width else None)
+    for row in zip(*columns.values(), strict=True):
+        table.add_row(*row)
     return table

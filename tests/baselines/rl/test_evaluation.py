@@ -6,16 +6,16 @@ import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 
+from dorothie_gym.analysis.intervals import wilson_interval
 from dorothie_gym.baselines.rl import evaluate_policy
-from dorothie_gym.baselines.rl.evaluation import wilson
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from tests.envs.navigation_drivers import follow_lane, obey
 
 
 def test_wilson_interval_equals_that_of_the_textbook() -> None:
-    assert wilson(0, 10) == pytest.approx((0.0, 0.278), abs=1e-3)
-    assert wilson(8, 10) == pytest.approx((0.490, 0.943), abs=1e-3)
-    assert wilson(10, 10)[1] == 1.0
+    assert wilson_interval(0, 10) == pytest.approx((0.0, 0.278), abs=1e-3)
+    assert wilson_interval(8, 10) == pytest.approx((0.490, 0.943), abs=1e-3)
+    assert wilson_interval(10, 10)[1] == 1.0
 
 
 def test_results_do_not_depend_on_the_number_of_parallel_episodes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dorothie_gym.analysis.intervals import wilson_interval
 from dorothie_gym.ontology import ExceptionKind
 from dorothie_gym.rollout.closed_loop import (
     METRICS,
@@ -67,3 +68,28 @@ def test_weighted_medians_are_those_of_the_values_written_out() -> None:
     counts[:, 4] += 1.0
     expected = [np.median(np.repeat(values, row.astype(int))) for row in counts]
     assert np.allclose(_weighted_medians(values, counts), expected)
+
+
+@pytest.mark.parametrize(("successes", "sessions"), [(4, 4), (0, 20), (20, 20), (3, 4), (57, 60)])
+def test_interval_of_success_is_wilsons_and_never_collapses(successes: int, sessions: int) -> None:
+    from scipy.stats import binomtest
+
+    found = interval_of(Success(), [record(success=k < successes) for k in range(sessions)])
+    expected = binomtest(successes, sessions).proportion_ci(method="wilson")
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=1e-9)
+    assert found.low is not None and found.high is not None and found.low < found.high
+
+
+def test_no_share_collapses_where_all_sessions_are_alike() -> None:
+    figures = figures_of([record(completion=1.0)] * 4)
+    for metric in METRICS:
+        figure = figures[metric.key]
+        if metric.is_share and figure.mean in (0.0, 1.0):
+            assert figure.low is not None and figure.high is not None
+            assert figure.high - figure.low > 0.4, metric.key
+
+
+def test_sessions_without_an_exception_are_no_trials_of_recovery() -> None:
+    exceptions = (MetException(kind=ExceptionKind.WEATHER, met=1.0, seconds=2.0),)
+    figures = figures_of([record(exceptions=exceptions)] * 3 + [record()] * 50)
+    assert figures["exceptions_recovered"].low == pytest.approx(wilson_interval(3, 3)[0])

@@ -14,7 +14,7 @@ from dorothie_gym.maps import SEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
 from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutRow, RolloutSettings
-from dorothie_gym.rollout.closed_loop.leaderboard import leaderboard_page, read_entries
+from dorothie_gym.rollout.closed_loop.leaderboard import labels_of, leaderboard_page, read_entries
 from tests.rollout.closed_loop.drives import record
 
 
@@ -42,7 +42,7 @@ def test_page_has_figures_cost_and_the_command_of_each_row(tmp_path: Path) -> No
     (folder / "cost.json").write_text('{"wall_seconds": 100.0, "cpu_seconds": 180.0, "workers": 2}')
     page = leaderboard_page(read_entries([folder]), "board.png")
     assert "![Success and driving score of each policy, with intervals](board.png)" in page
-    assert "| ppo | 4 | 0 | 75.0 [25.0, 100.0] % |" in page
+    assert "| ppo | 4 | 0 | 75.0 [30.1, 95.4] % |" in page
     assert "| ppo | unseen | 50,000 | 20 min | 800 | 100 s by 2 | 180 s |" in page
     assert "dorothie-gym rollout --co-wizard ppo --participant scripted" in page
 
@@ -72,3 +72,38 @@ def test_command_writes_page_and_picture(tmp_path: Path) -> None:
     assert (tmp_path / "leaderboard.png").read_bytes().startswith(b"\x89PNG")
     done = CliRunner().invoke(app, ["leaderboard", str(tmp_path), "--out", str(page)])
     assert done.exit_code == 2 and "has no rollout.json" in done.stderr
+
+
+def test_command_works_by_default_in_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path / "runs" / "a", "scripted", 4)
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["leaderboard", "runs"])
+    assert done.exit_code == 0, done.output
+    page = Path("leaderboard.md").read_text()
+    assert "(leaderboard.png)" in page and "(closed-loop.md)" not in page
+    assert Path("leaderboard.png").is_file()
+
+
+def test_shortened_sessions_are_marked_and_ranked_after_complete_ones(tmp_path: Path) -> None:
+    write(tmp_path / "long", "random", 1)
+    write(tmp_path / "short", "scripted", 4, config=EnvConfig(max_seconds=60.0))
+    entries = read_entries([tmp_path])
+    assert [entry.policy for entry in entries] == ["random", "scripted (sessions of at most 60 s)"]
+    page = leaderboard_page(entries)
+    assert "Rollouts with sessions shorter than 900 s are marked and ranked after the others" in page
+    assert "shorter than" not in leaderboard_page(entries[:1])
+
+
+def test_models_are_named_and_their_commands_have_the_path(tmp_path: Path) -> None:
+    for name in ("warm_ppo/best", "models/reader/small/seed-0", "runs/c/models/toto/paper/seed-12", "lane-follow"):
+        write(tmp_path / name.replace("/", "-"), name, 2)
+    entries = read_entries([tmp_path])
+    assert sorted(labels_of(entries).values()) == ["lane-follow", "reader, seed 0", "toto, seed 12", "warm_ppo"]
+    page = leaderboard_page(entries)
+    assert "| reader, seed 0 | 4 |" in page and "--co-wizard models/reader/small/seed-0 " in page
+
+
+def test_two_models_of_one_name_keep_their_paths(tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        write(tmp_path / folder, f"{folder}/ppo/best", 2)
+    assert sorted(labels_of(read_entries([tmp_path])).values()) == ["one/ppo/best", "two/ppo/best"]
