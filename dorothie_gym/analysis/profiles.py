@@ -116,7 +116,7 @@ def draw_profiles(profiles: Profiles, heading: str, title: str, path: Path) -> N
     """
     with empty_figure(*CHART_SIZE) as figure:
         grid = figure.add_gridspec(
-            2, 2, left=0.06, right=0.98, top=0.84, bottom=0.09, hspace=0.42, wspace=0.13, width_ratios=(14, 8)
+            2, 2, left=0.06, right=0.98, top=0.85, bottom=0.09, hspace=0.52, wspace=0.13, width_ratios=(14, 8)
         )
         figure.text(0.06, 0.95, title, fontsize=15, weight="bold")
         figure.text(0.06, 0.918, heading, fontsize=10, color=SOFT)
@@ -155,8 +155,17 @@ def _per_exchange(moves: Axes, slots: Axes, profiles: Profiles) -> None:
         slots.bar([x + offset for x in range(len(SLOTS))], heights, width * 0.93, color=colour)
     _dress(moves, "Moves in an exchange, by the exception that it handles", [_class_label(name) for name in CLASSES])
     _dress(slots, "Slot values in an exchange, likewise", [slot.label for slot in SLOTS])
-    _give_room(moves)
-    moves.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", columnspacing=1.2)
+    for axes in (moves, slots):
+        axes.set_title(axes.get_title(loc="left"), loc="left", fontsize=11, color=INK, pad=_LEGEND_ROOM)
+    # between title and axes, where it covers neither bars nor ticks
+    moves.legend(
+        frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.01), borderaxespad=0.0,
+        borderpad=0.0, columnspacing=1.2,
+    )  # fmt: skip
+
+
+_LEGEND_ROOM: Final = 36
+"""Distance between title and axes where the legend is between them [points]."""
 
 
 def _class_label(name: str) -> str:
@@ -167,8 +176,8 @@ def _class_label(name: str) -> str:
     return "\n".join([name, *wrap(", ".join(moves), LABEL_WIDTH)])
 
 
-def _give_room(axes: Axes, times: float = 1.22) -> None:
-    """Leaves room above the bars, for the legend if there is one."""
+def _give_room(axes: Axes, times: float) -> None:
+    """Leaves room above the bars."""
     axes.set_ylim(0.0, axes.get_ylim()[1] * times)
 
 

@@ -100,7 +100,7 @@ def draw_reward_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path)
         rewards = axes.twinx()
         rewards.plot(steps, [row["reward"] for row in rows], color=SOFT, lw=1.2, ls="--")
         rewards.set_ylabel("mean reward of an episode (dashed)", color=SOFT)
-        axes.set_title(f"{title}; {rows[-1]['seconds'] / 60:.1f} min of training", color=INK, fontsize=10)
+        axes.set_title(f"{title}; one seed, {rows[-1]['seconds'] / 60:.1f} min of training", color=INK, fontsize=10)
 
 
 # --- The curves of self-play as a picture ----------------------------------------------------------------------------
@@ -141,4 +141,4 @@ def draw_selfplay_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Pat
         for axes in (returns, success):
             axes.set_facecolor(SHEET)
         minutes = rows[-1]["seconds"] / 60
-        returns.set_title(f"{title}; {minutes:.1f} min of training", color=INK, fontsize=10)
+        returns.set_title(f"{title}; one seed, {minutes:.1f} min of training", color=INK, fontsize=10)

@@ -25,6 +25,7 @@ from dorothie_gym.baselines.toto import (
     Towns,
     TrainedTexts,
 )
+from dorothie_gym.errors import did_you_mean
 
 Kind = Literal["toto", "reader", "ppo", "cloning"]
 
@@ -114,7 +115,8 @@ def find_row(name: str) -> ModelEntry:
     for row in ROWS:
         if name.casefold() in (row.command, row.name.casefold()):
             return row
-    raise ValueError(f"there is no model {name!r}; choose from {', '.join(row.command for row in ROWS)}")
+    commands = tuple(row.command for row in ROWS)
+    raise ValueError(f"there is no model {name!r}; {did_you_mean(name, commands)}choose from {', '.join(commands)}")
 
 
 def make_model(row: ModelEntry, size: str, material: Dataset, seed: int) -> TOTO:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.bench.timing import Figures
-from dorothie_gym.rendering.charts import INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.rendering.charts import GRID, INK, SHEET, SOFT, hexadecimal
 from dorothie_gym.rendering.palette import CAR, LIGHT_RED, ROAD
 from dorothie_gym.sim.config import FRAME_RATE
 
@@ -304,7 +304,7 @@ def draw(report: Report, path: Path) -> None:
         axes = figure.add_axes(
             (0.29, (0.83 + 0.2 * len(report.notes)) / height, 0.66, _ROW_HEIGHT * len(report.rows) / height)
         )
-        _draw_bars(axes, report)
+        _draw_rows(axes, report)
         figure.savefig(path, format="png")
 
 
@@ -321,7 +321,7 @@ def _write_texts(figure: Figure, report: Report, height: float) -> None:
     write(0.14, report.machine, 7, SOFT)
 
 
-def _draw_bars(axes: Axes, report: Report) -> None:
+def _draw_rows(axes: Axes, report: Report) -> None:
     values = [row.value for row in report.rows]
     known = [*values, report.mark.value] if report.mark else values
     places = range(len(values))
@@ -333,10 +333,15 @@ def _draw_bars(axes: Axes, report: Report) -> None:
     axes.set_xlim(left, right)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.10g}")
     colours = [hexadecimal(ROAD if row.reference else CAR) for row in report.rows]
-    axes.barh(places, [value - left for value in values], left=left, height=0.56, color=colours, zorder=2)
+    if report.logarithmic:  # dots, because the length of a bar would mean nothing: the axis has no zero
+        axes.hlines(list(places), left, right, color=GRID, linewidth=1.0, zorder=1)
+        axes.scatter(values, list(places), s=110, color=colours, zorder=3)
+    else:
+        axes.barh(places, values, height=0.56, color=colours, zorder=2)
+    gap = 10 if report.logarithmic else 6
     for k, row in enumerate(report.rows):
         axes.annotate(
-            number(row.value), (row.value, k), xytext=(6, 0), textcoords="offset points", va="center", fontsize=11,
+            number(row.value), (row.value, k), xytext=(gap, 0), textcoords="offset points", va="center", fontsize=11,
             weight="bold", color=colours[k], zorder=4,
         )  # fmt: skip
     if report.mark is not None:

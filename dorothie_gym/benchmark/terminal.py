@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from dorothie_gym.analysis import Handled
 from dorothie_gym.analysis.intervals import Estimate
@@ -56,7 +56,7 @@ _VERDICTS: Final = {
 def print_table(table: ResultsTable, console: Console) -> None:
     """Prints all models: figures by part of the corpus, ours above the paper's, the findings, and what was counted."""
     for part in table.parts:
-        console.print(f"[bold]{part_title(part)}[/]")
+        console.print(part_title(part), style="bold", markup=False)
         for tasks in _side_by_side(table, console):
             console.print(_figures(table, part, tasks))
             console.print()
@@ -70,7 +70,7 @@ def print_table(table: ResultsTable, console: Console) -> None:
 
 def print_details(table: ResultsTable, model: str, console: Console) -> None:
     """Prints one model: every metric by part, by what is handled, and the accuracy of each class."""
-    console.print(f"[bold]{escape(model)}[/]")
+    console.print(model, style="bold", markup=False)
     for make in (_metrics, _by_handling):
         for tasks in _side_by_side(table, console):
             console.print(make(table, model, tasks))
@@ -108,15 +108,14 @@ def _figures(table: ResultsTable, part: str, tasks: Sequence[Task]) -> Table:
     for key in keys:
         shown.add_column(f"{task_of(key)}\n{shown_title(key)}", justify="right")
     for model in table.models:
-        shown.add_row(escape(row_title(table, model)), *(_cell(table, model, part, key) for key in keys))
+        shown.add_row(Text(row_title(table, model)), *(_cell(table, model, part, key) for key in keys))
     return shown
 
 
-def _cell(table: ResultsTable, model: str, part: str, key: str) -> str:
-    ours = _percent(table.estimate(model, part, key))
-    text = f"[bold]{ours}[/]" if model in table.best(part, key) else ours
+def _cell(table: ResultsTable, model: str, part: str, key: str) -> Text:
+    text = Text(_percent(table.estimate(model, part, key)), style="bold" if model in table.best(part, key) else "")
     paper = paper_figure(model, part, key) if has_paper_figure(key) else None
-    return text if paper is None else f"{text}\n[dim]{_percent(paper)}[/]"
+    return text if paper is None else Text.assemble(text, ("\n" + _percent(paper), "dim"))
 
 
 def _percent(figure: Estimate | PaperFigure) -> str:
@@ -125,7 +124,7 @@ def _percent(figure: Estimate | PaperFigure) -> str:
 
 def _print_finding(finding: ModelFinding, console: Console) -> None:
     colour = _VERDICTS[finding.verdict]
-    console.print(f"[bold]{escape(finding.statement)}[/] ({finding.part}): [{colour}]{finding.verdict}[/]")
+    console.print(Text.assemble((finding.statement, "bold"), f" ({finding.part}): ", (str(finding.verdict), colour)))
     for claim in finding.claims:
         console.print(f"  {claim_line(claim)}", style="dim", markup=False, soft_wrap=True)
     if finding.note:
@@ -168,7 +167,7 @@ def _by_handling(table: ResultsTable, model: str, tasks: Sequence[Task]) -> Tabl
             for key in keys:
                 count = table.points(model, part, Task(key.partition("_")[0]), kind)
                 figure = _percent(table.estimate(model, part, key, kind))
-                cells.append(f"{figure} [dim]({count})[/]" if count else NONE)
+                cells.append(_counted(figure, count) if count else Text(NONE))
             what = "nothing" if kind is Handled.NONE else f"{kind} exceptions"
             shown.add_row(what if part == ALL else f"{what}, {part}", *cells)
     return shown
@@ -188,9 +187,13 @@ def _classes(table: ResultsTable, model: str) -> Iterator[Table]:
                 estimate = estimates[part].get(name)
                 seeds = max(len(table.runs_of(model)), 1)
                 count = 0 if matrix is None else int(matrix[order.index(name)].sum()) // seeds
-                cells.append(NONE if estimate is None else f"{_percent(estimate)} [dim]({count})[/]")
+                cells.append(Text(NONE) if estimate is None else _counted(_percent(estimate), count))
             shown.add_row(name, *cells)
         yield shown
+
+
+def _counted(figure: str, count: int) -> Text:
+    return Text.assemble(f"{figure} ", (f"({count})", "dim"))
 
 
 def _grid(*heads: str) -> Table:

@@ -13,7 +13,7 @@ from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.generate import generate
-from dorothie_gym.cli.listings import storyboards, towns
+from dorothie_gym.cli.listings import envs, storyboards, towns
 from dorothie_gym.cli.options import PictureCommand
 from dorothie_gym.cli.rollout import leaderboard, rollout
 from dorothie_gym.cli.run import run
@@ -32,6 +32,7 @@ app = typer.Typer(
 app.command()(run)
 app.command(cls=PictureCommand)(towns)
 app.command()(storyboards)
+app.command()(envs)
 app.command()(evaluate)
 app.add_typer(bench, name="bench")
 app.command()(convert)

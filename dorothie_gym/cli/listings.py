@@ -1,4 +1,4 @@
-"""`dorothie-gym towns` and `dorothie-gym storyboards`: lists of towns and storyboards."""
+"""`dorothie-gym towns`, `storyboards` and `envs`: lists of towns, storyboards and environments."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import OWN_NAME
 from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stderr, stdout
 
@@ -22,7 +23,10 @@ FAULTY = 1
 
 def towns(
     town: Annotated[
-        str | None, typer.Argument(help="Name of a town, or a file (.xodr, .yaml); default: list all.")
+        str | None,
+        typer.Argument(
+            help="Name of a town, or a file (.xodr, .yaml); default: list all.", autocompletion=complete_town
+        ),
     ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Report faults of the map; exit code 1 if there are any.")
@@ -94,6 +98,27 @@ def storyboards(
     for template in templates:
         table.add_row(template.name, str(len(template.subgoals)), template.story)
     stdout().print(table)
+
+
+def envs(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+) -> None:
+    """List the environments, with the call that makes each."""
+    from dorothie_gym._registration import environments
+
+    rows = [{"id": env.id, "api": env.api, "description": env.description, "make": env.call} for env in environments()]
+    if as_json:
+        print_json(rows)
+        return
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("Environment", style="bold", no_wrap=True)
+    table.add_column("API", no_wrap=True)
+    table.add_column("Description")
+    for row in rows:
+        table.add_row(row["id"], row["api"], row["description"])
+    console = stdout()
+    console.print(table)
+    console.print(f"Make one with {rows[0]['make']}, after import dorothie_gym.", style="dim")
 
 
 def _show_towns(rows: Sequence[Facts]) -> None:

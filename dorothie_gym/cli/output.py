@@ -34,8 +34,8 @@ WIDTH = 130
 
 
 def stdout() -> Console:
-    """Returns a console on the present standard output."""
-    return Console(highlight=False)
+    """Returns a console on the present standard output; brackets in texts are printed as they are."""
+    return Console(highlight=False, markup=False)
 
 
 def wide_stdout() -> Console:
@@ -48,7 +48,7 @@ def wide_stdout() -> Console:
 
 def stderr() -> Console:
     """Returns a console on the present standard error."""
-    return Console(stderr=True, highlight=False)
+    return Console(stderr=True, highlight=False, markup=False)
 
 
 def fail(message: str, code: int = BAD_INPUT) -> NoReturn:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import AsJson, Maps, Players
+from dorothie_gym.cli.completion import complete_town
+from dorothie_gym.cli.options import AsJson, Maps, Players, needs
 from dorothie_gym.cli.output import (
     INTERRUPTED,
     check_video,
@@ -40,14 +41,19 @@ def replay(
     fps: Annotated[float, typer.Option(min=0.5, max=30.0, help="Frames per second.")] = 10.0,
     video: Annotated[
         Path | None,
-        typer.Option(metavar="F.mp4", help="Write a video instead of opening a window (needs dorothie-gym[video])."),
+        typer.Option(metavar="F.mp4", help=f"Write a video instead of opening a window ({needs('video')})."),
     ] = None,
     check: Annotated[
         bool,
         typer.Option("--check", help="Simulate the session again from seed and actions; compare all frames."),
     ] = False,
     town: Annotated[
-        str | None, typer.Option(metavar="NAME|FILE", help="Town of the session, if it is not shipped (.xodr, .yaml).")
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="Town of the session, if it is not shipped (.xodr, .yaml).",
+            autocompletion=complete_town,
+        ),
     ] = None,
     maps: Maps = None,
     storyboard: Annotated[

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dorothie_gym.cli.completion import complete_model
 from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import (
     FAILED,
@@ -49,7 +50,12 @@ Workers = Annotated[
 
 
 def train(
-    model: Annotated[str, typer.Argument(metavar="MODEL", help="toto, toto-belief, bert, ...; see `table`.")],
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL", help="toto, toto-belief, bert, ...; see `table`.", autocompletion=complete_model
+        ),
+    ],
     corpus: CorpusOption = None,
     size: Size = "small",
     seeds: Seeds = 5,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn, TypeAlias, TypeVar
 
 import typer
 
+from dorothie_gym.cli.completion import complete_algorithm, complete_env
 from dorothie_gym.cli.options import AsJson, Ray
 from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.ontology import AGENT_ROLES
@@ -36,11 +37,20 @@ _OPTIONS = ("steps", "environments", "workers", "seed", "evaluate_every", "episo
 
 
 def train_rl(
-    algorithm: Annotated[str, typer.Argument(metavar="ALGO", help="ppo, maskable_ppo, a2c, dqn, sac or selfplay.")],
+    algorithm: Annotated[
+        str,
+        typer.Argument(
+            metavar="ALGO", help="ppo, maskable_ppo, a2c, dqn, sac or selfplay.", autocompletion=complete_algorithm
+        ),
+    ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the run; a started run is resumed.")],
     env: Annotated[
         str | None,
-        typer.Option(metavar="ID", help=f"Id of the environment; default {DEFAULT_ENV}; selfplay has its own."),
+        typer.Option(
+            metavar="ID",
+            help=f"Id of the environment; default {DEFAULT_ENV}; selfplay has its own.",
+            autocompletion=complete_env,
+        ),
     ] = None,
     setting: Annotated[
         list[str] | None,

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from dorothie_gym.errors import TownError
+from dorothie_gym.errors import TownError, did_you_mean
 from dorothie_gym.files import JsonValue
 from dorothie_gym.maps.cache import through_cache
 from dorothie_gym.maps.model import LaneLink, SignalKind
@@ -60,7 +60,8 @@ def load_town(name_or_path: str | Path) -> Town:
         raise TownError(
             str(name_or_path),
             "town",
-            f"there is no such town; known towns are {', '.join(town_names())}, and files end in .xodr or .yaml",
+            f"there is no such town; {did_you_mean(str(name_or_path), town_names())}"
+            f"known towns are {', '.join(town_names())}, and files end in .xodr or .yaml",
         )
     return _load(path)
 

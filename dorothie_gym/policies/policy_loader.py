@@ -11,7 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from dorothie_gym.errors import PolicyLoadError
+from dorothie_gym.errors import PolicyLoadError, did_you_mean
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard
@@ -51,7 +51,8 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     if name == "random":
         return RandomPolicy(role, limits)
     if name not in policy_names(role):
-        raise ValueError(f"there is no policy {name!r}; the policies are {', '.join(policy_names(role))}")
+        hint = did_you_mean(name, policy_names(role))
+        raise ValueError(f"there is no policy {name!r}; {hint}the policies are {', '.join(policy_names(role))}")
     if name == LANE_FOLLOW:
         return LaneFollowPolicy(limits)
     if role is Role.PARTICIPANT:
@@ -162,7 +163,7 @@ def find_player(given: str, role: Role) -> Player:
     if not path.exists():
         raise PolicyLoadError(
             f"{role}: there is no policy {given!r}, nor a file of that name; "
-            f"the policies are {', '.join(policy_names(role))}"
+            f"{did_you_mean(given, policy_names(role))}the policies are {', '.join(policy_names(role))}"
         )
     description = _description(path)
     kinds = _kinds_of(path, description)

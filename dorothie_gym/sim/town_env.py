@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from pathlib import Path
 from typing import ClassVar, TypedDict
 
+import gymnasium
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
@@ -15,6 +18,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
+from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import load_town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.network.network import LARGEST_COORDINATE, TownNetwork
@@ -219,6 +223,20 @@ class TownConfig(TypedDict):
     action: dict[str, object]
 
 
+def config_with_town(config: Mapping[str, object] | None, town: str | Path | None) -> dict[str, object]:
+    """Returns settings with the town of the argument `town`.
+
+    Raises:
+        ValueError: the settings are no dictionary, or name another town.
+    """
+    if config is not None and not isinstance(config, Mapping):
+        raise ValueError(f"config is a {type(config).__name__}; it must be a dictionary of settings")
+    settings = dict(config or {})
+    if town is not None and str(settings.setdefault("town", str(town))) != str(town):
+        raise ValueError(f"town is {str(town)!r}, but config has the town {settings['town']!r}; give one of them")
+    return settings
+
+
 class TownEnv(AbstractEnv):
     """Driving through a town among other vehicles, as an environment of highway-env.
 
@@ -245,6 +263,8 @@ class TownEnv(AbstractEnv):
     seconds.
 
     ## Arguments
+    `town`: name of a town, or path of an `.xodr` or `.yaml` file, as the setting of the same name.
+
     `config`: settings of highway-env, and:
 
     - `town`: name of a town, or path of an `.xodr` or `.yaml` file.
@@ -263,10 +283,15 @@ class TownEnv(AbstractEnv):
     observation_type: ObservationType
     observation_space: spaces.Space[object]
 
-    def __init__(self, config: dict[str, object] | None = None, render_mode: str | None = None) -> None:
+    def __init__(
+        self,
+        config: dict[str, object] | None = None,
+        render_mode: str | None = None,
+        town: str | Path | None = None,
+    ) -> None:
         self._network: TownNetwork | None = None
         self._network_of: str | None = None
-        super().__init__(config, render_mode)
+        super().__init__(config_with_town(config, town), render_mode)
 
     @classmethod
     def default_config(cls) -> TownConfig:
@@ -287,6 +312,21 @@ class TownEnv(AbstractEnv):
         )
         settings: TownConfig = config
         return settings
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, object] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, object]]:
+        """Begins an episode.
+
+        Args:
+            seed: seed of the episode.
+            options: `config` changes settings, as in highway-env; other options cause a warning.
+        """
+        for name in options or {}:
+            if name != "config":
+                gymnasium.logger.warn(f"reset option {short_repr(name)} is unknown and ignored; known: config")
+        first: tuple[NDArray[np.float32], dict[str, object]] = super().reset(seed=seed, options=options)
+        return first
 
     @property
     def ego(self) -> Array:

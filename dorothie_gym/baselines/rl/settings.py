@@ -10,7 +10,7 @@ from typing import Any, Final, Self, TypeAlias
 
 import yaml
 
-from dorothie_gym.errors import SettingsError
+from dorothie_gym.errors import SettingsError, did_you_mean
 
 Arguments: TypeAlias = Mapping[str, Any]
 """Keyword arguments of an environment or an algorithm, of any type; both check them."""
@@ -146,7 +146,8 @@ def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSetti
 
 def _check_algorithm(name: str) -> None:
     if name not in ALGORITHMS:
-        raise SettingsError(f"algorithm is {name!r}; it must be one of {', '.join(ALGORITHMS)}")
+        known = (*ALGORITHMS, "selfplay")
+        raise SettingsError(f"algorithm is {name!r}; {did_you_mean(name, known)}it must be one of {', '.join(known)}")
 
 
 def _read_data(name: str) -> Page:

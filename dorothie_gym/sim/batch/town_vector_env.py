@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TypeAlias, cast
 
 import numpy as np
@@ -42,7 +43,7 @@ from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.records import RecordArray, empty_records
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.town_env import SEEDS, TownConfig, TownEnv, finite, populate_around
+from dorothie_gym.sim.town_env import SEEDS, TownConfig, TownEnv, config_with_town, finite, populate_around
 
 ActionArray: TypeAlias = "NDArray[np.int64] | NDArray[np.float32]"
 """Meta actions (n,), or continuous actions (n, 1 or 2) in [-1, 1]."""
@@ -213,6 +214,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], ActionArray, NDArray[np.gener
         render_mode: str | None = None,
         threads: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        town: str | Path | None = None,
     ) -> None:
         """Makes environments, to be reset before they are used.
 
@@ -224,7 +226,7 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], ActionArray, NDArray[np.gener
             raise ValueError(f'{render_mode=}: there are no pictures of many towns; use vectorization_mode="sync"')
         self.num_envs = num_envs
         self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(autoreset_mode)}
-        self.config = cast(TownConfig, {**TownEnv.default_config(), **(config or {})})
+        self.config = cast(TownConfig, {**TownEnv.default_config(), **config_with_town(config, town)})
         self._actions, self._kinematics = Actions(self.config["action"]), Kinematics(self.config["observation"])
         self.single_action_space = self._actions.space
         self.single_observation_space = finite(self._kinematics.space)
