@@ -14,6 +14,7 @@ DorothieGymError
 ├── PredictionError      predictions cannot be scored
 ├── FeatureStoreError    cached features are damaged
 ├── RolloutError         results of a rollout cannot be read
+├── StateError           a state of a session cannot be restored here
 ├── SettingsError        settings of a training run are out of range
 ├── ModelFileError       a saved model cannot be read
 ├── CheckpointError      a training checkpoint is damaged or of another run
@@ -98,6 +99,10 @@ class FeatureStoreError(DorothieGymError, ValueError):
 
 class RolloutError(DorothieGymError, ValueError):
     """A file of rollout results cannot be read; the message names the file and what to do."""
+
+
+class StateError(DorothieGymError, ValueError):
+    """A state cannot be restored: it is of another town or other settings; the message names both."""
 
 
 class SettingsError(DorothieGymError, ValueError):

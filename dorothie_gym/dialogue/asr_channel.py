@@ -14,6 +14,7 @@ import numpy as np
 from rapidfuzz import process
 from rapidfuzz.distance import Levenshtein
 
+from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.conversation import Span, Utterance
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.dialogue.entity_recognition import sound_of
@@ -27,6 +28,7 @@ _CANDIDATES = 6
 """Number of candidate words for a substitution."""
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class AsrChannel:
     """Error model of a speech recogniser.

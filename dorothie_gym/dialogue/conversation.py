@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from dorothie_gym.copying import shared
 from dorothie_gym.ontology import DialogueAct, Role
 
 WORDS_PER_SECOND = 2.7
@@ -28,6 +29,7 @@ def speech_seconds(text: str, words_per_second: float = WORDS_PER_SECOND) -> flo
     return max(SHORTEST_SPAN, len(text.split()) / words_per_second)
 
 
+@shared
 @dataclass(frozen=True)
 class Span:
     """Segment of an utterance with one dialogue act.
@@ -45,6 +47,7 @@ class Span:
             raise ValueError("Span.text is blank: pass the words, or generate them with word_act")
 
 
+@shared
 @dataclass(frozen=True)
 class Utterance:
     """Utterance of one speaker.

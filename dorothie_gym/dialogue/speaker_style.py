@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.lexicon import read_data, strings
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.errors import PhraseFileError
@@ -16,6 +17,7 @@ from dorothie_gym.ontology import Role, parse_role
 _SHARES = ("chattiness", "indirectness", "anaphora", "disfluency", "repairs", "habit", "addressing")
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class SpeakerStyle:
     """Style of a speaker. Shares are in [0, 1].

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym.copying import shared
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.engine.session_log import Outcome
 from dorothie_gym.maps import Town
@@ -22,6 +23,7 @@ GATE = 13.82
 """Squared Mahalanobis distance that one in a thousand true statements exceeds (chi-square, 2 degrees of freedom)."""
 
 
+@shared
 @dataclass(frozen=True)
 class PlaceEstimate:
     """Normal distribution over places.
@@ -117,6 +119,7 @@ STREET_POINT_SPACING = 10.0
 """Distance between the sampled points of a street [m]."""
 
 
+@shared
 class MapNames:
     """Positions of the named streets and landmarks on the Co-Wizard's map.
 
@@ -196,6 +199,7 @@ STATEMENTS = frozenset(
 _NO_LANDMARK = frozenset({LandmarkName.UNKNOWN, LandmarkName.QUERIED})
 
 
+@shared
 @dataclass(frozen=True)
 class LandmarkGuess:
     """Place on a lane that the Co-Wizard marked as the place of a hidden landmark.

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from dorothie_gym.copying import shared
 from dorothie_gym.dialogue import WORDS_PER_SECOND
 from dorothie_gym.ontology import Role
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
@@ -18,6 +19,7 @@ _SIGNS = ((Role.PARTICIPANT, 1.0), (Role.CO_WIZARD, 1.0), (Role.AD_WIZARD, -1.0)
 """Roles and the sign of the shared reward terms: the Ad-Wizard plays against the others."""
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class RewardWeights:
     """Weights of the reward terms. Participant and Co-Wizard share the first four; the Ad-Wizard gets them negated.
@@ -82,6 +84,7 @@ class RewardWeights:
         return terms
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class EnvConfig:
     """Settings of a session, of `DuoWizardEnv` and of the single-role environments.

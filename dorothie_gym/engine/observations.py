@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property, lru_cache
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Lookups
 from dorothie_gym.dialogue import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
 from dorothie_gym.engine.path_measurements import EgoMeasurements, UpcomingJunction
@@ -57,12 +59,20 @@ class DeliveredMessages:
     speaking: Mapping[Role, float]
 
 
-class ObservationBuilder:
+@lru_cache(maxsize=16)
+def _int64s(count: int) -> tuple[np.int64, ...]:
+    """Returns the numbers below `count`, which are handed out as they are."""
+    return tuple(np.int64(number) for number in range(count))
+
+
+class ObservationBuilder(Lookups):
     """Builds the observations of a session, for the roles that are asked for.
 
     Each role has a buffer. Its template holds the values that are the same in most decisions: constant values are
     written once, rarely changing ones when they change. A copy of the template is completed and handed out.
     """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_unread", "_numbers")
 
     def __init__(
         self,
@@ -80,15 +90,21 @@ class ObservationBuilder:
         self._buffers = {
             role: FieldBuffer.of_space(observation_space(role, limits, observe_acts)) for role in AGENT_ROLES
         }
-        # Taken for the tables of a role that is not asked for.
-        self._unread = {role: buffer.copy() for role, buffer in self._buffers.items()}
-        self._numbers = [np.int64(number) for number in range(max(limits.lanes, len(LABELS)))]  # created once
         self._story = plain_text(scenario.storyboard.story, STORY_LENGTH)
         self._tasks = ""
         self._weather: tuple[float, ...] = ()
         self._faults: tuple[Sensor, ...] = ()
         self._versions = (-1, -1)
         self._write_constants(scenario)
+
+    @cached_property
+    def _unread(self) -> dict[Role, Observation]:
+        """Tables that are written in place of those of a role that is not asked for."""
+        return {role: buffer.copy() for role, buffer in self._buffers.items()}
+
+    @cached_property
+    def _numbers(self) -> tuple[np.int64, ...]:
+        return _int64s(max(self._limits.lanes, len(LABELS)))
 
     def build(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[str, Observation]:
         """Builds the observations of some roles, by agent, each in its observation space.

@@ -10,6 +10,7 @@ from typing import TypeAlias
 import gymnasium
 import numpy as np
 
+from dorothie_gym.copying import shared
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import did_you_mean, short_repr
 from dorothie_gym.maps import Town
@@ -23,6 +24,7 @@ STREET_NAMES = tuple(
 """The fourteen names that are drawn for streets."""
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
     """Initial conditions of a session.

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Restorable
 from dorothie_gym.dialogue import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
 from dorothie_gym.engine.config import EnvConfig, RewardTerms
@@ -281,7 +282,7 @@ class StepOutcome(NamedTuple):
     truncated: bool
 
 
-class SessionEngine:
+class SessionEngine(Restorable):
     """Plays the sessions of one town, one after the other, for all three roles.
 
     Environments are views of an engine; corpora, rollouts and replay checks step it without one.
@@ -299,6 +300,8 @@ class SessionEngine:
         max_cycles: see above.
         limits: sizes of the spaces that the town needs.
     """
+
+    CHANGES: ClassVar[Sequence[str]] = ("_session", "_seeds")
 
     def __init__(
         self,
@@ -324,6 +327,15 @@ class SessionEngine:
         self._seeds = np.random.default_rng()
         self._session: LiveSession | None = None
         self._observations: LazyObservations | None = None
+
+    def go_on(self, values: dict[str, object]) -> None:
+        """Takes up a session and the series of seeds; the observations are built when they are read."""
+        super().go_on(values)
+        self._observations = None
+
+    def fits(self) -> dict[str, object]:
+        """Returns the town and the settings."""
+        return {**super().fits(), "the town": self.town, "the settings": self.config}
 
     @property
     def engine(self) -> SessionEngine:

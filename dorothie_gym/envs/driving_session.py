@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.path_measurements import UpcomingJunction
 from dorothie_gym.engine.scenario import (
     ResetOptions,
@@ -259,8 +260,10 @@ class DrivingSession:
 Action = TypeVar("Action")
 
 
-class DrivingEnv(TimeLimitedEnv[Vector, Action]):
+class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
     """Base class of the navigation environments; subclasses define observations and actions."""
+
+    CHANGES: ClassVar[Sequence[str]] = ("_drive", "_controls", "_shown", "_np_random", "_np_random_seed")
 
     def __init__(
         self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
@@ -275,6 +278,22 @@ class DrivingEnv(TimeLimitedEnv[Vector, Action]):
         self.template = template_option(storyboard)
         self._network = TownNetwork(self.town)
         self._drive: DrivingSession | None = None
+        self._controls: NavigationMask | None = None
+
+    def changing(self) -> dict[str, object]:
+        """Returns what changes in the environment, and what was noted for its pictures."""
+        return {**super().changing(), "view": self._view.notes}
+
+    def go_on(self, values: dict[str, object]) -> None:
+        """Takes up what changes in the environment, and what was noted for its pictures."""
+        notes = values.pop("view")
+        super().go_on(values)
+        if self._drive is not None:
+            self._view.go_on(notes, self._drive.session)
+
+    def fits(self) -> dict[str, object]:
+        """Returns the kind of environment, the town and the settings."""
+        return {**super().fits(), "the town": self.town, "the settings": self.config}
 
     @property
     def decision_limit(self) -> int:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
+from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import ResetOptions, Scenario, scenario_option
 from dorothie_gym.engine.session_engine import LiveSession, SessionEngine
@@ -37,7 +38,7 @@ _METADATA: dict[str, object] = {"name": "duo_wizard_v0", **METADATA, "is_paralle
 _AGENTS = {str(role): role for role in AGENT_ROLES}
 
 
-class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
+class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
     """Dialogue of three agents while a car drives through a town.
 
     ## Description
@@ -83,6 +84,7 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
     """
 
     metadata = _METADATA
+    CHANGES: ClassVar[Sequence[str]] = ("agents",)
 
     def __init__(
         self,
@@ -182,6 +184,21 @@ class DuoWizardEnv(ParallelEnv[str, Observation, ActionDict]):
         padded[: len(reached)] = reached[: self.limits.subgoals]
         car = session.world.car
         return np.concatenate(([session.world.time, *car.position, car.heading, car.speed], padded))
+
+    def changing(self) -> dict[str, object]:
+        """Returns what changes in the environment and in its engine."""
+        return {**super().changing(), "engine": self.engine.changing()}
+
+    def go_on(self, values: dict[str, object]) -> None:
+        """Takes up what changes in the environment and in its engine."""
+        engine = values.pop("engine")
+        assert isinstance(engine, dict)
+        super().go_on(values)
+        self.engine.go_on(engine)
+
+    def fits(self) -> dict[str, object]:
+        """Returns the kind of environment, and what has to be equal in the engine."""
+        return {**self.engine.fits(), **super().fits()}
 
     # --- the engine inside ------------------------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from dorothie_gym.copying import shared
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.policies.ad_wizard import MOST_TRICKS
 from dorothie_gym.policies.navigation.instructor import Guidance
@@ -19,6 +20,7 @@ TRAFFIC: Mapping[str, tuple[int, int]] = MappingProxyType(
 """Numbers of vehicles and pedestrians of each traffic density; upper bounds where the town is small."""
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class NavigationWeights:
     """Weights of the reward terms; a term of weight 0 is reported as 0.
@@ -65,6 +67,7 @@ REWARDS: Mapping[str, NavigationWeights] = MappingProxyType(
 """Weights by name."""
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class NavigationConfig:
     """Settings of `NavigationEnv`.

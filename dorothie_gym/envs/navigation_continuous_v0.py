@@ -235,7 +235,6 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         super().__init__(town, storyboard, config, render_mode, view)
         self.action_space = spaces.Box(-1.0, 1.0, (len(CONTROL_SPECS),), dtype=np.float32)
         self.observation_space = spaces.Box(-1.0, 1.0, (sum(CONTINUOUS_FIELDS.values()),), dtype=np.float32)
-        self._controls: NavigationMask | None = None
 
     def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
         """Begins a session; see `NavigationEnv.reset`."""

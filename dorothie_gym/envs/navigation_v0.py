@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -70,6 +72,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
     """
 
     metadata = metadata_at(DECISION_FREQUENCY)
+    CHANGES: ClassVar[Sequence[str]] = (*DrivingEnv.CHANGES, "_mask")
 
     def __init__(
         self,
@@ -92,7 +95,6 @@ class NavigationEnv(DrivingEnv[np.int64]):
         super().__init__(town, storyboard, config, render_mode, view)
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = navigation_space()
-        self._controls: NavigationMask | None = None
         self._mask = np.zeros(len(ACTIONS), dtype=np.int8)
 
     def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:

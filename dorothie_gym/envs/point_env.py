@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
 
 import gymnasium as gym
@@ -12,6 +12,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.history_space import (
     act_space,
@@ -128,7 +129,7 @@ RULES: Final[Mapping[Task, PointRules[Any]]] = {
 _METADATA: dict[str, object] = {"render_modes": ["ansi"], "render_fps": 2}
 
 
-class PointEnv(gym.Env[Observation, ActionDict]):
+class PointEnv(Restorable, gym.Env[Observation, ActionDict]):
     """Base class of the task environments on recorded and live sessions.
 
     An episode is one session, a step one prediction point. Predictions do not affect later observations.
@@ -140,6 +141,7 @@ class PointEnv(gym.Env[Observation, ActionDict]):
     """
 
     metadata = _METADATA
+    CHANGES: ClassVar[Sequence[str]] = ("_points", "_point", "_np_random", "_np_random_seed")
 
     def __init__(self, task: Task, limits: SpaceLimits | None, render_mode: str | None) -> None:
         if render_mode not in (None, "ansi"):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import Observation
@@ -33,7 +35,7 @@ METADATA: Final[dict[str, object]] = metadata_at(2.0)
 """Metadata of the environments with two decisions per second."""
 
 
-class SessionView:
+class SessionView(Lookups):
     """Draws sessions in one render mode; the renderer is created with the first frame.
 
     Args:
@@ -45,14 +47,17 @@ class SessionView:
         ValueError: the render mode is unknown.
     """
 
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_renderer", "_window")
+
+    _renderer: SceneRenderer | None = None
+    _window: HumanWindow | None = None
+
     def __init__(self, render_mode: str | None, *, frames_per_second: float, role: Role | None = None) -> None:
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or one of {', '.join(RENDER_MODES)}")
         self._mode, self._rate, self._role = render_mode, frames_per_second, role
         self._seen: RoleView | None = None
         self._heard: list[SpokenLine] = []
-        self._renderer: SceneRenderer | None = None
-        self._window: HumanWindow | None = None
 
     @classmethod
     def of_role(cls, role: Role, view: str, render_mode: str | None, frames_per_second: float) -> SessionView:
@@ -68,6 +73,20 @@ class SessionView:
             from dorothie_gym.engine.role_scene import RoleView
 
             self._seen = RoleView(self._role, session.world.town)
+
+    @property
+    def notes(self) -> tuple[RoleView | None, list[SpokenLine]]:
+        """What was noted of the session, for a state of the environment."""
+        return self._seen, self._heard
+
+    def go_on(self, notes: object, session: LiveSession) -> None:
+        """Takes up the notes of a state; a view that draws begins anew if they were not taken for pictures."""
+        self.begin(session)
+        assert isinstance(notes, tuple)  # of `notes`
+        seen, heard = notes
+        if self._seen is not None and seen is not None:
+            self._seen = seen
+        self._heard = heard
 
     def note(self, seen: Observation) -> None:
         """Notes the role's observation of a decision."""

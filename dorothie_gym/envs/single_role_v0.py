@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Restorable, Unchanged
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_option
 from dorothie_gym.engine.session_engine import SessionEngine
@@ -23,7 +25,7 @@ from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, StepInfo
 from dorothie_gym.tasks import StoryboardTemplate
 
 
-class SingleRole(TimeLimitedEnv[Observation, ActionDict]):
+class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
     """One of the three roles for the agent; policies play the other two.
 
     ## Description
@@ -64,6 +66,7 @@ class SingleRole(TimeLimitedEnv[Observation, ActionDict]):
     """
 
     metadata = METADATA
+    CHANGES: ClassVar[Sequence[str]] = ("_np_random", "_np_random_seed")
 
     def __init__(
         self,
@@ -156,6 +159,26 @@ class SingleRole(TimeLimitedEnv[Observation, ActionDict]):
     def close(self) -> None:
         """Closes the window, if there is one."""
         self._view.close()
+
+    def changing(self) -> dict[str, object]:
+        """Returns what changes in the environment, its engine and its partners."""
+        states = {role: Unchanged(state) for role, state in self._states.items()}
+        return {**super().changing(), "engine": self.engine.changing(), "partners": states, "view": self._view.notes}
+
+    def go_on(self, values: dict[str, object]) -> None:
+        """Takes up what changes in the environment, its engine and its partners."""
+        engine, states, notes = values.pop("engine"), values.pop("partners"), values.pop("view")
+        assert isinstance(engine, dict) and isinstance(states, dict)
+        super().go_on(values)
+        self.engine.go_on(engine)
+        self._states = {role: state.value for role, state in states.items()}
+        if self._states:
+            self._view.go_on(notes, self.engine.session)
+
+    def fits(self) -> dict[str, object]:
+        """Returns role and partners, and what has to be equal in the engine."""
+        partners = {str(role): type(policy).__name__ for role, policy in self.partners.items()}
+        return {**self.engine.fits(), **super().fits(), "the role": self.role, "the partners": partners}
 
     def _cast(self, wanted: Mapping[str, str | AnyPolicy]) -> dict[Role, AnyPolicy]:
         others = [role for role in AGENT_ROLES if role is not self.role]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import ClassVar, Final
 
@@ -18,6 +18,7 @@ from dorothie_gym.benchmark.metrics import (
     SlotScorePaper,
 )
 from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
+from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.scenario import ResetOptions, check_options
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError
@@ -75,9 +76,8 @@ class TeacherForcedEnv(PointEnv):
     - `render_mode`: None or `"ansi"`.
 
     `reset(options={"session": number or name})` selects the session, which is drawn at random otherwise; sessions
-    without a point of the task are skipped. The infos hold `session` (name) and `points_left`; after a step also
-    `index` (number of the event), `label` (the correct action), `reward_terms`, and `metrics` of the episode so far
-    (None: not defined yet).
+    without a point of the task are skipped. The infos hold `session` (name); after a step also `index` (number of the
+    event), `label` (the correct action), `reward_terms`, and `metrics` of the episode so far (None: not defined yet).
 
     Raises:
         SessionError: if there are no sessions, one cannot be read, or none has a point of the task.
@@ -87,6 +87,7 @@ class TeacherForcedEnv(PointEnv):
     """
 
     of_task: ClassVar[Task]
+    CHANGES: ClassVar[Sequence[str]] = (*PointEnv.CHANGES, "_session", "_town", "_done")
 
     def __init__(
         self,
@@ -101,7 +102,10 @@ class TeacherForcedEnv(PointEnv):
         self._session: Session | None = None
         self._town: Town | None = None
         self._done: list[tuple[ActionMapping, Point]] = []
-        self._count = 0
+
+    def fits(self) -> dict[str, object]:
+        """Returns the kind of environment, the names of the sessions and the sizes of the tables."""
+        return {**super().fits(), "the sessions": self._library.names, "the limits": self.limits}
 
     def _begin(self, seed: int | None, options: ResetOptions) -> Iterator[Point]:
         check_options(options, "session")
@@ -110,7 +114,7 @@ class TeacherForcedEnv(PointEnv):
         for number in order:
             self._session, points = self._library.read(number)
             if points:
-                self._done, self._count = [], len(points)
+                self._done = []
                 self._town = find_town(self._session.header.town, self._library.maps(number))
                 return iter(points)
         raise SessionError(f"none of the {len(order)} sessions has a point of the task {self.task.value}")
@@ -129,7 +133,7 @@ class TeacherForcedEnv(PointEnv):
 
     def _info(self) -> StepInfo:
         assert self._session is not None  # an episode has begun
-        return {"session": self._session.name, "points_left": self._count - len(self._done)}
+        return {"session": self._session.name}
 
     def _judge(self, action: ActionMapping, point: Point) -> StepInfo:
         self._done.append((action, point))
@@ -138,13 +142,10 @@ class TeacherForcedEnv(PointEnv):
             found = _decision_metrics(actions, [point for point in points if isinstance(point, DecisionPoint)])
         else:
             found = _act_metrics(actions, [point for point in points if isinstance(point, InferencePoint)])
-        return {
-            "points_left": self._count - len(self._done),
-            "metrics": {key: None if np.isnan(value) else value for key, value in found.items()},
-        }
+        return {"metrics": {key: None if np.isnan(value) else value for key, value in found.items()}}
 
 
-class _Library:
+class _Library(Lookups):
     """Sessions of a split, read on demand.
 
     Args:
@@ -153,6 +154,8 @@ class _Library:
         task: task of the points.
         limits: largest numbers of landmarks and streets.
     """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("read",)
 
     def __init__(
         self, corpus: Corpus | Path | str | Sequence[Session], split: str, task: Task, limits: SpaceLimits
@@ -163,7 +166,11 @@ class _Library:
         found = _sessions(corpus, split)
         self.names = [one.name for one in found]
         self._found = found
-        self.read = lru_cache(maxsize=CACHED_SESSIONS)(self._read)
+
+    @cached_property
+    def read(self) -> Callable[[int], tuple[Session, tuple[Point, ...]]]:
+        """Reads a session and its points, or returns them once more."""
+        return lru_cache(maxsize=CACHED_SESSIONS)(self._read)
 
     def __len__(self) -> int:
         return len(self.names)

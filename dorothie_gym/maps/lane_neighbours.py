@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dorothie_gym.compilation import allocating
+from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.maps.polyline import (
     HEADING,
@@ -54,6 +55,7 @@ class Oncoming(NamedTuple):
     gap: float
 
 
+@shared
 class OncomingLanes:
     """Lookup of the oncoming lane to the left of a point on a lane."""
 

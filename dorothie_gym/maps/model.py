@@ -14,6 +14,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import shared
+
 Array: TypeAlias = NDArray[np.float64]
 
 NO_JUNCTION = -1
@@ -46,6 +48,7 @@ class LinkType(enum.StrEnum):
         return self in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
 
 
+@shared
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lane:
     """Driving lane, given by its centre line in driving direction.
@@ -152,6 +155,7 @@ class Lane:
         return float(s), distance if side >= 0 else -distance
 
 
+@shared
 @dataclass(frozen=True)
 class LaneLink:
     """Link from lane `source` to lane `target`. The type of a turn is that of the link into its connector."""
@@ -161,6 +165,7 @@ class LaneLink:
     type: LinkType
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Exit:
     """Exit from the end of a lane, across a junction if there is one.
@@ -181,6 +186,7 @@ class Exit:
     junction_id: int
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Junction:
     """Junction of roads.
@@ -196,6 +202,7 @@ class Junction:
     connectors: tuple[int, ...]
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Street:
     """Named street: lanes that continue straight across junctions. `name` is the name in the map."""
@@ -205,6 +212,7 @@ class Street:
     lanes: tuple[int, ...]
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Site:
     """Place beside a lane where a landmark may stand.
@@ -236,6 +244,7 @@ class SignalKind(enum.StrEnum):
     OTHER = "other"
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Signal:
     """Traffic light or sign.
@@ -257,6 +266,7 @@ class Signal:
     value: float | None = None
 
 
+@shared
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Crosswalk:
     """Marked pedestrian crossing, given by its outline (n, 2) [m]."""
@@ -265,6 +275,7 @@ class Crosswalk:
     outline: Array
 
 
+@shared
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sidewalk:
     """Pavement beside a street.

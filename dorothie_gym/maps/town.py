@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.copying import shared
 from dorothie_gym.maps.lane_graph import LaneGraph, build_lane_graph
 from dorothie_gym.maps.model import (
     Crosswalk,
@@ -24,6 +25,7 @@ from dorothie_gym.maps.model import (
 from dorothie_gym.maps.traffic_lights import LightColour, LightProgramme
 
 
+@shared
 class Town:
     """Road map of a town. Immutable: do not modify its parts, they are cached and shared.
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 
+from dorothie_gym.copying import shared
+
 
 class LightColour(enum.StrEnum):
     """Colour of a traffic light."""
@@ -16,6 +18,7 @@ class LightColour(enum.StrEnum):
     RED = "red"
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class LightPhase:
     """Interval in which no light of the junction changes.
@@ -37,6 +40,7 @@ class LightPhase:
         return LightColour.YELLOW if signal in self.yellow else LightColour.RED
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class LightProgramme:
     """Cyclic programme of the lights of one junction.

@@ -10,6 +10,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Self, TypeAlias
 
+from dorothie_gym.copying import shared
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.slots import SLOT_VALUES, Slot, SlotValue
 from dorothie_gym.ontology.vocabulary import LabelledInt, unknown_spelling
@@ -93,6 +94,7 @@ def decode_slots(vector: Iterable[int]) -> frozenset[SlotValue]:
     return frozenset(value for entry, value in zip(entries, LABELS, strict=True) if entry)
 
 
+@shared
 @dataclass(frozen=True)
 class DialogueAct:
     """Dialogue act of one span of an utterance: a move with slot values.

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.copying import shared
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, U_TURN_ANGLE, ArgumentKind, DialogueAct, PhysicalAction, Role
 from dorothie_gym.recording.events import ActionRecord, Event, EventType, MoveRecord, UtteranceRecord
 from dorothie_gym.recording.header import LandmarkRow
@@ -330,6 +331,7 @@ class _TaskPoint:
         return self.history.view(self.task, self.frame, self.index)
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class InferencePoint(_TaskPoint):
     """Prediction point of a dialogue move (UfN, RfN).
@@ -345,6 +347,7 @@ class InferencePoint(_TaskPoint):
     act: DialogueAct
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class DecisionPoint(_TaskPoint):
     """Prediction point of a navigation action (NfD).

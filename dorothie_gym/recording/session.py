@@ -15,6 +15,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import shared
 from dorothie_gym.errors import SessionError
 from dorothie_gym.files import new_folder, write_atomically
 from dorothie_gym.ontology import Role
@@ -63,6 +64,7 @@ from dorothie_gym.recording.validation import ReadReport, faults_of
 from dorothie_gym.sim.config import FRAME_RATE
 
 
+@shared
 @dataclass(frozen=True, eq=False)
 class Session:
     """Header, events and trajectory of a session.

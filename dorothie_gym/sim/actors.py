@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
+from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.bodies import Bodies, Pedestrian, Prop, TrafficVehicle
@@ -32,12 +36,16 @@ MORE = 8
 """Rows by which the arrays grow when all are taken."""
 
 
-class Actors:
+class Actors(Lookups):
     """Traffic, pedestrians and props of a world.
 
     Attributes:
         arrays: state of all bodies, the ego the first vehicle; replaced by bigger arrays when more are added.
     """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_bodies", "_present_of", "_present")
+
+    _present_of: WorldArrays | None = None
 
     def __init__(self, road: TownRoad, town: TownArrays, arrays: WorldArrays, *, seed: np.random.SeedSequence) -> None:
         """Takes over the arrays of a world that holds the ego already.
@@ -50,10 +58,11 @@ class Actors:
         """
         self.arrays = arrays
         self._road, self._town_arrays, self._town = road, town, road.network.town
-        self._bodies = Bodies(road, self)
         self._rng = np.random.default_rng(seed)
-        self._present_of: WorldArrays | None = None
-        self._present = np.zeros(0, dtype=np.bool_)
+
+    @cached_property
+    def _bodies(self) -> Bodies:
+        return Bodies(self._road, self)
 
     @property
     def vehicles(self) -> list[TrafficVehicle]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dorothie_gym.copying import shared
+
 FRAME_RATE = 30
 """Physics substeps, and frames of a recording, a second (paper, appendix B.2)."""
 
@@ -11,6 +13,7 @@ FRAME_COLUMNS = ("frame", "x", "y", "heading", "speed", "throttle", "steer", "br
 """Columns of the ego's trajectory: metres, radians, m/s, normalised controls; `lane` is the lane's id."""
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class WorldConfig:
     """Settings of the world.

@@ -7,14 +7,17 @@ They follow from the ego's trajectory alone, whatever drove it. Collisions, the 
 from __future__ import annotations
 
 import enum
+import functools
 import math
 import weakref
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
+from dorothie_gym.copying import Lookups, shared
 from dorothie_gym.maps.model import Array, SignalKind
 from dorothie_gym.maps.polyline import WIDTH
 from dorothie_gym.maps.right_of_way import right_of_way
@@ -67,19 +70,24 @@ class Breach:
     other: ObjectClass | None = None
 
 
-class InfractionWatch:
+class InfractionWatch(Lookups):
     """Watch over the trajectory of one car, which reports each breach of a rule once."""
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_arrays",)
 
     def __init__(self, network: TownNetwork, length: float) -> None:
         """Begins to watch a car of a length [m]."""
         self._network, self._town, self._length = network, network.town, length
         self._lines = _lines(network)
-        town = town_arrays(network)
         self._wide = bool(network.table.points[:, WIDTH].max() > WIDE_LANE)
-        self._arrays = WatchArrays(
+        self._marks, self._last = empty_records(LineMarkRecord, len(self._lines.lanes)), np.full(2, LONG_AGO)
+
+    @functools.cached_property
+    def _arrays(self) -> WatchArrays:
+        town = town_arrays(self._network)
+        return WatchArrays(
             town.points, town.lanes, town.origin, town.cells, town.entries, self._lines.records,
-            empty_records(LineMarkRecord, len(self._lines.lanes)), np.full(2, LONG_AGO),
-            empty_records(FindingRecord, 0),
+            self._marks, self._last, empty_records(FindingRecord, 0),
         )  # fmt: skip
 
     def look(self, poses: Array, frame: int) -> list[Breach]:
@@ -138,6 +146,7 @@ class InfractionWatch:
         return Breach(kind=kind, frame=frame, lane=lane, station=station, x=x, y=y)
 
 
+@shared
 @dataclass(frozen=True, eq=False)
 class _Lines:
     """Ends of lanes with a light or stop sign: `StopLineRecord` (m,), lanes, kinds and ids of signals."""

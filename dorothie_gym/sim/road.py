@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 import itertools
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from highway_env.road.road import Road
@@ -14,6 +14,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Landmark, RoadObject
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.bodies import Bodies, TrafficVehicle
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
@@ -29,7 +30,7 @@ from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.respawn import new_key, put_on_lane
 
 
-class TownRoad(Road):
+class TownRoad(Lookups, Road):
     """A highway-env road on which heights count and neighbours are found across lane ends.
 
     Vehicles and objects are highway-env's. One may carry a `height` [m] of its own, else it has that of its lane.
@@ -37,6 +38,8 @@ class TownRoad(Road):
     Attributes:
         time: simulated time [s], counted by `step`.
     """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_chains", "_zones")
 
     def __init__(
         self,
@@ -268,13 +271,6 @@ class CompiledRoad(TownRoad):
         self._things: list[RoadObject] = []
         self._listed: tuple[list[Vehicle], list[RoadObject]] = [], []
         self.show()
-
-    def __deepcopy__(self, memo: dict[int, object]) -> CompiledRoad:
-        twin = self.__class__.__new__(self.__class__)
-        memo[id(self)] = twin
-        for name, value in self.__dict__.items():
-            setattr(twin, name, value.copy() if name == "arrays" else copy.deepcopy(value, memo))
-        return twin
 
     @property
     def town_arrays(self) -> TownArrays:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, TypedDict
 
@@ -12,12 +14,18 @@ import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.envs.common.graphics import EnvViewer
-from highway_env.envs.common.observation import KinematicObservation, ObservationType, OccupancyGridObservation
+from highway_env.envs.common.observation import (
+    GrayscaleObservation,
+    KinematicObservation,
+    ObservationType,
+    OccupancyGridObservation,
+)
 from highway_env.utils import lmap
 from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import load_town
 from dorothie_gym.maps.model import Array
@@ -199,7 +207,24 @@ def parts_of(kind: ObservationType) -> list[ObservationType]:
     return [kind, *(found for part in parts for found in parts_of(part))]
 
 
+class Grayscale(Lookups, GrayscaleObservation):
+    """highway-env's `GrayscaleObservation`, whose viewer is made again in copies."""
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("viewer",)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**super().__getstate__(), "_viewed": self.viewer.config}
+
+    @cached_property
+    def viewer(self) -> EnvViewer:
+        """highway-env's viewer, which also draws under SDL's dummy video driver, where its own would show black."""
+        viewer = EnvViewer(self.env, config=self._viewed)
+        viewer.enabled = True
+        return viewer
+
+
 _FASTER: dict[type[ObservationType], type[ObservationType]] = {
+    GrayscaleObservation: Grayscale,
     KinematicObservation: Kinematics,
     OccupancyGridObservation: OccupancyGrid,
 }
@@ -237,7 +262,7 @@ def config_with_town(config: Mapping[str, object] | None, town: str | Path | Non
     return settings
 
 
-class TownEnv(AbstractEnv):
+class TownEnv(Restorable, AbstractEnv):
     """Driving through a town among other vehicles, as an environment of highway-env.
 
     ## Description
@@ -339,6 +364,9 @@ class TownEnv(AbstractEnv):
         super().define_spaces()
         use_faster_observations(self.observation_type)
         self.observation_space = finite(self.observation_space)
+        # highway-env makes new spaces in each reset, and draws the action of the first info from them: they follow from
+        # the environment's seed, whose own generator goes on as if nothing had been drawn.
+        self.action_space.seed(int(copy.deepcopy(self.np_random).integers(SEEDS)))
         for kind in parts_of(self.observation_type):
             viewer = getattr(kind, "viewer", None)
             if viewer is not None:
@@ -371,6 +399,19 @@ class TownEnv(AbstractEnv):
         populate_around(network, arrays, self.np_random, vehicles=vehicles, pedestrians=pedestrians)
         self.road.show()
 
+    # --- Copies -------------------------------------------------------------------------------------------------------
+
+    def changing(self) -> dict[str, object]:
+        """Returns the attributes of highway-env that change."""
+        return {name: value for name, value in self.__dict__.items() if name not in _CONSTANT}
+
+    def fits(self) -> dict[str, object]:
+        """Returns the kind of environment and the settings."""
+        return {**super().fits(), "the settings": self.config}
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "viewer": None, "_record_video_wrapper": None}
+
     def _reward(self, action: object) -> float:
         return float(sum(self._rewards(action).values()))
 
@@ -397,6 +438,13 @@ class TownEnv(AbstractEnv):
 
     def _is_truncated(self) -> bool:
         return bool(self.time >= self.config["duration"])
+
+
+_CONSTANT = frozenset({
+    "render_mode", "viewer", "_record_video_wrapper", "config", "action_space", "observation_space", "_network",
+    "_network_of", "spec", "_spec",
+})  # fmt: skip
+"""Attributes of `TownEnv` that do not change between resets, or belong to pictures."""
 
 
 def finite(space: spaces.Space[object]) -> spaces.Space[object]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
@@ -57,7 +59,7 @@ class SensorArrays(NamedTuple):
     eye: RecordArray[EyeRecord]
 
 
-class World:
+class World(Lookups, Restorable):
     """A town in which the ego drives among others.
 
     All that moves is stepped by compiled loops (`sim.step`); this class writes their input and reads their results.
@@ -79,6 +81,10 @@ class World:
         offsets: offset of the ego to the right of its path at each of these frames (n,) [m].
         reports: events of the ego, and the numbers of its infractions.
     """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_record_of", "_own_record")
+
+    _record_of: WorldArrays | None = None
 
     def __init__(
         self, town: Town, config: WorldConfig, *, seed: np.random.SeedSequence, departure: tuple[int, float],
@@ -118,12 +124,25 @@ class World:
             float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading),
             np.random.default_rng(locate_seed),
         )  # fmt: skip
-        self._record_of: WorldArrays | None = None
         self.faults: dict[Sensor, int] = {}
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
         self.offsets: Array = np.zeros(0)
         self.reports = WorldEventLog(self.network, self.car.LENGTH)
+
+    # --- Copies -------------------------------------------------------------------------------------------------------
+
+    def changing(self) -> dict[str, object]:
+        """Returns all attributes but the views, which are looked up again."""
+        return self.__getstate__()
+
+    def go_on(self, values: dict[str, object]) -> None:
+        """Takes up these attributes."""
+        self.__dict__ = values
+
+    def fits(self) -> dict[str, object]:
+        """Returns the town and the settings."""
+        return {**super().fits(), "the town": self.town, "the settings": self.config}
 
     # --- Time ---------------------------------------------------------------------------------------------------------
 

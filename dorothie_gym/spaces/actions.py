@@ -14,6 +14,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from gymnasium import spaces
 
+from dorothie_gym.copying import shared
 from dorothie_gym.ontology import (
     LABELS,
     DialogueAct,
@@ -290,6 +291,7 @@ _CLASSES: dict[Role, type[ParticipantAction] | type[CoWizardAction] | type[AdWiz
 }
 
 
+@shared
 class ActionDecoder:
     """Decoder of the actions of one role; looks up everything that depends on the role once."""
 

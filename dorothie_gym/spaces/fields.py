@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Self, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import DTypeLike, NDArray
 
+from dorothie_gym.copying import Lookups
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS, UNBOUNDED
 
 AnySpace: TypeAlias = spaces.Space[Any]
@@ -170,15 +172,14 @@ Arrays: TypeAlias = dict[str, NDArray[Any]]
 """Arrays of several types, by name."""
 
 
-class FieldBuffer:
+class FieldBuffer(Lookups):
     """Arrays of fixed types and shapes in one block of memory.
 
     A copy of the block costs as much as the copy of one array. The caller owns the copy; later changes of the template
     do not reach it.
-
-    Attributes:
-        template: arrays that the next copies are made of, by name.
     """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("template",)
 
     def __init__(self, fields: Mapping[str, tuple[DTypeLike, Shape]]) -> None:
         """Allocates arrays of zeros.
@@ -189,7 +190,11 @@ class FieldBuffer:
         self._layout = np.dtype([(name, kind, shape) for name, (kind, shape) in fields.items()], align=True)
         self._block: NDArray[np.uint8] = np.zeros(self._layout.itemsize, dtype=np.uint8)
         self._names = tuple(fields)
-        self.template: Arrays = self._arrays(self._block)
+
+    @cached_property
+    def template(self) -> Arrays:
+        """Arrays that the next copies are made of, by name."""
+        return self._arrays(self._block)
 
     @classmethod
     def of_space(cls, space: spaces.Dict) -> Self:

@@ -6,6 +6,7 @@ import string
 import unicodedata
 from dataclasses import dataclass
 
+from dorothie_gym.copying import shared
 from dorothie_gym.maps import Town
 
 TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
@@ -30,6 +31,7 @@ PERCENT = 101
 """Number of steps of a share in percent, 0 to 100."""
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class SpaceLimits:
     """Numbers of rows and ids in observation and action spaces.

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from dorothie_gym.copying import shared
 from dorothie_gym.ontology import LandmarkName
 
 _REFERENCE = re.compile(r"\$([A-Za-z_]\w*)")
@@ -56,6 +57,7 @@ class SubgoalTemplate:
     leaves: bool = False
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class StoryboardTemplate:
     """Storyboard template (paper, appendix "Task Configuration"); `parse_template` creates and validates it.
@@ -142,6 +144,7 @@ class LandmarkSite(Protocol):
         ...
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Landmark:
     """Landmark at its site.
@@ -173,6 +176,7 @@ class Landmark:
     hidden: bool
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Subgoal:
     """Subgoal with texts filled in and landmarks given by index; fields as in `SubgoalTemplate`."""
@@ -188,6 +192,7 @@ class Subgoal:
     leaves: bool = False
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Storyboard:
     """Storyboard bound to a town.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dorothie_gym.engine.recorder import LightStates, actors_around
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.point_env import PointEnv
-from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import SessionError, StateError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
@@ -87,6 +87,16 @@ class TeacherForcing(PointEnv):
     def close(self) -> None:
         """Closes the wrapped environment."""
         self.duo.close()
+
+    def __getstate__(self) -> dict[str, object]:
+        raise StateError(
+            "a session that is played while it is predicted cannot be copied: copy the wrapped DuoWizardEnv, or record "
+            "the session and use UfN-v0, RfN-v0 or NfD-v0"
+        )
+
+    def changing(self) -> dict[str, object]:
+        """Raises `StateError`: the policies that play the session are in the middle of their steps."""
+        return self.__getstate__()
 
     def _begin(self, seed: int | None, options: Mapping[str, object]) -> Iterator[Point]:
         for _ in range(MAX_SILENT_SESSIONS):

@@ -54,7 +54,6 @@ def test_gymnasium_accepts_the_environment(env_class: type[TeacherForcedEnv]) ->
 def test_labels_get_full_reward(env_class: type[TeacherForcedEnv], count: int) -> None:
     _observations, rewards, info = play(env_class([session(talk())]))
     assert rewards == [1.0] * count
-    assert info["points_left"] == 0
     assert set(info["metrics"].values()) == {1.0}
     assert info["session"] == "one"
 
@@ -126,7 +125,7 @@ def test_reward_of_nfd_is_the_mean_of_action_and_joint_on_the_circle() -> None:
 
 def test_reward_without_recorded_angle_is_that_of_the_action() -> None:
     env = NfDEnv([session([physical(1, PhysicalAction.J_TURN), physical(2, PhysicalAction.STOP)])])
-    assert env.reset(seed=0)[1]["points_left"] == 2
+    env.reset(seed=0)
     _, reward, _, _, info = env.step({"action": 3, "angle": 77})
     assert (reward, info["reward_terms"], info["metrics"]["joint_accuracy"]) == (1.0, {"action": 1.0}, None)
 

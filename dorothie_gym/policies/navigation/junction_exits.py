@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.copying import shared
 from dorothie_gym.maps import Exit, Town
 from dorothie_gym.policies.route_progress import is_choice, lanes_beside, next_choice
 from dorothie_gym.spaces import ExitColumn, ObservationMapping
@@ -16,6 +17,7 @@ SECTOR_WIDTH = 45.0
 """Width of a sector [degrees]."""
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class SectorExit:
     """Exit of a junction in a sector.
@@ -33,6 +35,7 @@ class SectorExit:
     connectors: frozenset[int]
 
 
+@shared
 class JunctionExits:
     """Lookup of the exits behind each lane of a town; computed on first use.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TypeAlias, cast
+from typing import ClassVar, TypeAlias, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -18,6 +18,7 @@ from highway_env.utils import lmap
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Restorable
 from dorothie_gym.maps import load_town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.batch.egos import (
@@ -176,7 +177,7 @@ def _sync_only(setting: str, what: str) -> ValueError:
 # --- Vector environment -----------------------------------------------------------------------------------------------
 
 
-class TownVectorEnv(VectorEnv[NDArray[np.float32], ActionArray, NDArray[np.generic]]):
+class TownVectorEnv(Restorable, VectorEnv[NDArray[np.float32], ActionArray, NDArray[np.generic]]):
     """Vectorised `TownEnv`: each environment has a world of its own, and a step is one compiled call per thread.
 
     ## Description
@@ -206,6 +207,10 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], ActionArray, NDArray[np.gener
     """
 
     metadata: dict[str, object] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+
+    CHANGES: ClassVar[Sequence[str]] = (
+        "_egos", "_shown", "_generators", "_seeds", "_elapsed", "_over", "_begun"
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -257,6 +262,19 @@ class TownVectorEnv(VectorEnv[NDArray[np.float32], ActionArray, NDArray[np.gener
             np.zeros(shape, dtype=np.float32),
             empty_records(OutcomeRecord, self.num_envs),
         )
+
+    def changing(self) -> dict[str, object]:
+        """Returns what changes in the environments and in their worlds."""
+        return {**super().changing(), "arrays": self._worlds.arrays}
+
+    def go_on(self, values: dict[str, object]) -> None:
+        """Takes up what changes in the environments and in their worlds."""
+        self._worlds.arrays = cast(WorldArrays, values.pop("arrays"))
+        super().go_on(values)
+
+    def fits(self) -> dict[str, object]:
+        """Returns the kind of environment, their number and the settings."""
+        return {**super().fits(), "num_envs": self.num_envs, "the settings": self.config}
 
     # --- Gymnasium's interface ----------------------------------------------------------------------------------------
 

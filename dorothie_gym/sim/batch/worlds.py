@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numba import types
@@ -11,6 +12,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import WITHOUT_COUNTS, concurrent
+from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.threads import ThreadPool, take, turns_of
@@ -115,7 +117,7 @@ def step_share(
 # --- Batch of worlds --------------------------------------------------------------------------------------------------
 
 
-class VectorWorld:
+class VectorWorld(Lookups):
     """Worlds of one town in one set of arrays; every thread steps a share of them in one compiled call.
 
     A thread has a block of worlds of its own, which stay in its processor's cache; then it takes worlds that other
@@ -128,6 +130,8 @@ class VectorWorld:
         arrays: arrays of all worlds, those of a single one with a leading axis: `arrays.vehicles[b]`.
         threads: number of threads, the caller's included.
     """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_pool",)
 
     def __init__(self, town: TownArrays, world: WorldArrays, worlds: int, *, threads: int | None = None) -> None:
         """Makes copies of a world, each to be replaced by `put`.
@@ -148,7 +152,10 @@ class VectorWorld:
         self.town = town
         self.arrays = stacked(world, worlds)
         self.threads = min(threads or available_processors(), worlds)
-        self._pool = ThreadPool(self.threads - 1)
+
+    @cached_property
+    def _pool(self) -> ThreadPool:
+        return ThreadPool(self.threads - 1)
 
     def __len__(self) -> int:
         return len(self.arrays.clock)

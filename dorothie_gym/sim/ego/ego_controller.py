@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import SPEED_STEP, PhysicalAction
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
@@ -31,6 +32,7 @@ END_GAP = 0.8
 """Room between the nose of a waiting ego and the end of its lane [m]."""
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class GoalAhead:
     """Place where the ego is expected to stop: lane and distance along it [m]."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, PLANNED_BRAKING, SWITCH_TIME
@@ -47,6 +48,7 @@ class LaneStep:
     change: bool = False
 
 
+@shared
 class LaneChooser:
     """Choice of lanes for plans: side lanes, successors, ways to an exit."""
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.sim.state.records import PathPointRecord, RecordArray, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import PLANNED
@@ -132,6 +133,7 @@ def u_turn(source: Lane, target: Lane, start: float, radius: float = TURNING_RAD
     )
 
 
+@shared
 class Path:
     """Pieces joined to one line that the ego follows.
 

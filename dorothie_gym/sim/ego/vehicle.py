@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.sim.road import TownRoad
@@ -16,18 +19,20 @@ from dorothie_gym.sim.state.records import fields, plain
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
-class Car(Vehicle):
+class Car(Lookups, Vehicle):
     """The ego, vehicle number 0 of a world (`Kind.DRIVEN`), as of the last step of the world.
 
     Setting its position, heading or speed moves it.
     """
 
     MAX_SPEED = 40.0
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_state_of", "_own_state")
+
+    _state_of: WorldArrays | None = None
 
     def __init__(self, road: TownRoad, holder: ArrayHolder) -> None:
         """Shows the first vehicle of `holder.arrays`, which may be replaced by others with more room."""
         self._holder = holder
-        self._state_of: WorldArrays | None = None
         self._heading: float
         self._speed: float
         self._height: float

@@ -11,6 +11,7 @@ from highway_env.road.lane import AbstractLane, LineType
 from highway_env.utils import get_class_path
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import shared
 from dorothie_gym.maps import polyline
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.polyline import LaneTable
@@ -45,6 +46,7 @@ class LaneConfig(TypedDict):
     config: PolylineLaneConfig
 
 
+@shared
 class PolylineLane(AbstractLane):
     """A lane of a town for the vehicles, observations and viewer of highway-env.
 
@@ -99,9 +101,6 @@ class PolylineLane(AbstractLane):
         self._place = functools.partial(polyline.position, *shape)
         self._value = functools.partial(polyline.value_at, self._points, self._offsets, row)
         self._distance = functools.partial(polyline.distance, *shape)
-
-    def __deepcopy__(self, memo: dict[int, object]) -> PolylineLane:
-        return self
 
     def position(self, longitudinal: float, lateral: float = 0.0) -> Array:
         """Returns the world position (2,) [m] at a station and a distance to the right."""

@@ -12,6 +12,7 @@ import numpy as np
 from highway_env.road.lane import LineType
 from highway_env.road.road import RoadNetwork
 
+from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane, LinkType
 from dorothie_gym.maps.polyline import HEIGHT, LaneTable
 from dorothie_gym.maps.town import Town
@@ -109,6 +110,7 @@ LARGEST_COORDINATE = 1e9
 """Coordinate beyond which, as for NaN, highway-env's scan replaces the index, whose bounds rounding invalidates [m]."""
 
 
+@shared
 class TownNetwork(RoadNetwork):
     """The lanes of a town as highway-env's graph of roads, with an index for the closest one.
 
@@ -141,9 +143,6 @@ class TownNetwork(RoadNetwork):
         self._side_lanes = [self._find_side_lanes(lane.town_lane.id) for lane in ordered]
         heights = self.table.points[:, HEIGHT]
         self.height_range = float(heights.min()), float(heights.max())
-
-    def __deepcopy__(self, memo: dict[int, object]) -> TownNetwork:
-        return self
 
     def add_lane(self, _from: str, _to: str, lane: object) -> None:
         """Raises `TypeError`: lanes are part of the town, which is complete before its network is built."""

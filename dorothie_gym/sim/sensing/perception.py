@@ -6,11 +6,13 @@ All chance is a hash of the seed, the body and the time: it does not depend on t
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
@@ -293,12 +295,15 @@ def _normal(state: int) -> tuple[float, int]:
 # --- Perception of a world --------------------------------------------------------------------------------------------
 
 
-class Perception:
+class Perception(Lookups):
     """Perception with the errors of one seed."""
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_opened",)
+
+    _opened: tuple[RecordArray[EyeRecord], Visibility] | None = None
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._seed = int(rng.integers(1 << 63))
-        self._opened: tuple[RecordArray[EyeRecord], Visibility] | None = None
 
     def open(self, eyes: RecordArray[EyeRecord], visibility: Visibility) -> bool:
         """Writes the visibility and the seed into the record of a world.

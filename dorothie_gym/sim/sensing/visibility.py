@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dorothie_gym.compilation import allocating
+from dorothie_gym.copying import shared
 
 CLEAR_SIGHT = 80.0
 """Range of perception on a clear day [m]."""
@@ -130,6 +131,7 @@ def signal(gain: float, distance: float) -> float:
     return nearness * nearness * gain
 
 
+@shared
 @dataclass(frozen=True, kw_only=True)
 class Visibility:
     """Visibility between an observer and a body.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeAlias, TypeVa
 
 import numpy as np
 
+from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 
@@ -110,7 +111,7 @@ def _accessors(
     return read, write
 
 
-class BodyView(Generic[Record_co]):
+class BodyView(Lookups, Generic[Record_co]):
     """A row of the arrays. Its memory is looked up once and again whenever the holder has other arrays.
 
     Attributes:
@@ -119,6 +120,7 @@ class BodyView(Generic[Record_co]):
 
     RECORDS: ClassVar[str]
     DTYPE: ClassVar[np.dtype[np.void]]
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_arrays", "_cells", "_position")
 
     # set by `RoadObject.__init__`; the records have no field for them
     collidable = True
@@ -126,6 +128,10 @@ class BodyView(Generic[Record_co]):
     check_collisions = True
     hit = False
     impact: Array | None = None
+
+    _arrays: WorldArrays | None = None
+    _cells: tuple[Cells, ...]
+    _position: Array
 
     cos: Field[float]
     sin: Field[float]
@@ -137,9 +143,6 @@ class BodyView(Generic[Record_co]):
         self.road = road
         self._holder = holder
         self._row = row
-        self._arrays: WorldArrays | None = None
-        self._cells: tuple[Cells, ...] = ()
-        self._position = np.zeros(2)
 
     @property
     def row(self) -> int:
@@ -158,9 +161,6 @@ class BodyView(Generic[Record_co]):
             self._cells = cast("tuple[Cells, ...]", (row.cast("d"), row.cast("i"), row.cast("?")))
             self._arrays = arrays
         return self._cells
-
-    def __getstate__(self) -> dict[str, object]:
-        return {**self.__dict__, "_arrays": None, "_cells": (), "_position": None}  # a copy looks its memory up again
 
     @property
     def record(self) -> Record_co:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
 from dorothie_gym.maps.polyline import LaneTable
 from dorothie_gym.maps.right_of_way import RightOfWay, right_of_way
@@ -48,6 +49,7 @@ _CONTROLS = {
 }  # fmt: skip
 
 
+@shared
 class TownArrays(NamedTuple):
     """A town in arrays; lanes have the town's own ids.
 

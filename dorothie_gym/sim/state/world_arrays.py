@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ from dorothie_gym.sim.state.records import (
     SeenRecord,
     VehicleRecord,
     empty_records,
+    record_dtype,
 )
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
@@ -100,6 +102,16 @@ class WorldArrays(NamedTuple):
         """Returns a copy of the world."""
         return WorldArrays._make(_copy_of(array) for array in self.plain())
 
+    def __deepcopy__(self, memo: dict[int, object]) -> WorldArrays:
+        twin = self.copy()
+        memo.update((id(array), copied) for array, copied in zip(self, twin, strict=True))
+        return twin
+
+    def __reduce__(self) -> tuple[Callable[..., WorldArrays], tuple[list[tuple[int, ...]], bytes]]:
+        arrays = self.plain()
+        shapes = [array.shape for array in arrays]
+        return _from_bytes, (shapes, b"".join(array.tobytes() + bytes(-array.nbytes % ALIGNMENT) for array in arrays))
+
     def tobytes(self) -> bytes:
         """Returns the state byte by byte, to compare worlds."""
         return b"".join(array.tobytes() for array in self)
@@ -109,6 +121,30 @@ def _copy_of(array: NDArray[np.generic]) -> NDArray[np.generic]:
     """Returns a copy with all bytes, also those between the fields of records, which NumPy leaves out."""
     copied = np.frombuffer(bytearray(array.tobytes()), dtype=array.dtype).reshape(array.shape)
     return copied.view(np.recarray) if array.dtype.names else copied
+
+
+ALIGNMENT = 16
+"""Alignment of the arrays in the bytes of a pickled world [bytes]."""
+
+_DTYPES = [
+    *map(record_dtype, (VehicleRecord, PedestrianRecord, PropRecord, NodeRecord)), *map(np.dtype, "iid"),
+    record_dtype(LampRecord), *map(np.dtype, "iid"),
+    *map(record_dtype, (ClockRecord, EgoRecord, PathPointRecord, EyeRecord, SeenRecord)), *map(np.dtype, "dd"),
+    record_dtype(EventRecord),
+]  # fmt: skip
+"""Types of the arrays of a world, in order."""
+
+
+def _from_bytes(shapes: Sequence[tuple[int, ...]], data: bytes) -> WorldArrays:
+    """Returns a pickled world."""
+    block = np.frombuffer(bytearray(data), dtype=np.uint8)
+    arrays, start = [], 0
+    for shape, dtype in zip(shapes, _DTYPES, strict=True):
+        size = math.prod(shape) * dtype.itemsize
+        array = block[start : start + size].view(dtype).reshape(shape)
+        arrays.append(array.view(np.recarray) if dtype.names else array)
+        start += size + -size % ALIGNMENT
+    return WorldArrays._make(arrays)
 
 
 def empty_world(

@@ -1,0 +1,196 @@
+"""Copies of sessions: values that copies share, lookups that copies repeat, and states kept in memory.
+
+`copy.deepcopy` and `pickle` copy every environment exactly, because the classes inside follow two rules:
+
+- An instance that never changes (a town, a path, an utterance) is `shared` by all copies.
+- What was only looked up (a view on the arrays of a world) is dropped from a copy, which looks it up again (`Lookups`).
+
+A `State` holds what changes in one object. It is cheaper than a copy, and any number of sessions can go on from it.
+"""
+
+from __future__ import annotations
+
+import enum
+import io
+import pickle
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import FunctionType, NotImplementedType
+from typing import ClassVar, Final, Generic, TypeVar
+
+import numpy as np
+
+from dorothie_gym.errors import StateError, short_repr
+
+T = TypeVar("T")
+
+_SHARED: set[type] = set()
+"""Classes whose instances never change."""
+
+_CONSTANTS: Final = enum.Enum, type, FunctionType, np.dtype
+"""Kinds of values that are the same in a whole process."""
+
+
+def shared(kind: type[T]) -> type[T]:
+    """Marks a class whose instances never change: copies and states refer to the same instance."""
+    _SHARED.add(kind)
+    kind.__deepcopy__ = _itself  # type: ignore[attr-defined]  # the protocol of the module `copy`
+    return kind
+
+
+def _itself(value: T, memo: dict[int, object]) -> T:
+    return value
+
+
+class Lookups:
+    """Base class of objects that keep looked up values, such as views on arrays that another object owns.
+
+    A copied view would show other memory than the array that is copied beside it. So copies begin without.
+    """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ()
+    """Attributes that hold looked up values; without them, the next use looks the values up."""
+
+    def __getstate__(self) -> dict[str, object]:
+        values = self.__dict__.copy()
+        for name in self.LOOKED_UP:
+            values.pop(name, None)
+        return values
+
+
+class State:
+    """What changes in an environment, an engine or a world, at one moment: an opaque value that never changes.
+
+    It refers to the things that do not change, such as the town.
+
+    Attributes:
+        nbytes: memory of the values, without what is shared [bytes].
+    """
+
+    __slots__ = ("_fits", "_shared", "_values")
+
+    def __init__(self, owner: object, values: object, fits: Mapping[str, object]) -> None:
+        """Keeps values.
+
+        Args:
+            owner: object that the values belong to; references to it lead to the one that takes them up again.
+            values: what is kept.
+            fits: name and value of what has to be equal in the object that takes up the values.
+        """
+        self._fits = dict(fits)
+        self._values, self._shared = _pack(owner, values)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the values, without what is shared [bytes]."""
+        return len(self._values)
+
+    def values(self, owner: object, fits: Mapping[str, object]) -> object:
+        """Returns a new copy of the values for an object; `fits` as above.
+
+        Raises:
+            StateError: the state belongs to another town, or to other settings.
+        """
+        for name, wanted in fits.items():
+            found = self._fits.get(name)
+            if found is not wanted and found != wanted:
+                raise StateError(
+                    f"the state is one of {name} {short_repr(found)}, not {short_repr(wanted)}: "
+                    "restore it in an environment that was made with the same arguments"
+                )
+        return _Unpickler(self._values, [owner, *self._shared]).load()
+
+    def __repr__(self) -> str:
+        return f"<State of {self.nbytes} bytes>"
+
+
+@shared
+@dataclass(frozen=True)
+class Unchanged(Generic[T]):
+    """A value inside a state that is kept as it is, such as the state of a policy, which no policy modifies."""
+
+    value: T
+
+
+class Restorable:
+    """Base class of what can go back to a state of its own, or of another one made with the same arguments."""
+
+    CHANGES: ClassVar[Sequence[str]] = ()
+    """Attributes that hold what changes."""
+
+    def clone_state(self) -> State:
+        """Returns the present state, for `restore_state`: an opaque value that later steps do not change.
+
+        Generators' states are part of it; what the spaces draw for `sample()` and what was rendered are not.
+        """
+        return State(self, self.changing(), self.fits())
+
+    def restore_state(self, state: State) -> None:
+        """Goes back to a state, any number of times; the state stays as it is.
+
+        Args:
+            state: of this object, or of another one that was made with the same arguments.
+
+        Raises:
+            StateError: the state is of another town or other settings, or not a state.
+        """
+        if not isinstance(state, State):
+            raise StateError(f"state is {short_repr(state)}; it must be a value that clone_state() has returned")
+        values = state.values(self, self.fits())
+        assert isinstance(values, dict)  # made by `changing`
+        self.go_on(values)
+
+    def changing(self) -> dict[str, object]:
+        """Returns what changes, by name."""
+        return {name: getattr(self, name) for name in self.CHANGES}
+
+    def go_on(self, values: dict[str, object]) -> None:
+        """Takes up what `changing` has returned."""
+        self.__dict__.update(values)
+
+    def fits(self) -> dict[str, object]:
+        """Returns name and value of what has to be equal where a state is restored."""
+        return {"a": type(self).__name__}
+
+
+# --- Bytes in memory: made here, read here, never from a file ---------------------------------------------------------
+
+_OWNER: Final = 0
+
+
+def _pack(owner: object, values: object) -> tuple[bytes, list[object]]:
+    """Returns values as bytes, and the shared objects that they refer to by number."""
+    buffer = io.BytesIO()
+    pickler = _Pickler(buffer, owner)
+    pickler.dump(values)
+    return buffer.getvalue(), pickler.shared
+
+
+def _by_number(number: int) -> object:
+    raise StateError("a reference of a state was read outside of it")
+
+
+class _Pickler(pickle.Pickler):
+    def __init__(self, buffer: io.BytesIO, owner: object) -> None:
+        super().__init__(buffer, pickle.HIGHEST_PROTOCOL)
+        self._owner = owner
+        self.shared: list[object] = []
+
+    def reducer_override(self, value: object) -> tuple[Callable[[int], object], tuple[int]] | NotImplementedType:
+        if value is self._owner:
+            return _by_number, (_OWNER,)
+        if value is _by_number or not (type(value) in _SHARED or isinstance(value, _CONSTANTS)):
+            return NotImplemented  # type: ignore[no-any-return]  # typeshed has no type for it
+        self.shared.append(value)
+        return _by_number, (len(self.shared),)
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, values: bytes, objects: list[object]) -> None:
+        super().__init__(io.BytesIO(values))
+        self._objects = objects
+
+    def find_class(self, module: str, name: str) -> object:
+        if name == "_by_number" and module == __name__:
+            return self._objects.__getitem__
+        return super().find_class(module, name)
