@@ -332,7 +332,16 @@ actions = {agent: env.action_space(agent).sample(mask=infos[agent]["action_mask"
 observations, rewards, terminations, truncations, infos = env.step(actions)"""
 
 SESSION = ("duo_wizard.png", "A session from above, with errands and dialogue at the right")
-DRIVE = ("navigation.png", "A session from above; the planned path is blue")
+DRIVE = ("navigation.png", "What the Co-Wizard observes of a drive, with the instructions at the right")
+ROLE_PICTURES = {
+    Role.PARTICIPANT: (
+        "participant.png",
+        "What the participant observes: all places, its errands, the objects in sight",
+    ),
+    Role.CO_WIZARD: ("co_wizard.png", "What the Co-Wizard observes: the places on its map, the objects in sight"),
+    Role.AD_WIZARD: ("ad_wizard.png", "What the Ad-Wizard observes: all places, the errands, its obstacles"),
+}
+"""Pictures of the views of one role, in a session of the same seed."""
 
 ROLE_SUMMARIES = {
     Role.PARTICIPANT: "The agent is the participant: it knows the errands and the whole map and guides the Co-Wizard by"
@@ -372,7 +381,7 @@ def _pages() -> Iterator[EnvironmentPage]:
     )  # fmt: skip
     for role, env_id in ((Role.PARTICIPANT, "Participant"), (Role.CO_WIZARD, "CoWizard"), (Role.AD_WIZARD, "AdWizard")):
         yield EnvironmentPage(
-            name=str(role), id=f"{env_id}-v0", cls=dorothie_gym.SingleRole, picture=SESSION, guide=roles,
+            name=str(role), id=f"{env_id}-v0", cls=dorothie_gym.SingleRole, picture=ROLE_PICTURES[role], guide=roles,
             summary=ROLE_SUMMARIES[role], snippet=MASKED,
             observations=lambda role=role: field_tables(observation_fields(role, LIMITS)),
             actions=lambda role=role: field_tables(action_fields(role, LIMITS)),
@@ -523,6 +532,8 @@ def draw_pictures() -> None:
             actions[str(role)], states[role] = policy.step(observations[str(role)], states[role])
         observations, *_ = duo.step(actions)
     _save("duo_wizard.png", duo.render())
+    for name in ("Participant", "CoWizard", "AdWizard"):
+        _draw_role(f"dorothie_gym/{name}-v0")
     drive = gym.make("dorothie_gym/Navigation-v0", render_mode="rgb_array")
     drive.action_space.seed(0)
     _, info = drive.reset(seed=3)
@@ -535,6 +546,19 @@ def draw_pictures() -> None:
     for _ in range(5):
         town_env.step(1)
     _save("town.png", town_env.render())
+
+
+def _draw_role(env_id: str) -> None:
+    """Draws what a role observes after a minute of a session of scripted policies."""
+    env = gym.make(env_id, render_mode="rgb_array")
+    role, engine = env.get_wrapper_attr("role"), env.get_wrapper_attr("engine")
+    policy: Any = dorothie_gym.make_policy("scripted", role, engine.limits)
+    seen, _ = env.reset(seed=7)
+    state = policy.initial_state(7, engine.town)
+    for _ in range(120):
+        action, state = policy.step(seen, state)
+        seen, *_ = env.step(action)
+    _save(f"{role}.png", env.render())
 
 
 def _save(name: str, frame: Any) -> None:

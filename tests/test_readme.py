@@ -2,11 +2,13 @@
 
 import importlib
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from dorothie_gym import EnvConfig
+from dorothie_gym.maps import town_names
 
 README = Path(__file__).parents[1] / "README.md"
 SNIPPETS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
@@ -49,3 +51,32 @@ def test_files_named_in_the_contributing_guide_exist() -> None:
     examples = [path for path in paths if "harbour" in path]  # the town that the guide adds
     assert len(paths) > 10 and len(examples) == 1
     assert [path for path in paths if path not in examples and not (README.parent / path).exists()] == []
+
+
+def test_description_on_an_index_page_has_no_broken_links_and_pictures() -> None:
+    project = tomllib.loads((README.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    hook = project["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"]
+    assert [fragment["path"] for fragment in hook["fragments"]] == ["README.md"]
+    text = README.read_text(encoding="utf-8")
+    for rule in hook["substitutions"]:
+        text = re.sub(rule["pattern"], rule["replacement"], text)
+    assert "](https://aclanthology.org" in text
+    assert re.findall(r"\]\((?!https?:)[^)]*\)", text) == []
+
+
+def test_source_distribution_has_docs_benchmarks_and_examples() -> None:
+    project = tomllib.loads((README.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    included = project["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    assert {"/docs", "/benchmarks", "/examples", "/tests"} <= set(included)
+    assert project["project"]["urls"]
+
+
+def test_readme_names_shipped_towns_only() -> None:
+    text = README.read_text(encoding="utf-8")
+    named = re.findall(r"--town (\S+)", text)
+    assert named and set(named) <= set(town_names())
+
+
+def test_home_page_shows_what_the_package_is() -> None:
+    page = (README.parent / "docs" / "index.md").read_text(encoding="utf-8")
+    assert "![" in page and "gym.make(" in page and "dorothie-gym run" in page

@@ -278,6 +278,7 @@ CHART_DPI: Final = 150
 
 _ROW_HEIGHT, _MARGINS = 0.72, 1.95
 _FONT = "DejaVu Sans"
+_LONGEST_SUBJECT = 115  # characters in a line of 9 points
 
 
 def draw(report: Report, path: Path) -> None:
@@ -315,7 +316,8 @@ def _write_texts(figure: Figure, report: Report, height: float) -> None:
         figure.text(0.03, inches / height, text, va="baseline", fontsize=size, color=colour, weight=weight)
 
     write(height - 0.42, report.headline[0].upper() + report.headline[1:], 13.5, INK, "bold")
-    write(height - 0.72, f"{report.title} · {report.setting}", 9, SOFT)
+    subject = f"{report.title} · {report.setting}"
+    write(height - 0.72, subject, min(9.0, 9.0 * _LONGEST_SUBJECT / len(subject)), SOFT)
     for k, note in enumerate(reversed(report.notes)):
         write(0.36 + 0.2 * k, note, 8.5, INK)
     write(0.14, report.machine, 7, SOFT)
@@ -342,7 +344,7 @@ def _draw_rows(axes: Axes, report: Report) -> None:
     for k, row in enumerate(report.rows):
         axes.annotate(
             number(row.value), (row.value, k), xytext=(gap, 0), textcoords="offset points", va="center", fontsize=11,
-            weight="bold", color=colours[k], zorder=4,
+            weight="bold", color=colours[k], zorder=4, bbox={"facecolor": SHEET, "edgecolor": "none", "pad": 1.5},
         )  # fmt: skip
     if report.mark is not None:
         axes.axvline(report.mark.value, color=hexadecimal(LIGHT_RED), linewidth=1.4, linestyle=(0, (4, 3)), zorder=3)

@@ -165,7 +165,7 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
     drawing, waiting = film.seconds if film is not None else 0.0, pace.seconds if pace is not None else 0.0
     wall = time.perf_counter() - begun - drawing - waiting
     if plan.picture is not None:
-        _draw(engine, plan.picture)
+        draw_session(engine, plan.picture)
     return _facts(engine, ending, wall, plan.out)
 
 
@@ -204,7 +204,7 @@ def _exit_interrupted(engine: SessionEngine, plan: _Plan) -> None:
     raise typer.Exit(INTERRUPTED)
 
 
-def _draw(engine: SessionEngine, path: Path) -> None:
+def draw_session(engine: SessionEngine, path: Path) -> None:
     """Draws the whole town at the end of the session, with route and dialogue."""
     from dorothie_gym.engine.session_scene import scene_of
     from dorothie_gym.rendering.frames import PICTURE_SIZE, SceneRenderer

@@ -1,0 +1,177 @@
+"""Draws the pictures of the documentation again; a step of every release.
+
+python docs/pictures.py --corpus DIR       # all; DIR: dorothie-gym generate --sessions 183 --out DIR
+python docs/pictures.py session midtown    # some of them
+
+`navigation_curve.png` and `selfplay_curve.png` come from training runs, see `docs/pages.py curves` and
+docs/selfplay.md. Charts have a hash of what they show (`FINGERPRINT`), with which the tests find charts that are out of
+date without drawing them: the pixels of a chart depend on the version of matplotlib.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import hashlib
+import json
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import environment_pages
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+
+from dorothie_gym.bench.report import Report, draw, world_report
+from dorothie_gym.cli.run import draw_session
+from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.maps import fold_of, load_town
+from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.policies import make_policy
+from dorothie_gym.rendering import town_picture
+from dorothie_gym.rollout import play_session
+from dorothie_gym.rollout.closed_loop.leaderboard import CHART_METRICS, PART_TITLES, ChartRow, draw_rows
+
+DOCS = Path(__file__).parent
+BENCHMARK = DOCS.parent / "benchmarks" / "results" / "world.json"
+
+FINGERPRINT: Final = "dorothie_gym content"
+"""Key of the text in a PNG file with the hash of the content of a chart."""
+
+COLOURS: Final = 256
+"""Number of colours of the pictures, which keeps their files small."""
+
+SESSION_TOWN, SESSION_SEED = "brookside", 7
+"""Session on the first picture of README.md: that of `dorothie-gym run --seed 7`."""
+
+
+def draw_first_session(path: Path) -> None:
+    """Draws the picture that `dorothie-gym run --seed 7` draws."""
+    engine = SessionEngine(SESSION_TOWN)
+    policies = {role: make_policy("scripted", role, engine.limits) for role in AGENT_ROLES}
+    play_session(engine, policies, seed=SESSION_SEED)
+    draw_session(engine, path)
+    _reduce(path)
+
+
+def draw_midtown(path: Path) -> None:
+    """Draws the map that `dorothie-gym towns midtown --picture` draws, in a size for a page."""
+    town_picture(load_town("midtown"), path, size=(1400, 1372), fold=fold_of("midtown"))
+    _reduce(path)
+
+
+def draw_corpus(path: Path, corpus: Path) -> None:
+    """Draws moves and slots of a corpus."""
+    from dorothie_gym.analysis import corpus_stats_of
+    from dorothie_gym.analysis.profiles import draw_profiles
+    from dorothie_gym.recording import Corpus
+
+    census = corpus_stats_of(Corpus.load(corpus))
+    made = json.loads((corpus / "generation.json").read_text(encoding="utf-8"))
+    draw_profiles(census.profiles, census.counts.heading, f"{made['sessions']} generated sessions", path)
+
+
+def benchmark_report() -> Report:
+    """Returns the recorded measurement of `dorothie-gym bench world`."""
+    return world_report(json.loads(BENCHMARK.read_text(encoding="utf-8")))
+
+
+def draw_benchmark(path: Path) -> None:
+    """Draws the recorded measurement of `dorothie-gym bench world`."""
+    report = benchmark_report()
+    draw(report, path)
+    sign(path, dataclasses.asdict(report))
+
+
+def leaderboard_rows() -> list[ChartRow]:
+    """Returns the rows of the charts on the leaderboard, from the tables of its page."""
+    page = (DOCS / "leaderboard.md").read_text(encoding="utf-8")
+    rows = []
+    for part, title in PART_TITLES.items():
+        table = re.search(rf"## {title}\n\n(.*?)\n\n", page, flags=re.DOTALL)
+        if table is None:
+            continue
+        head, _, *lines = [[cell.strip() for cell in line.strip("|").split(" |")] for line in table[1].splitlines()]
+        for cells in lines:
+            found = dict(zip(head, cells, strict=True))
+            figures = {key: _figure(found[name]) for key, name in CHART_COLUMNS.items()}
+            rows.append(ChartRow(label=found["Co-Wizard"], part=part, figures=figures))
+    return rows
+
+
+CHART_COLUMNS: Final[Mapping[str, str]] = {
+    "success": "success",
+    "goal_condition_success": "goals",
+    "driving_score": "driving score",
+    "spl": "SPL",
+}
+"""Column of the page of each of `CHART_METRICS`."""
+
+
+def _figure(cell: str) -> dict[str, float | None]:
+    """Returns mean and interval of a cell such as "98.3 [91.1, 99.7] %"."""
+    numbers = [float(number) / 100.0 for number in re.findall(r"\d+\.\d+", cell)]
+    mean, low, high = (*numbers, None, None, None)[:3]
+    return {"mean": mean, "low": low, "high": high}
+
+
+def draw_leaderboard(path: Path) -> None:
+    """Draws the leaderboard from its page."""
+    rows = leaderboard_rows()
+    assert set(CHART_COLUMNS) == set(CHART_METRICS)
+    draw_rows(rows, path)
+    sign(path, [dataclasses.asdict(row) for row in rows])
+
+
+def fingerprint(content: object) -> str:
+    """Returns the hash of the content of a chart, in JSON types."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def sign(path: Path, content: object) -> None:
+    """Writes the fingerprint of its content into a PNG file."""
+    text = PngInfo()
+    text.add_text(FINGERPRINT, fingerprint(content))
+    with Image.open(path) as image:
+        image.load()
+        image.save(path, optimize=True, pnginfo=text)
+
+
+def _reduce(path: Path) -> None:
+    with Image.open(path) as image:
+        image.convert("RGB").quantize(COLOURS).save(path, optimize=True)
+
+
+PICTURES: Final[Mapping[str, Callable[[Path], None]]] = {
+    "session": draw_first_session,
+    "midtown": draw_midtown,
+    "bench_world": draw_benchmark,
+    "leaderboard": draw_leaderboard,
+}
+"""Functions that draw the pictures that need nothing but the repository, by name of the file."""
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Draws all pictures, or some."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    names = (*PICTURES, "corpus", "environments")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}; default: all")
+    parser.add_argument("--corpus", type=Path, help="corpus for corpus.png")
+    given: Any = parser.parse_args(arguments)
+    if unknown := set(given.names) - set(names):
+        parser.error(f"there is no picture {min(unknown)}; choose from {', '.join(names)}")
+    for name in given.names or names:
+        if name in PICTURES:
+            PICTURES[name](DOCS / f"{name}.png")
+        elif name == "environments":
+            environment_pages.draw_pictures()
+        elif given.corpus is None:
+            print("corpus: left out; give a corpus with --corpus DIR")
+        else:
+            draw_corpus(DOCS / "corpus.png", given.corpus)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,69 @@
+"""Committed pictures of the documentation show what the code draws today."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+DOCS = Path(__file__).parents[1] / "docs"
+DRAWN = ("session", "midtown")
+"""Pictures that are drawn again: the versions of pygame draw nearly the same pixels."""
+
+DIFFERENT = 0.01
+"""Largest share of clearly different pixels: another session differs in several per cent."""
+
+
+@pytest.fixture(scope="module")
+def pictures() -> Iterator[ModuleType]:
+    sys.path.insert(0, str(DOCS))
+    import pictures  # type: ignore[import-not-found]  # a script of docs
+
+    yield pictures
+    sys.path.remove(str(DOCS))
+
+
+def pixels(path: Path) -> Any:
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"), dtype=np.int16)
+
+
+def share_of_different_pixels(first: Path, second: Path) -> float:
+    one, other = pixels(first), pixels(second)
+    return 1.0 if one.shape != other.shape else float((np.abs(one - other).max(axis=2) > 60).mean())
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_picture_is_up_to_date(name: str, pictures: ModuleType, tmp_path: Path) -> None:
+    pictures.PICTURES[name](tmp_path / "now.png")
+    share = share_of_different_pixels(DOCS / f"{name}.png", tmp_path / "now.png")
+    assert share < DIFFERENT, f"docs/{name}.png is out of date: run python docs/pictures.py {name}"
+
+
+def test_another_session_is_noticed(pictures: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pictures, "SESSION_SEED", 8)
+    pictures.draw_first_session(tmp_path / "other.png")
+    assert share_of_different_pixels(DOCS / "session.png", tmp_path / "other.png") > 2 * DIFFERENT
+
+
+def test_charts_show_the_recorded_figures(pictures: ModuleType) -> None:
+    contents = {
+        "bench_world": dataclasses.asdict(pictures.benchmark_report()),
+        "leaderboard": [dataclasses.asdict(row) for row in pictures.leaderboard_rows()],
+    }
+    for name, content in contents.items():
+        with Image.open(DOCS / f"{name}.png") as image:
+            found = image.text.get(pictures.FINGERPRINT)  # type: ignore[attr-defined]  # of PNG files
+        assert found == pictures.fingerprint(content), f"docs/{name}.png: run python docs/pictures.py {name}"
+
+
+def test_every_picture_of_the_pages_is_drawn_by_a_command(pictures: ModuleType) -> None:
+    from_runs = {"navigation_curve", "selfplay_curve"}  # docs/pages.py curves, train-rl
+    assert {path.stem for path in DOCS.glob("*.png")} == {*pictures.PICTURES, "corpus", *from_runs}
