@@ -81,7 +81,7 @@ class TestRun:
     def test_picture_shows_the_whole_town(self) -> None:
         pygame = pytest.importorskip("pygame")
         loaded("run", "--max-seconds", 1, "--json", "--picture", "p.png")
-        assert pygame.image.load("p.png").get_size() == (1280, 800)
+        assert pygame.image.load("p.png").get_size() == (1640, 900)
 
     def test_session_is_recorded_into_the_given_folder(self) -> None:
         facts = loaded("run", "--seed", 3, "--max-seconds", 6, "--json", "--out", "deep/down")

@@ -165,4 +165,4 @@ def test_links_to_vocabularies_have_a_heading(name: str, generator: ModuleType) 
 
 def test_pictures_are_small() -> None:
     pictures = list(FOLDER.glob("*.png"))
-    assert len(pictures) == 3 and all(path.stat().st_size < 150_000 for path in pictures)
+    assert len(pictures) == 6 and all(path.stat().st_size < 150_000 for path in pictures)

@@ -37,9 +37,9 @@ from dorothie_gym.tasks import map_label, map_labels
 
 _KINDS: dict[ObjectClass, FigureKind] = {ObjectClass.VEHICLES: "vehicle", ObjectClass.PEDESTRIAN: "pedestrian"}
 _TITLES = {
-    Role.PARTICIPANT: "View of the participant",
-    Role.CO_WIZARD: "View of the Co-Wizard",
-    Role.AD_WIZARD: "View of the Ad-Wizard",
+    Role.PARTICIPANT: "Participant's view",
+    Role.CO_WIZARD: "Co-Wizard's view",
+    Role.AD_WIZARD: "Ad-Wizard's view",
 }
 _PROP_SIZE = 1.2
 """Length and width of an observed prop [m]; the observation has neither."""
@@ -206,7 +206,7 @@ def _caption(role: Role, seen: ObservationMapping) -> str:
     parts = [_TITLES[role]]
     if seen.get("manoeuvre", 0):
         action, angle = PhysicalAction(int(seen["manoeuvre"])), float(seen["manoeuvre_angle"][0])
-        parts.append(f"prepares {action.label}" + (f" {angle:+.0f}°" if angle else ""))
+        parts.append(action.label + (f" {angle:+.0f}°" if angle else ""))
     return " · ".join(parts)
 
 
