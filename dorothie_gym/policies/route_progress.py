@@ -358,6 +358,10 @@ class RouteProgress:
         return False
 
 
+MOST_AVOIDED = 3
+"""Largest number of places that are excluded after misses; more would close a road of several lanes altogether."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class RouteState:
     """Route of an agent, and what it knows about places that the planner must not use.
@@ -365,7 +369,7 @@ class RouteState:
     Attributes:
         progress: route to the goal and the progress on it; None without a place to go to.
         blocked: places behind roadblocks.
-        avoided: places excluded because the car missed the goal after passing them.
+        avoided: places excluded because the car missed the goal after passing them, the latest last.
         misses: number of times that the car has driven past the goal.
     """
 
@@ -404,8 +408,8 @@ class RouteState:
         return counted.avoiding(town, start, way_in) if counted.misses > 1 and way_in is not None else counted
 
     def avoiding(self, town: Town, start: Place, place: Place) -> RouteState:
-        """Excludes a place and plans another route."""
-        return replace(self, avoided=(*self.avoided, place)).replanned(town, start)
+        """Excludes a place, besides the `MOST_AVOIDED` - 1 latest ones, and plans another route."""
+        return replace(self, avoided=(*self.avoided, place)[-MOST_AVOIDED:]).replanned(town, start)
 
     def knows_roadblock(self, place: Place) -> bool:
         """Returns whether a roadblock at a place is one of those known."""

@@ -109,7 +109,13 @@ class CoWizardView:
 
     @property
     def manoeuvring(self) -> bool:
-        """Returns whether the car is switching lanes or turning round."""
+        """Returns whether the car is switching lanes or turning round.
+
+        A car that waits at the end of its path is not: with little room, the manoeuvre ends only beyond that place, and
+        the car would wait for ever.
+        """
+        if self.motion is Motion.WAITING:
+            return False
         return self.manoeuvre in (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN)
 
 
