@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import json
 import time
 from pathlib import Path
 
 import pytest
 from click.testing import Result
+from rich.console import Console
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
 from dorothie_gym.cli.film import Film
-from dorothie_gym.cli.live import script_lines
+from dorothie_gym.cli.live import LiveShow, script_lines
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_scene import scene_of
 from dorothie_gym.ontology import AGENT_ROLES, Role
@@ -45,6 +47,19 @@ def test_drawing_a_video_is_not_reported_as_simulation(monkeypatch: pytest.Monke
     done = call("run", "--max-seconds", 10, "--video", "v.mp4", "--json")
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["wall_seconds"] < 2.0
+
+
+def test_progress_of_the_video_is_shown_on_a_terminal() -> None:
+    class Drawn:
+        frames, seconds = 312, 61.0
+
+    console = Console(file=io.StringIO(), force_terminal=True, width=80)
+    engine = SessionEngine("brookside", max_cycles=1)
+    engine.reset(seed=3)
+    show = LiveShow(console, Drawn())  # type: ignore[arg-type]  # the two counts of a film
+    with show:
+        show(engine)
+    assert "video: 312 frames drawn in 1:01" in console.file.getvalue()  # type: ignore[attr-defined]  # a StringIO
 
 
 def test_terminal_picture_and_playback_have_one_clock(tmp_path: Path) -> None:
