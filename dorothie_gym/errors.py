@@ -5,6 +5,7 @@ for an environment that does not allow the work), so that `except ValueError` ke
 
 ```
 DorothieGymError
+├── InputFileError       a file is no regular file, too large, malformed, or has a field of another type
 ├── OntologyError        a text, number or combination that the closed vocabularies do not contain
 ├── TownError            a map cannot be read or used
 ├── TownArchiveError     a cached town is damaged or of another format
@@ -37,8 +38,30 @@ MAX_SHOWN: Final = 120
 """Characters of a value that a message shows."""
 
 
+MAX_MESSAGE: Final = 1000
+"""Characters of a message that quotes names of a file."""
+
+
 class DorothieGymError(Exception):
     """Root of all exceptions that dorothie_gym raises on purpose."""
+
+
+class InputFileError(DorothieGymError, ValueError):
+    """A file that a user provides cannot be read as data.
+
+    Attributes:
+        where: the file, or the file and line.
+        reason: what is wrong, and what to do about it.
+        place: line and column, or the field, where it is known; else empty.
+    """
+
+    def __init__(self, where: object, reason: str, place: str = "") -> None:
+        # The arguments go to `args` as they are, so that the error can be pickled and sent to other processes.
+        super().__init__(str(where), reason, place)
+        self.where, self.reason, self.place = str(where), reason, place
+
+    def __str__(self) -> str:
+        return f"{self.where}{', ' if self.place else ''}{self.place}: {self.reason}"
 
 
 class OntologyError(DorothieGymError, ValueError):
@@ -60,7 +83,7 @@ class TownError(DorothieGymError, ValueError):
         self.source, self.element, self.reason = source, element, reason
 
     def __str__(self) -> str:
-        return f"{self.source}: {self.element}: {self.reason}"
+        return one_line(f"{self.source}: {self.element}: {self.reason}", MAX_MESSAGE)
 
 
 class TownArchiveError(DorothieGymError, ValueError):
@@ -77,7 +100,7 @@ class StoryboardError(DorothieGymError, ValueError):
     """
 
     def __init__(self, template: str, field: str, reason: str) -> None:
-        super().__init__(f"storyboard {template}: {field}: {reason}")
+        super().__init__(one_line(f"storyboard {template}: {field}: {reason}", MAX_MESSAGE))
         self.template, self.field, self.reason = template, field, reason
 
 
@@ -135,6 +158,12 @@ class ProcessError(DorothieGymError, RuntimeError):
 
 class BenchmarkProcessError(ProcessError):
     """A measuring process ended before it reported a result."""
+
+
+def one_line(text: object, limit: int = 300) -> str:
+    """Returns a text, such as the message of another library, on one line of at most `limit` characters."""
+    words = " ".join(str(text)[: 10 * limit].split())
+    return words if len(words) <= limit else f"{words[:limit]}..."
 
 
 class _ShortRepr(Repr):

@@ -45,9 +45,18 @@ def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
         raise
 
 
-def write_atomically(path: Path, content: str | bytes, *, shared: bool = False) -> None:
-    """Writes a file whole or not at all; a text in UTF-8. Arguments and errors as of `replacing`."""
+def write_atomically(path: Path, content: str | bytes, *, shared: bool = False, mode: int | None = None) -> None:
+    """Writes a file whole or not at all; a text in UTF-8. Errors as of `replacing`.
+
+    Args:
+        path: the file.
+        content: text or bytes.
+        shared: see `replacing`.
+        mode: permissions of the file from its creation on; those of the process if None.
+    """
     with replacing(path, shared=shared) as part:
+        if mode is not None:
+            part.touch(mode=mode, exist_ok=False)
         part.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
 
 

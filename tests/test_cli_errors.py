@@ -123,7 +123,7 @@ def test_unwritable_files_are_reported(arguments: list[str], words: str) -> None
         (["--sessions", "."], "holds no session"),
         (["--split", "dev"], "'dev'"),
         (["none.parquet"], "none.parquet: No such file or directory"),
-        (["text.parquet", "--corpus", "."], "text.parquet: is no parquet file"),
+        (["text.parquet", "--corpus", "."], "text.parquet: not a readable Parquet file"),
         (["text.parquet", "--save", "x.parquet"], "add --model majority or --model random"),
         (["--save", "none/x.parquet"], "the folder none does not exist"),
     ],

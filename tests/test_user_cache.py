@@ -5,7 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.user_cache import CACHE_VARIABLE, cache_folder
+from dorothie_gym.maps import Town, load_town
+from dorothie_gym.maps.cache import pack, through_cache, unpack
+from dorothie_gym.user_cache import CACHE_VARIABLE, SIGNATURE_LENGTH, cache_folder
+from tests.maps.yaml_text import MIDTOWN, written
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="folders of the Linux desktop standard")
@@ -32,3 +35,50 @@ def test_the_cache_folder_follows_the_variable_and_the_desktop_standard(
 def test_an_empty_variable_turns_the_cache_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(CACHE_VARIABLE, "")
     assert cache_folder() is None
+
+
+def test_cache_is_created_for_its_user_alone(cache: Path) -> None:
+    load_town(own_town(cache.parent))
+    assert all(path.stat().st_mode & 0o777 == 0o700 for path in (cache, cache / "towns"))
+    assert all(path.stat().st_mode & 0o077 == 0 for path in cache.rglob("*"))
+
+
+def test_altered_town_is_compiled_again_though_its_checksum_is_right(cache: Path) -> None:
+    path = own_town(cache.parent)
+    sound = load_town(path)
+    (entry,) = (cache / "towns").glob("*.npz")
+    data = entry.read_bytes()[:-SIGNATURE_LENGTH]
+    altered = pack(replaced_name(unpack(data, entry.stem)), entry.stem)
+    for content in (altered, altered + data[-SIGNATURE_LENGTH:], altered + b"0" * SIGNATURE_LENGTH):
+        entry.write_bytes(content)
+        assert through_cache(path, lambda _: sound) is sound
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has other permissions")
+def test_cache_that_others_can_write_is_not_used(cache: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = own_town(cache.parent)
+    load_town(path)
+    (cache / "towns").chmod(0o777)
+    (entry,) = (cache / "towns").glob("*.npz")
+    for shared in (cache / "towns", entry, cache):
+        shared.chmod(0o777)
+        compiled = load_town("brookside")
+        assert through_cache(path, lambda _, town=compiled: town) is compiled
+        assert f"{shared} can be written by other users" in caplog.text
+        shared.chmod(0o700)
+
+
+def own_town(folder: Path) -> Path:
+    path = folder / "own.yaml"
+    return written(folder, MIDTOWN).rename(path)
+
+
+def replaced_name(town: Town) -> Town:
+    town.name = "altered"
+    return town
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    return tmp_path / "cache"

@@ -21,9 +21,10 @@ from __future__ import annotations
 import bisect
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache, partial
 from types import MappingProxyType
 from typing import Final
 
@@ -155,8 +156,9 @@ def handled_by(units: Units) -> dict[int, Event]:
         fresh = range(
             bisect.bisect_left(times, exchange.start - HANDLING_WINDOW), bisect.bisect_right(times, exchange.start)
         )
+        mentioned = cache(partial(_mentions, exchange))  # each kind once, however many exceptions there are
         latest = (happened[k] for k in sorted({*fresh, *met}, reverse=True))
-        cause = next((each for each in latest if each.is_handled_in(exchange)), None)
+        cause = next((each for each in latest if each.is_handled_in(exchange, mentioned)), None)
         if (
             cause is None
             and last is not None
@@ -202,6 +204,12 @@ def handling_of_events(units: Units) -> dict[int, Handled]:
     return found
 
 
+def _mentions(exchange: SaidUnit, kind: ExceptionKind) -> bool:
+    """Returns whether an act of an exchange contains a word for a kind of exceptions."""
+    words = _WORDS.get(kind)
+    return words is not None and any(words.search(move.span.casefold().replace("’", "'")) for move in exchange.moves)
+
+
 @dataclass(frozen=True)
 class _Happened:
     """Exception with its kind, and the time at which the car came near its object on the road [s]."""
@@ -210,23 +218,22 @@ class _Happened:
     kind: ExceptionKind
     met: float
 
-    def is_handled_in(self, exchange: SaidUnit) -> bool:
+    def is_handled_in(self, exchange: SaidUnit, mentioned: Callable[[ExceptionKind], bool]) -> bool:
         """Returns whether an exchange is within the window and one of its acts refers to the exception."""
         is_near = 0.0 <= exchange.start - self.met <= HANDLING_WINDOW
         since = exchange.start - self.event.time
         if not is_near and not 0.0 <= since <= HANDLING_WINDOW:
             return False
-        values = {value for move in exchange.moves for value in move.act.slots}
+        values = exchange.values
         if self.kind.is_task:
             return bool(_PUT_OFF & values) or self._place() in values
         if values & _REFERENCES.get(self.kind, frozenset()) or self._is_met_by(values, exchange.start):
             return True
-        words = _WORDS.get(self.kind)
-        if words is not None and any(words.search(move.span.casefold().replace("’", "'")) for move in exchange.moves):
+        if mentioned(self.kind):
             return True
         return self.kind is ExceptionKind.SENSOR_FAULT and since <= MAX_FAULT_DURATION and _asks_what_to_do(exchange)
 
-    def _is_met_by(self, values: set[SlotValue], time: float) -> bool:
+    def _is_met_by(self, values: frozenset[SlotValue], time: float) -> bool:
         """Returns whether an action named at a time [s] responds to the exception, within `PROMPT_WINDOW` after it."""
         if self.kind is ExceptionKind.WEATHER:
             return time - self.event.time <= PROMPT_WINDOW and bool(values & _CAUTION)

@@ -13,7 +13,7 @@ from dorothie_gym.dialogue.conversation import Span, Utterance
 from dorothie_gym.dialogue.exchanges import EXPECTATIONS, Exchange
 from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology import GoalStatus, LandmarkName, Role, parse_goal_status, parse_landmark
+from dorothie_gym.ontology import GoalStatus, LandmarkName, Role, SlotValue, parse_goal_status, parse_landmark
 from dorothie_gym.recording.events import Event, EventType, MoveRecord, UtteranceRecord
 from dorothie_gym.recording.header import NATIVE
 from dorothie_gym.recording.session import Session
@@ -29,15 +29,20 @@ class SaidUnit:
     id: int
     moves: tuple[MoveRecord, ...]
 
-    @property
+    @cached_property
     def start(self) -> float:
         """Start of its first utterance [s]."""
         return min(move.start for move in self.moves)
 
-    @property
+    @cached_property
     def end(self) -> float:
         """End of its last utterance [s]."""
         return max(move.end for move in self.moves)
+
+    @cached_property
+    def values(self) -> frozenset[SlotValue]:
+        """Slot values that its acts name."""
+        return frozenset(value for move in self.moves for value in move.act.slots)
 
 
 class Units:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,8 +15,9 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor, nn
 
-from dorothie_gym.errors import CheckpointError
+from dorothie_gym.errors import CheckpointError, InputFileError, ModelFileError, one_line, short_repr
 from dorothie_gym.files import replacing, write_atomically
+from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, parse_json, read_json
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 
 _MODEL: Final = "model."
@@ -53,9 +55,10 @@ def about(path: Path) -> dict[str, Any]:
         CheckpointError: the file is not a checkpoint of this package, or is damaged.
     """
     try:
+        check_file(path, MAX_WEIGHTS)
         with safe_open(path, framework="pt") as file:
-            written = json.loads((file.metadata() or {})[_ABOUT])
-    except (SafetensorError, KeyError, ValueError) as error:
+            written = parse_json((file.metadata() or {})[_ABOUT], path)
+    except (SafetensorError, KeyError, InputFileError) as error:
         raise CheckpointError(
             f"{path}: is not a checkpoint of this package, or is damaged ({error}); delete it"
         ) from None
@@ -71,10 +74,13 @@ def restore(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer | Non
         CheckpointError: the file is damaged, or of a model of other sizes.
     """
     try:
+        check_file(path, MAX_WEIGHTS)
         with safe_open(path, framework="pt") as file:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # a handle, not a dict
-    except SafetensorError as error:
-        raise CheckpointError(f"{path}: is damaged ({error}); delete it") from None
+    except (SafetensorError, InputFileError) as error:
+        raise CheckpointError(f"{path}: is damaged ({one_line(error)}); delete it") from None
+    if any(value.is_floating_point() and not bool(value.isfinite().all()) for value in tensors.values()):
+        raise CheckpointError(f"{path}: has a weight that is no finite number; delete it")
     weights = {name.removeprefix(_MODEL): value for name, value in tensors.items() if name.startswith(_MODEL)}
     try:
         model.load_state_dict(weights)
@@ -82,16 +88,19 @@ def restore(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer | Non
         message = f"{path}: was written by a model of other sizes ({' '.join(str(error).split())[:200]}); delete it"
         raise CheckpointError(message) from None
     if optimiser is not None:
-        _restore_optimiser(optimiser, tensors)
+        _restore_optimiser(optimiser, tensors, path)
 
 
-def _restore_optimiser(optimiser: torch.optim.Optimizer, tensors: Mapping[str, Tensor]) -> None:
+def _restore_optimiser(optimiser: torch.optim.Optimizer, tensors: Mapping[str, Tensor], path: Path) -> None:
     states: dict[int, dict[str, Tensor]] = {}
-    for name, value in tensors.items():
-        if name.startswith(_OPTIMISER):
-            row, field = name.removeprefix(_OPTIMISER).split(".")
-            states.setdefault(int(row), {})[field] = value
-    optimiser.load_state_dict({"state": states, "param_groups": optimiser.state_dict()["param_groups"]})
+    try:
+        for name, value in tensors.items():
+            if name.startswith(_OPTIMISER):
+                row, field = name.removeprefix(_OPTIMISER).split(".")
+                states.setdefault(int(row), {})[field] = value
+        optimiser.load_state_dict({"state": states, "param_groups": optimiser.state_dict()["param_groups"]})
+    except (ValueError, KeyError, RuntimeError) as error:
+        raise CheckpointError(f"{path}: its optimiser is damaged ({one_line(error)}); delete it") from None
 
 
 # --- Model card of a trained benchmark model, in `model.json` beside its weights -------------------------------------
@@ -130,6 +139,15 @@ class ModelCard:
     steps: int
     seconds: float
 
+    def __post_init__(self) -> None:
+        """Checks what the types do not."""
+        if Path(self.weights).name != self.weights:
+            raise ValueError(f"weights is {short_repr(self.weights)}; it must be the name of a file in the folder")
+        if self.spread is not None and not 0.0 < self.spread < math.inf:
+            raise ValueError(f"spread is {self.spread}; it must be positive")
+        if self.steps < 0 or not 0.0 <= self.seconds < math.inf:
+            raise ValueError(f"steps and seconds are {self.steps} and {self.seconds}; they must be at least 0")
+
     def write(self, folder: Path) -> None:
         """Writes the card into the folder of the weights, atomically."""
         page = {"kind": KIND, **asdict(self)}
@@ -143,16 +161,18 @@ class ModelCard:
             path: the file, or its folder.
 
         Raises:
-            ValueError: the file cannot be read, or is of another version; the message names it.
+            ModelFileError: the file cannot be read, or is of another version; the message names it.
         """
         file = path / DESCRIPTION if path.is_dir() else path
         try:
-            page = json.loads(file.read_text(encoding="utf-8"))
-            merges = page.pop("merges")
-            page.pop("kind")
-            return cls(**page, merges=None if merges is None else tuple((one, other) for one, other in merges))
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise ValueError(f"{file}: describes no model of this version ({error}); train it again") from None
+            page = read_json(file, MAX_MODEL_JSON)
+            fields = {name: value for name, value in page.items() if name != "kind"} if isinstance(page, dict) else page
+            card = checked(fields, cls, file)
+        except (OSError, InputFileError) as error:
+            raise ModelFileError(
+                f"{file}: describes no model of this version ({one_line(error)}); train it again"
+            ) from None
+        return card
 
 
 def sha256_of(path: Path) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias, TypedDict
 
 import numpy as np
 import torch
@@ -36,6 +36,7 @@ from dorothie_gym.benchmark import (
 from dorothie_gym.benchmark.features import Columns, PointTable
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.files import write_atomically
+from dorothie_gym.input_files import MAX_MODEL_JSON, checked, raising, read_json
 from dorothie_gym.recording import Corpus, Task
 from dorothie_gym.rollout.processes import run_tasks
 
@@ -101,8 +102,10 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
     wall, cpu = time.perf_counter() - started[0], time.process_time() - started[1]
     kept = job.folder / RESULT_FILE
     if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
-        done = dict(json.loads(kept.read_text(encoding="utf-8")))
-        _describe(job, model, material, steps=done["points"] * done["epochs"], seconds=done["seconds"])
+        done = _read_result(kept)
+        with raising(lambda message: CheckpointError(f"{message}; delete it")):
+            facts = checked(done, _TrainingPage, kept)
+        _describe(job, model, material, steps=facts["points"] * facts["epochs"], seconds=facts["seconds"])
         return done
     predicted = predict(model, material.examples(TEST, spec))
     rows = task_predictions(job, material.columns, material.tables(TEST), predicted)
@@ -113,6 +116,20 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
     steps = trained.points * len(trained.epochs)
     _describe(job, model, material, steps=steps, seconds=round(wall, 3))
     return result
+
+
+class _TrainingPage(TypedDict):
+    """Figures of a training in `RESULT_FILE`."""
+
+    points: int
+    epochs: int
+    seconds: float
+
+
+def _read_result(path: Path) -> dict[str, Any]:
+    """Returns the result of an earlier run; raises `CheckpointError` if it is damaged."""
+    with raising(lambda message: CheckpointError(f"{message}; delete it")):
+        return checked(read_json(path, MAX_MODEL_JSON), dict[str, Any], path)
 
 
 def _describe(job: Experiment, model: TOTO, material: Dataset, *, steps: int, seconds: float) -> None:
@@ -140,7 +157,7 @@ def _run_policy(job: Experiment, about: dict[str, object]) -> dict[str, object]:
 
     kept = job.folder / RESULT_FILE
     if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
-        done = dict(json.loads(kept.read_text(encoding="utf-8")))
+        done = _read_result(kept)
         if done.get("corpus") != about["corpus"]:
             message = f"{kept}: was trained on another corpus; choose another folder or delete it"
             raise CheckpointError(message)
@@ -315,7 +332,7 @@ def gather_table(
         predicted += [part for name in FLOORS for seed in seeds for part in predict_floor(name, training, labels, seed)]
     about: dict[str, dict[str, object]] = {}
     for job in jobs:
-        facts = json.loads((job.folder / RESULT_FILE).read_text(encoding="utf-8"))
+        facts = _read_result(job.folder / RESULT_FILE)
         about.setdefault(job.row.name, {})[str(job.seed)] = facts
     chosen = {job.model for job in jobs}
     whole = chosen >= {row.command for row in ROWS if not row.missing}

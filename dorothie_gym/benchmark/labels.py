@@ -295,8 +295,8 @@ def _divide(corpus: Corpus, split: Split) -> tuple[dict[str, str], str]:
         division = HALVES
     if not chosen:
         known = ", ".join([*there, ALL])
-        hint = " (two sessions at least are divided)" if not there else ""
-        raise SessionError(f"{corpus.root}: has no session for the split {split!r}; choose from {known}{hint}")
+        hint = "" if there else "; two sessions or more are divided into train and test"
+        raise SessionError(f"{corpus.root}: has no session of the split {split!r}, only of {known}{hint}")
     return chosen, division
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,12 +21,16 @@ from dorothie_gym.benchmark.predictions import (
     joined_actions,
     joined_acts,
 )
-from dorothie_gym.errors import PredictionError
+from dorothie_gym.errors import PredictionError, one_line, short_repr
+from dorothie_gym.input_files import MIB, ParquetLimits, parse_json, raising, read_parquet
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
 from dorothie_gym.recording import Task
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+LIMITS: Final = ParquetLimits(file=256 * MIB, rows=500_000, values=69 * 500_000, content=256 * MIB)
+"""Limits of a file; the 183 sessions of SDN have 20,000 points, each a row per model and seed."""
 
 SHOWN: Final = 5
 """Number of invalid rows that a message names; the others are counted."""
@@ -56,7 +59,8 @@ class _Rows:
     def name(self, row: int) -> str:
         """Returns the name of a row in messages."""
         values = self.columns
-        return f"row {row} (session {values['session'][row]}, event {values['event'][row]}, {values['task'][row]})"
+        session, task = (one_line(values[name][row], 60) for name in ("session", "task"))
+        return f"row {row} (session {session}, event {values['event'][row]}, {task})"
 
 
 def read_predictions(*paths: Path | str) -> tuple[TaskPredictions, ...]:
@@ -87,26 +91,19 @@ def read_about(path: Path | str) -> dict[str, object]:
         OSError: it cannot be read.
     """
     about = (_open(Path(path)).schema.metadata or {}).get(ABOUT)
-    try:
-        value = {} if about is None else json.loads(about)
-    except ValueError as error:
-        raise PredictionError(
-            f"{path}: {ABOUT.decode()} in its metadata is not valid JSON ({error}); {_PAGE}"
-        ) from None
-    return value if isinstance(value, dict) else {"about": value}
+    if about is None:
+        return {}
+    with raising(lambda message: PredictionError(f"{message}; {_PAGE}")):
+        try:
+            value = parse_json(about.decode("utf-8"), f"{path}: {ABOUT.decode()} in its metadata")
+        except UnicodeDecodeError as error:
+            raise PredictionError(f"{path}: {ABOUT.decode()} in its metadata is not UTF-8; {_PAGE}") from error
+    return dict(value) if isinstance(value, Mapping) else {"about": value}
 
 
 def _open(path: Path) -> pa.Table:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    content = path.read_bytes()
-    try:
-        table = pq.ParquetFile(pa.BufferReader(content)).read()
-        table.validate(full=True)
-    except (pa.ArrowException, OSError) as error:  # damaged pages raise OSError
-        raise PredictionError(f"{path}: is no parquet file, or damaged ({error}); {_PAGE}") from None
-    return table
+    with raising(lambda message: PredictionError(f"{message}; {_PAGE}")):
+        return read_parquet(path, LIMITS, (*_REQUIRED, *_ANSWERS, "slots"))
 
 
 def _read_file(path: Path) -> Iterator[TaskPredictions]:
@@ -133,15 +130,22 @@ def _check_columns(table: pa.Table, source: str) -> None:
             raise PredictionError(f"{source}: column {name!r} is missing{hint}; {_PAGE}")
     for name, wanted in {**_REQUIRED, **_ANSWERS}.items():
         if name in table.column_names and not _is_type(table.schema.field(name).type, wanted):
-            there = table.schema.field(name).type
+            there = _shown(table.schema.field(name).type)
             raise PredictionError(
                 f"{source}: column {name!r} holds {there}, but {_WANTED[wanted]} are expected; {_PAGE}"
             )
     if "slots" in table.column_names and not _is_slots(table.schema.field("slots").type):
         raise PredictionError(
-            f"{source}: column 'slots' holds {table.schema.field('slots').type}, but lists of texts like "
+            f"{source}: column 'slots' holds {_shown(table.schema.field('slots').type)}, but lists of texts like "
             f"{SLOT_TEXTS[0]!r} or lists of {len(LABELS)} booleans are expected; {_PAGE}"
         )
+
+
+def _shown(kind: pa.DataType) -> str:
+    """Returns the name of a type in a message, without the dictionary in which texts are read."""
+    from pyarrow import types
+
+    return one_line(kind.value_type if types.is_dictionary(kind) else kind, 100)
 
 
 def _is_type(kind: pa.DataType, wanted: str) -> bool:
@@ -179,7 +183,7 @@ def _check_required(rows: _Rows) -> None:
         elif not 0 <= rows.columns["event"][row] <= _LAST_EVENT:
             wrong.append(f"{rows.name(row)}: events are counted from 0 within their session")
         elif (task := rows.columns["task"][row]) not in tasks:
-            wrong.append(f"{rows.name(row)}: task is {task!r}; it must be one of {', '.join(sorted(tasks))}")
+            wrong.append(f"{rows.name(row)}: task is {short_repr(task)}; it must be one of {', '.join(sorted(tasks))}")
     _refuse(rows.source, wrong)
 
 
@@ -206,9 +210,8 @@ def _check_twice(rows: _Rows, members: Sequence[int]) -> None:
     for row in members:
         key = (rows.columns["session"][row], rows.columns["event"][row])
         if key in first:
-            model, seed = rows.columns["model"][row], rows.columns["seed"][row]
-            wrong.append(f"{rows.name(row)}: row {first[key]} is of the same point, model {model} and seed {seed}; "
-                         "leave one of them out")  # fmt: skip
+            run = f"model {one_line(rows.columns['model'][row], 60)} and seed {rows.columns['seed'][row]}"
+            wrong.append(f"{rows.name(row)}: row {first[key]} is of the same point, {run}; leave one of them out")
         first.setdefault(key, row)
     _refuse(rows.source, wrong)
 
@@ -220,7 +223,7 @@ def _acts(rows: _Rows, members: Sequence[int]) -> ActPredictions:
     for k, row in enumerate(members):
         move, given = rows.columns["move"][row], rows.columns["slots"][row]
         if move not in _MOVES:
-            wrong.append(f"{rows.name(row)}: move is {move!r}; it must be one of {', '.join(_MOVES)}")
+            wrong.append(f"{rows.name(row)}: move is {short_repr(move)}; it must be one of {', '.join(_MOVES)}")
         elif fault := _fault_in_slots(given):
             wrong.append(f"{rows.name(row)}: {fault}")
         else:
@@ -240,7 +243,7 @@ def _fault_in_slots(given: Sequence[Any] | None) -> str | None:
     unknown = next((value for value in given if value not in _PLACES), None)
     if unknown is None and None not in given:
         return None
-    return f"slots names {unknown!r}; it must be a slot and a value like {SLOT_TEXTS[0]!r} or 'Landmark=KFC'"
+    return f"slots names {short_repr(unknown)}; it must be a slot and a value like {SLOT_TEXTS[0]!r} or 'Landmark=KFC'"
 
 
 def _vector(given: Sequence[Any]) -> NDArray[np.bool_]:
@@ -258,7 +261,7 @@ def _actions(rows: _Rows, members: Sequence[int]) -> ActionPredictions:
     for k, row in enumerate(members):
         action, angle = rows.columns["action"][row], rows.columns["angle"][row]
         if action not in _ACTIONS:
-            wrong.append(f"{rows.name(row)}: action is {action!r}; it must be one of {', '.join(_ACTIONS)}")
+            wrong.append(f"{rows.name(row)}: action is {short_repr(action)}; it must be one of {', '.join(_ACTIONS)}")
         elif angle is None or not np.isfinite(angle):
             wrong.append(f"{rows.name(row)}: angle is {angle}; write degrees, positive left, 0 where there is none")
         else:
@@ -304,4 +307,4 @@ def _refuse(source: str, wrong: Sequence[str]) -> None:
     """Raises `PredictionError` with the faults of a file, if any."""
     if wrong:
         more = [f"... and {len(wrong) - SHOWN} more rows"] if len(wrong) > SHOWN else []
-        raise PredictionError("\n".join([f"{source}: {wrong[0]}", *wrong[1:SHOWN], *more]))
+        raise PredictionError(f"{source}: {'; '.join([*wrong[:SHOWN], *more])}")

@@ -96,8 +96,12 @@ def _floor(
     name: str, corpus: Corpus, labels: CorpusLabels, seeds: range, tasks: Sequence[Task], save: Path | None
 ) -> list[TaskPredictions]:
     from dorothie_gym.benchmark import labels_of, predict_floor, write_predictions
+    from dorothie_gym.errors import SessionError
 
-    train = labels_of(corpus, "train")
+    try:
+        train = labels_of(corpus, "train")
+    except SessionError as error:
+        fail(f"the trivial baseline {name} is fitted on the split train: {error}; or give a file of predictions")
     drawn = [given for seed in seeds for given in predict_floor(name, train, labels, seed)]
     wanted = [given for given in drawn if given.task in tasks]
     if save is not None:

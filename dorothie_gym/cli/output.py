@@ -67,11 +67,11 @@ def print_json(value: Mapping[str, object] | Sequence[object]) -> None:
 @contextmanager
 def reporting_errors() -> Iterator[None]:
     """Turns errors of the input into one message and exit code 2."""
-    from dorothie_gym.errors import SessionError, StoryboardError, TownError
+    from dorothie_gym.errors import DorothieGymError
 
     try:
         yield
-    except (TownError, StoryboardError, SessionError) as error:
+    except DorothieGymError as error:
         fail(str(error))
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}; check the path" if error.filename else str(error))

@@ -15,14 +15,17 @@ from collections.abc import Callable, Iterator, Mapping
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TypeAlias, TypedDict
+from typing import Any, TypeAlias, TypedDict, get_type_hints
 
+import msgspec
 import numpy as np
 
 from dorothie_gym import angles
-from dorothie_gym.errors import TownArchiveError
-from dorothie_gym.files import PART, write_atomically
+from dorothie_gym.errors import InputFileError, TownArchiveError
+from dorothie_gym.files import PART
+from dorothie_gym.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, read_file
 from dorothie_gym.maps.model import (
+    NO_STREET,
     Array,
     Crosswalk,
     Junction,
@@ -37,10 +40,13 @@ from dorothie_gym.maps.model import (
 )
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
-from dorothie_gym.user_cache import cache_folder
+from dorothie_gym.user_cache import cache_folder, read_signed, write_signed
 
 ARCHIVE_FORMAT = 1
 """Version of the archive format; raise it when the same town would be written differently."""
+
+MAX_ARCHIVE = 512 * MIB
+"""Largest content of an archive [bytes]; a town takes up to some megabytes."""
 
 PARTS: dict[str, type] = {
     "lanes": Lane,
@@ -100,6 +106,8 @@ def unpack(data: bytes, key: str) -> Town:
         raise TownArchiveError("its checksum is wrong")
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            if sum(member.file_size for member in archive.zip.infolist()) > MAX_ARCHIVE:
+                raise TownArchiveError("it is larger than any town")
             document = json.loads(archive["document"].tobytes())
             floats: Array = archive["floats"]
         if (document["format"], document["key"]) != (ARCHIVE_FORMAT, key):
@@ -108,12 +116,10 @@ def unpack(data: bytes, key: str) -> Town:
     except TownArchiveError:
         raise
     except (
-        ValueError,
-        TypeError,
+        *ARRAY_ERRORS,
         KeyError,
         AttributeError,
         OSError,
-        EOFError,
         zipfile.BadZipFile,
         zlib.error,
     ) as error:
@@ -139,15 +145,21 @@ def _plain(value: object) -> object:
 
 
 def _town(name: str, document: Mapping[str, Mapping[str, _Column]], floats: Array) -> Town:
+    if not isinstance(name, str) or floats.dtype != np.float64 or floats.ndim != 1:
+        raise TownArchiveError("its name is no text, or its numbers are no floats")
     numbers = _ArrayReader(floats)
-    parts = {}
+    parts: dict[str, list[Any]] = {}
     for part, kind in PARTS.items():
-        columns = {field: list(numbers.values(field, column)) for field, column in document[part].items()}
+        types = get_type_hints(kind)
+        columns = {field: list(numbers.values(field, column, types[field])) for field, column in document[part].items()}
         rows = zip(*columns.values(), strict=True)
         parts[part] = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
     if not numbers.at_end:
         raise TownArchiveError("it holds more numbers than its town has")
-    return Town(name=name, **parts)
+    town = Town(name=name, **parts)
+    if fault := next(_faults(town), None):
+        raise TownArchiveError(f"it holds no sound town: {fault}")
+    return town
 
 
 class _PhaseRow(TypedDict):
@@ -179,20 +191,54 @@ class _ArrayReader:
         """Whether all numbers were read."""
         return self._at == len(self._floats)
 
-    def values(self, name: str, column: _Column) -> Iterator[object]:
-        """Yields one field of all elements."""
+    def values(self, name: str, column: _Column, kind: Any) -> Iterator[object]:
+        """Yields one field of all elements, in the type of the field."""
         if isinstance(column, dict):
             for shape in column["shapes"]:
+                if not all(type(size) is int and 0 <= size <= len(self._floats) for size in shape):
+                    raise TownArchiveError("an array has a size that is no number")
                 count = int(np.prod(shape))
                 yield self._floats[self._at : self._at + count].reshape(shape)
                 self._at += count
         else:
+            msgspec.convert(column, list[kind])  # checks the types; a whole number stays one
             yield from map(_CONVERTERS.get(name, _frozen), column)
 
 
 def _frozen(value: object) -> object:
     """Converts lists to tuples, nested ones included."""
     return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
+
+
+def _faults(town: Town) -> Iterator[str]:
+    """Yields what no compiled town has: references to missing elements, and arrays of other shapes or numbers."""
+    for part in ("lanes", "streets", "sites", "crosswalks", "sidewalks"):
+        if [element.id for element in getattr(town, part)] != list(range(len(getattr(town, part)))):
+            yield f"{part} are not numbered from 0"
+    lanes, streets, signals = len(town.lanes), len(town.streets), {signal.id for signal in town.signals}
+    refers = [
+        *((end, lanes) for link in town.links for end in (link.source, link.target)),
+        *((lane, lanes) for junction in town.junctions for lane in junction.connectors),
+        *((lane, lanes) for street in town.streets for lane in street.lanes),
+        *((lane, lanes) for signal in town.signals for lane in signal.lanes),
+        *((site.lane, lanes) for site in town.sites),
+    ]
+    named = [lane.street for lane in town.lanes] + [walk.street for walk in town.sidewalks]
+    refers += [(street, streets) for street in (*named, *(site.street for site in town.sites)) if street != NO_STREET]
+    if not all(0 <= row < count for row, count in refers):
+        yield "an element refers to one that does not exist"
+    for lane in town.lanes:
+        if lane.points.shape != (len(lane.widths), 3) or len(lane.widths) < 2 or not lane.speed_limit > 0.0:
+            yield f"lane {lane.id} has no line, widths or speed limit"
+    arrays = [array for lane in town.lanes for array in (lane.points, lane.widths)]
+    arrays += [crosswalk.outline for crosswalk in town.crosswalks] + [walk.points for walk in town.sidewalks]
+    places = [site.position + site.waypoint for site in town.sites] + [each.position for each in town.signals]
+    if not all(bool(np.all(np.isfinite(array))) for array in (*arrays, *map(np.array, places))):
+        yield "a position is not finite"
+    for programme in town.programmes:
+        shown = {signal for phase in programme.phases for signal in (*phase.green, *phase.yellow)}
+        if not ({*programme.signals} | shown) <= signals or not all(phase.duration > 0.0 for phase in programme.phases):
+            yield f"the lights of junction {programme.junction_id} have a phase that cannot be shown"
 
 
 # --- Entries in the cache folder -------------------------------------------------------------------------------------
@@ -261,8 +307,8 @@ def _sources(folder: Traversable, prefix: str) -> Iterator[tuple[str, bytes]]:
 def _content(path: Path) -> bytes | None:
     """Returns the bytes of a file, or None if it cannot be read; the compiler reports the reason."""
     try:
-        return path.read_bytes()
-    except OSError:
+        return read_file(path, MAX_OPENDRIVE)
+    except (OSError, InputFileError):
         return None
 
 
@@ -276,7 +322,10 @@ def _key(compiler: str, path: Path, content: bytes) -> str:
 def _recall(folder: Path, key: str) -> Town | None:
     entry = folder / f"{key}.npz"
     try:
-        return unpack(entry.read_bytes(), key)
+        data = read_signed(entry)
+        if data is None:
+            raise TownArchiveError("it was not written by this user")
+        return unpack(data, key)
     except FileNotFoundError:
         return None
     except (OSError, TownArchiveError) as error:
@@ -288,8 +337,7 @@ def _keep(folder: Path, key: str, town: Town) -> None:
     """Writes an entry atomically: other processes see the whole entry or none."""
     data = pack(town, key)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomically(folder / f"{key}.npz", data, shared=True)
+        write_signed(folder / f"{key}.npz", data)
         _prune(folder)
     except OSError as error:
         _log.debug("the town %s cannot be kept in %s: %s", town.name, folder, error)

@@ -12,8 +12,9 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from dorothie_gym.errors import TownError, did_you_mean
+from dorothie_gym.errors import InputFileError, TownError, did_you_mean
 from dorothie_gym.files import JsonValue
+from dorothie_gym.input_files import MAX_OPENDRIVE, check_file
 from dorothie_gym.maps.cache import through_cache
 from dorothie_gym.maps.model import LaneLink, SignalKind
 from dorothie_gym.maps.town import Town
@@ -84,8 +85,13 @@ def _load(path: Path) -> Town:
     try:
         resolved = path.resolve(strict=True)
         stamp = resolved.stat()
+        check_file(resolved, MAX_OPENDRIVE)
     except OSError as error:
         raise TownError(str(path), "file", f"cannot be read ({error.strerror}); check the path") from error
+    except InputFileError as error:
+        raise TownError(str(path), "file", error.reason) from None
+    except ValueError as error:  # a null character in the path
+        raise TownError(repr(str(path)), "file", f"cannot be read ({error}); check the path") from None
     return _read(resolved, stamp.st_mtime_ns, stamp.st_size)
 
 

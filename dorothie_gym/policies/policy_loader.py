@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -11,7 +10,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from dorothie_gym.errors import PolicyLoadError, did_you_mean
+from dorothie_gym.errors import MAX_SHOWN, InputFileError, PolicyLoadError, did_you_mean
+from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard
@@ -173,25 +173,34 @@ def find_player(given: str, role: Role) -> Player:
         raise PolicyLoadError(
             f"{role}: {given} is of the kind {' or '.join(kinds)}, which cannot be played (known: {known})"
         )
-    training = {name: value for name in _COSTS if isinstance(value := description.get(name), int | float)}
+    training = {name: value for name in _COSTS if (value := _cost(description.get(name))) is not None}
     return Player(name=given, path=path, loader=loader, sha256=_sha256(path), training=training)
+
+
+def _cost(value: object) -> float | None:
+    """Returns a number of at least 0; None for anything else."""
+    return value if isinstance(value, int | float) and not isinstance(value, bool) and value >= 0 else None
 
 
 def _description(path: Path) -> Mapping[str, object]:
     """Returns the JSON of a file, or of a folder's description; empty where there is none."""
     file = path / DESCRIPTION if path.is_dir() else path
-    if file.suffix != ".json" or not file.is_file():
+    if file.suffix != ".json" or not file.exists():
         return {}
     try:
-        page = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise PolicyLoadError(f"{file}: cannot be read ({error}); give the file of a policy") from None
-    return page if isinstance(page, dict) else {}
+        page = read_json(file, MAX_MODEL_JSON)
+    except OSError as error:
+        raise PolicyLoadError(f"{file}: cannot be read ({error.strerror}); give the file of a policy") from None
+    except InputFileError as error:
+        raise PolicyLoadError(f"{error}; give the file of a policy") from None
+    if not isinstance(page, Mapping) or not isinstance(page.get("kind", ""), str):
+        raise PolicyLoadError(f"{file}: describes no policy: it must be a JSON object whose field 'kind' is a text")
+    return page
 
 
 def _kinds_of(path: Path, description: Mapping[str, object]) -> tuple[str, ...]:
     """Returns the possible kinds of a file: the one named in its JSON, and its suffix."""
-    named = (str(description["kind"]),) if "kind" in description else ()
+    named = (str(description["kind"])[:MAX_SHOWN],) if "kind" in description else ()
     if not path.is_dir():
         return (*named, path.suffix or "file without an ending")
     return (*named, ".json") if (path / DESCRIPTION).is_file() else ("folder without " + DESCRIPTION,)
@@ -201,6 +210,8 @@ def _sha256(path: Path) -> str:
     digest = hashlib.sha256()
     files = sorted(path.glob(Path(DESCRIPTION).stem + ".*")) if path.is_dir() else [path]
     for each in files:
+        with raising(PolicyLoadError):
+            check_file(each, MAX_WEIGHTS)
         digest.update(each.name.encode() + b"\0")
         with each.open("rb") as content:
             digest.update(hashlib.file_digest(content, "sha256").digest())

@@ -18,7 +18,7 @@ from dorothie_gym.recording.events import Event, EventType, decode_event
 from dorothie_gym.recording.export import export_tables
 from dorothie_gym.recording.file_names import EVENTS_FILE, HEADER_FILE
 from dorothie_gym.recording.header import parse_version
-from dorothie_gym.recording.json_io import Fields, decode_text, from_line, read_bytes, to_page
+from dorothie_gym.recording.json_io import decode_text, read_bytes, read_object, to_page
 from dorothie_gym.recording.sdn import SignVote, detect_layout, read_sdn, settle_sign
 from dorothie_gym.recording.session import Session, read_session_file
 
@@ -395,7 +395,7 @@ def read_manifest(root: Path) -> dict[str, str]:
     path = root / MANIFEST_FILE
     if not path.is_file():
         raise SessionError(f"{path}: is missing; write it with Corpus.write_manifest")
-    fields = Fields(from_line(decode_text(read_bytes(path), str(path)), str(path)), str(path))
+    fields = read_object(path)
     parse_version(fields.text("version"), str(path), MANIFEST_VERSION)
     rows = [{"path": row.text("path"), "sha256": row.text("sha256")} for row in fields.objects("sessions")]
     if _digest(rows) != fields.text("sha256"):

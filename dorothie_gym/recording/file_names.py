@@ -29,17 +29,20 @@ SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE, JOU
 MAX_EVENTS: Final = 200_000
 """Most events of a session; 15 minutes of three roles acting at 2 Hz give some 5,000."""
 
+MAX_MOVES: Final = 10_000
+"""Most dialogue moves of a session; 15 minutes have some 300."""
+
+MAX_EXCEPTIONS: Final = 500
+"""Most exceptions of a session; most sessions have up to 4."""
+
 MAX_FRAMES: Final = 1_000_000
 """Most frames of a session: 9 hours at 30 Hz."""
 
 MAX_FRAME: Final = 2**31
 """Bound of frame numbers."""
 
-MAX_TEXT_FILE: Final = 128 * 2**20
-"""Largest JSON or CSV file that is read [bytes]."""
-
-MAX_FRAMES_FILE: Final = 2**30
-"""Largest uncompressed frames file, and largest journal, that is read [bytes]."""
+MAX_FRAMES_FILE: Final = 2**28
+"""Largest uncompressed frames file, and largest journal, that is read [bytes]; a session of 15 minutes takes 16 MB."""
 
 _NAME: Final = re.compile(r"[^\w.+-]+")
 

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import SessionError, short_repr
 from dorothie_gym.files import replacing
+from dorothie_gym.input_files import ParquetLimits, raising, read_parquet
 from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES, MAX_FRAMES_FILE
 from dorothie_gym.recording.json_io import read_bytes
 from dorothie_gym.recording.surroundings import (
@@ -27,12 +28,12 @@ from dorothie_gym.recording.surroundings import (
     Rows,
     SceneTable,
     Surroundings,
+    actor_rows,
 )
 from dorothie_gym.recording.trajectory import (
     OPEN_COLUMNS,
     TRAJECTORY_COLUMNS,
     TRAJECTORY_DTYPE,
-    WHOLE_COLUMNS,
     Trajectory,
     check_rising,
     trajectory_of,
@@ -49,6 +50,11 @@ _WORDS: Final = {
     "state": tuple(str(colour) for colour in LIGHT_STATES),
 }
 """Columns that are words in the file and numbers in the arrays."""
+
+_LIMITS: Final = ParquetLimits(file=MAX_FRAMES_FILE, rows=MAX_FRAMES, values=32 * MAX_FRAMES, content=MAX_FRAMES_FILE)
+
+MAX_MAGNITUDE: Final = 1e9
+"""Largest magnitude of a number of the car or its surroundings, in the units of the columns."""
 
 _FALLBACK: Final = {"kind": int(ActorKind.OTHER)}
 """Numbers of unknown words."""
@@ -105,10 +111,11 @@ def read_frames(path: Path, report: ReadReport) -> tuple[Trajectory, Surrounding
         SessionError: it is missing or damaged, lacks a column, is larger than a session's, or its frames do not rise.
         OSError: it cannot be read.
     """
-    if not path.is_file():
+    if not path.exists():
         raise SessionError(f"{path}: is missing")
     with _parquet_errors(path):
-        arrow = _read_arrow(path)
+        with raising(SessionError):
+            arrow = read_parquet(path, _LIMITS)
         trajectory = _trajectory(arrow, path)
         tables = {
             name: _table(arrow.column(name), name, dtype, trajectory["frame"], path, report)
@@ -137,42 +144,46 @@ def _parquet_errors(path: Path) -> Iterator[None]:
         raise SessionError(f"{path}: not a readable Parquet file ({reason})") from None
 
 
-def _read_arrow(path: Path) -> pa.Table:
-    import pyarrow.parquet as pq
-
-    file = pq.ParquetFile(path)
-    try:
-        metadata = file.metadata
-        size = sum(metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups))
-        if metadata.num_rows > MAX_FRAMES or size > MAX_FRAMES_FILE:
-            raise SessionError(
-                f"{path}: {metadata.num_rows} frames of {size >> 20} MiB; a session has at most {MAX_FRAMES} frames "
-                f"of {MAX_FRAMES_FILE >> 20} MiB"
-            )
-        return file.read(use_threads=False)
-    finally:
-        file.close()
-
-
 def _trajectory(arrow: pa.Table, path: Path) -> Trajectory:
-    import pyarrow as pa
-
     trajectory = np.empty(arrow.num_rows, dtype=TRAJECTORY_DTYPE)
     for name in TRAJECTORY_COLUMNS:
         if name not in arrow.column_names:
             raise SessionError(f"{path}: column {name!r} is missing")
         column = arrow.column(name)
-        wanted = pa.int64() if name in WHOLE_COLUMNS else pa.float64()
         if column.null_count and name not in OPEN_COLUMNS:
             raise SessionError(f"{path}: column {name!r} has rows without a value")
-        trajectory[name] = column.cast(wanted).to_numpy()
-        if name not in WHOLE_COLUMNS and not np.all(np.isfinite(trajectory[name]) | (name in OPEN_COLUMNS)):
-            raise SessionError(f"{path}: column {name!r} has a value that is not finite")
+        trajectory[name] = _typed(column, trajectory.dtype[name], f"{path}: column {name!r}", name in OPEN_COLUMNS)
     frames = trajectory["frame"]
     if len(frames) and (frames[0] < 0 or frames[-1] >= MAX_FRAME):
         raise SessionError(f"{path}: column 'frame' must be in 0..{MAX_FRAME - 1}")
     check_rising(frames, -1, f"{path}: column 'frame'")
     return trajectory
+
+
+def _typed(
+    column: pa.ChunkedArray | pa.Array, wanted: np.dtype[np.generic], where: str, unknown: bool
+) -> NDArray[np.generic]:
+    """Returns numbers of a column in a numpy type.
+
+    Args:
+        column: the column.
+        wanted: type of whole numbers or of floats.
+        where: file and column, for messages.
+        unknown: whether floats may be null or NaN, which stand for an unknown value.
+
+    Raises:
+        SessionError: the column holds other types than numbers, or numbers out of range.
+    """
+    import pyarrow as pa
+
+    whole = wanted.kind in "iu"
+    if not (pa.types.is_integer(column.type) or (pa.types.is_floating(column.type) and not whole)):
+        expected = "whole numbers" if whole else "numbers"
+        raise SessionError(f"{where} holds {str(column.type)[:60]}; it must hold {expected}")
+    values: NDArray[np.generic] = column.cast(pa.from_numpy_dtype(wanted)).to_numpy(zero_copy_only=False)
+    if not whole and not np.all((np.abs(values) <= MAX_MAGNITUDE) | (unknown & np.isnan(values))):
+        raise SessionError(f"{where} has a value that is not finite, or beyond {MAX_MAGNITUDE:g}")
+    return values
 
 
 # --- Nested columns --------------------------------------------------------------------------------------------------
@@ -251,7 +262,10 @@ def _rows(values: pa.StructArray, name: str, dtype: np.dtype[np.void], path: Pat
         column = values.field(field)
         if column.null_count:
             raise SessionError(f"{path}: field {name}.{field} has rows without a value")
-        rows[field] = _numbers(column, field, path) if field in _WORDS else column.to_numpy(zero_copy_only=False)
+        if field in _WORDS:
+            rows[field] = _numbers(column, field, path)
+        else:
+            rows[field] = _typed(column, dtype[field], f"{path}: field {name}.{field}", unknown=False)
     return rows
 
 
@@ -265,7 +279,7 @@ def _numbers(column: pa.Array, field: str, path: Path) -> NDArray[np.int64]:
     known = {word: number for number, word in enumerate(_WORDS[field])}
     numbers = np.array([known.get(word, _FALLBACK.get(field, -1)) for word in words], dtype=np.int64)
     if np.any(numbers < 0):
-        raise SessionError(f"{path}: {field!r} holds {words}; it must be of {', '.join(known)}")
+        raise SessionError(f"{path}: {field!r} holds {short_repr(words)}; it must be of {', '.join(known)}")
     if not len(numbers):
         return numbers
     result: NDArray[np.int64] = numbers[column.indices.to_numpy()]
@@ -333,16 +347,32 @@ def read_journal(path: Path) -> tuple[Trajectory, Surroundings]:
     """Returns trajectory and scene of a journal up to its last complete block.
 
     Raises:
-        SessionError: it is too large to be that of a session.
+        SessionError: it is too large to be that of a session, or has values that no session has.
         OSError: it cannot be read.
     """
     blocks: dict[bytes, list[tuple[int, bytes]]] = {kind: [] for kind in DTYPES}
     for kind, frame, body in _blocks(read_bytes(path, MAX_FRAMES_FILE)):
         blocks[kind].append((frame, body))
     cars = np.frombuffer(b"".join(body for _, body in blocks[CAR]), dtype=DTYPES[CAR])
+    if np.any(np.abs(cars) > MAX_FRAME):
+        raise SessionError(f"{path}: the car has a value beyond {MAX_FRAME}")
     tables = {kind: _table_journal(blocks[kind], DTYPES[kind]) for kind in (ACTORS, LIGHTS, WEATHER)}
     scene = Surroundings(actors=tables[ACTORS], lights=tables[LIGHTS], weather=tables[WEATHER])
+    _check_journal(scene, path)
     return trajectory_of(cars.reshape(-1, len(TRAJECTORY_COLUMNS))), scene
+
+
+def _check_journal(scene: Surroundings, path: Path) -> None:
+    for name, table in (("actors", scene.actors), ("lights", scene.lights), ("weather", scene.weather)):
+        check_rising(table.frames, -1, f"{path}: {name}")
+        if len(table) and table.frames[-1] >= MAX_FRAME:
+            raise SessionError(f"{path}: {name}: frames are in 0..{MAX_FRAME - 1}")
+    actor_rows(scene.actors.rows)
+    states = scene.lights.rows["state"]
+    if len(states) and not 0 <= states.min() <= states.max() < len(LIGHT_STATES):
+        raise SessionError(f"{path}: lights: the state must be one of {', '.join(LIGHT_STATES)}")
+    if not all(np.all(np.isfinite(scene.weather.rows[name])) for name in WEATHER_DTYPE.names or ()):
+        raise SessionError(f"{path}: weather: a value is not finite")
 
 
 def _blocks(content: bytes) -> Iterator[tuple[bytes, int, bytes]]:

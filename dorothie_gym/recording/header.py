@@ -133,7 +133,7 @@ class SessionHeader:
         parse_version(plain.text("format_version"), plain.where)
         for name in ("town", "storyboard", "story", "package_version", "source"):
             plain.text(name)
-        plain.optional("seed", plain.integer)
+        plain.optional("seed", plain.seed)
         if plain.number("decision_frequency") <= 0:
             raise plain.error("decision_frequency", "a positive number")
         object.__setattr__(self, "street_names", _streets(plain))

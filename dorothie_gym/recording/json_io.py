@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
@@ -14,10 +13,17 @@ import numpy as np
 
 from dorothie_gym.errors import SessionError, short_repr
 from dorothie_gym.files import JsonValue
-from dorothie_gym.recording.file_names import MAX_TEXT_FILE
+from dorothie_gym.input_files import (
+    MAX_DEPTH,
+    MAX_SESSION_TEXT,
+    check_value_count,
+    parse_json,
+    raising,
+    read_file,
+)
 
-MAX_DEPTH: Final = 40
-"""Deepest nesting of a session's values."""
+MAX_WHOLE: Final = 2**53
+"""Bound of whole numbers, which floats hold exactly; seeds may be larger."""
 
 
 def canonical(value: object, where: str, depth: int = MAX_DEPTH) -> JsonValue:
@@ -85,45 +91,33 @@ def from_line(text: str, where: str) -> dict[str, JsonValue]:
     """Returns the JSON object of a text.
 
     Raises:
-        SessionError: it is no JSON object, or holds a number that is not finite; the message begins with `where`.
+        SessionError: it is no JSON object, contains a field twice, or is beyond the limits of `parse_json`; the message
+            begins with `where`.
     """
-    try:
-        value = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
-    except ValueError as error:
-        raise SessionError(f"{where}: not JSON ({error})") from None
-    except RecursionError:
-        raise SessionError(f"{where}: the JSON is nested too deeply to be read") from None
+    with raising(SessionError):
+        value = parse_json(text, where)
     if not isinstance(value, dict):
         raise SessionError(f"{where}: a JSON object is expected, not {type(value).__name__}")
     return value
 
 
-def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is no number")
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(f"{text[:30]} is too large a number")
-    return value
-
-
-def read_bytes(path: Path, limit: int = MAX_TEXT_FILE) -> bytes:
+def read_bytes(path: Path, limit: int = MAX_SESSION_TEXT) -> bytes:
     """Returns the content of a regular file, or of a link to one.
 
     Raises:
-        SessionError: it is no regular file (a pipe would block forever), or larger than `limit`.
+        SessionError: it is missing, no regular file (a pipe would block forever), or larger than `limit`.
         OSError: it cannot be read.
     """
-    if not path.is_file():
-        kind = "is not a regular file" if os.path.lexists(path) else "is missing"
-        raise SessionError(f"{path}: {kind}")
-    with path.open("rb") as file:
-        content = file.read(limit + 1)
-    if len(content) > limit:
-        raise SessionError(f"{path}: is larger than {limit >> 20} MiB, which no session needs; it is not read")
-    return content
+    with raising(SessionError):
+        try:
+            return read_file(path, limit)
+        except FileNotFoundError:
+            raise SessionError(f"{path}: is missing") from None
+
+
+def read_object(path: Path) -> Fields:
+    """Returns the fields of the JSON object in a file; raises as `read_bytes` and `from_line`."""
+    return Fields(from_line(decode_text(read_bytes(path), str(path)), str(path)), str(path))
 
 
 def decode_text(content: bytes, where: str) -> str:
@@ -157,10 +151,18 @@ class Fields:
         self.where = where
 
     def integer(self, name: str, minimum: int | None = None) -> int:
-        """Returns a whole number of at least `minimum`."""
+        """Returns a whole number of at least `minimum`, of a magnitude below `MAX_WHOLE`."""
         value = self.anything(name)
-        if isinstance(value, bool) or not isinstance(value, int) or (minimum is not None and value < minimum):
-            raise self.error(name, "a whole number" + ("" if minimum is None else f" of at least {minimum}"))
+        if type(value) is not int or (minimum is not None and value < minimum) or not abs(value) < MAX_WHOLE:
+            least = "" if minimum is None else f" of at least {minimum}"
+            raise self.error(name, f"a whole number{least}, of a magnitude below 2^53")
+        return value
+
+    def seed(self, name: str) -> int:
+        """Returns a whole number of at least 0 and of any size."""
+        value = self.anything(name)
+        if type(value) is not int or value < 0:
+            raise self.error(name, "a whole number of at least 0")
         return value
 
     def number(self, name: str) -> float:
@@ -201,8 +203,10 @@ class Fields:
     def integers(self, name: str) -> tuple[int, ...]:
         """Returns a list of whole numbers."""
         value = self.anything(name)
-        if not isinstance(value, list | tuple) or not all(type(item) is int for item in value):
-            raise self.error(name, "a list of whole numbers")
+        if not isinstance(value, list | tuple) or not all(
+            type(item) is int and abs(item) < MAX_WHOLE for item in value
+        ):
+            raise self.error(name, "a list of whole numbers of a magnitude below 2^53")
         return tuple(value)
 
     def objects(self, name: str) -> tuple[Fields, ...]:
@@ -249,5 +253,7 @@ def read_lines(path: Path, limit: int) -> tuple[list[str], bool]:
     content = read_bytes(path)
     if content.count(b"\n") > limit:
         raise SessionError(f"{path}: holds more than {limit} lines, which no session does; it is not read")
+    with raising(SessionError):
+        check_value_count(content, path)
     *lines, rest = content.split(b"\n")
     return [decode_text(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1)], bool(rest)

@@ -42,6 +42,8 @@ from dorothie_gym.recording.file_names import (
     HEADER_FILE,
     JOURNAL_FILE,
     MAX_EVENTS,
+    MAX_EXCEPTIONS,
+    MAX_MOVES,
     PICTURES_FOLDER,
     SessionState,
     safe_name,
@@ -51,10 +53,8 @@ from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.recording.json_io import (
     Fields,
     canonical,
-    decode_text,
-    from_line,
-    read_bytes,
     read_lines,
+    read_object,
     to_line,
     to_page,
 )
@@ -98,6 +98,10 @@ class Session:
         if self.trajectory.dtype != TRAJECTORY_DTYPE:
             raise SessionError(f"session: trajectory has type {self.trajectory.dtype}; it must be {TRAJECTORY_DTYPE}")
         object.__setattr__(self, "events", tuple(sorted(self.events, key=lambda event: event.frame)))
+        kinds = [event.type for event in self.events]
+        for kind, most in ((EventType.DIALOGUE_MOVE, MAX_MOVES), (EventType.EXCEPTION, MAX_EXCEPTIONS)):
+            if (count := kinds.count(kind)) > most:
+                raise SessionError(f"session {self.name}: has {count} events of type {kind}; at most {most} are read")
         if not self.name:
             name = f"{self.header.town}-{self.header.storyboard}-{self.header.seed}"
             object.__setattr__(self, "name", safe_name(name))
@@ -257,7 +261,7 @@ def read_session_file(folder: Path) -> SessionFile:
     path = folder / HEADER_FILE
     if not path.is_file():
         raise SessionError(f"{folder}: no session here (there is no {HEADER_FILE})")
-    fields = Fields(from_line(decode_text(read_bytes(path), str(path)), str(path)), str(path))
+    fields = read_object(path)
     header = SessionHeader.from_json(fields.others(("outcome", "counts")), str(path))
     outcome = fields.if_given("outcome", fields.mapping)
     if outcome is None:

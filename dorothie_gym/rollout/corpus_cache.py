@@ -20,7 +20,7 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import CacheError
 from dorothie_gym.recording import FORMAT_VERSION
 from dorothie_gym.rollout.corpus_generation import generate_corpus
-from dorothie_gym.user_cache import CACHE_VARIABLE, cache_folder
+from dorothie_gym.user_cache import CACHE_VARIABLE, cache_folder, is_private
 
 SESSIONS = 20
 """Number of sessions: each fold has at least one, and the generation takes some minutes."""
@@ -54,12 +54,17 @@ def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: Env
     digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:12]
     cache = cache_folder()
     if cache is None:
-        raise CacheError(f"sessions cannot be kept: {CACHE_VARIABLE} is empty; set it to a folder that can be written")
+        raise CacheError(
+            f"sessions cannot be kept: {CACHE_VARIABLE} is empty or names a folder that others can write; set it to a "
+            "folder that only you can write"
+        )
     folder = cache / f"corpus-{__version__}-{digest}"
     if folder.is_dir():
+        if not is_private(folder):
+            raise CacheError(f"{folder}: belongs to another user or can be written by others; remove it")
         return folder
     with _naming_the_variable(folder.parent):
-        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", suffix=".part", dir=folder.parent))
         try:
             _play(part, sessions, seed, config)
@@ -85,7 +90,6 @@ def _play(folder: Path, sessions: int, seed: int, config: EnvConfig) -> None:
 
 def _publish(part: Path, folder: Path) -> None:
     """Renames the finished folder, unless another process has already stored the same sessions."""
-    part.chmod(0o755)  # temporary folders are closed to other users
     try:
         part.rename(folder)
     except OSError:

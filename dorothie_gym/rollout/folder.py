@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from dorothie_gym._version import __version__
-from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import SessionError, short_repr
 from dorothie_gym.files import PART, write_atomically
+from dorothie_gym.input_files import MAX_SMALL_JSON, raising, read_json
 from dorothie_gym.recording import FORMAT_VERSION
 
 if sys.platform != "win32":
@@ -73,15 +74,14 @@ def _check_settings(path: Path, settings: Mapping[str, object]) -> None:
             raise SessionError(f"{root}: holds something else ({others[0]}); choose a new or an empty folder")
         write_atomically(path, page)
         return
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise SessionError(f"{path}: cannot be read ({error}); choose another folder") from None
+    with raising(lambda message: SessionError(f"{message}; choose another folder")):
+        found = read_json(path, MAX_SMALL_JSON)
     for name, value in json.loads(page).items():
         if not isinstance(found, dict) or found.get(name) != value:
             there = found.get(name) if isinstance(found, dict) else found
             raise SessionError(
-                f"{path}: has {name} {there!r}, not {value!r}; choose another folder, or resume with the same settings"
+                f"{path}: has {name} {short_repr(there)}, not {value!r}; choose another folder, or resume "
+                "with the same settings"
             )
 
 

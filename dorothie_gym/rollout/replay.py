@@ -8,19 +8,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from dorothie_gym._version import __version__
-from dorothie_gym.engine.config import EnvConfig, RewardWeights
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError, StoryboardError, TownError
+from dorothie_gym.input_files import checked, raising
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import CorpusEntry, Difference, Session, SessionHeader, SessionWriter, first_difference
 from dorothie_gym.rollout.processes import run_tasks
-from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import ActionDict, Observation
 from dorothie_gym.tasks import StoryboardTemplate, load_template, template_names
 
@@ -84,7 +84,7 @@ def _begin(session: Session, town: Town, storyboard: StoryboardTemplate | None) 
         raise SessionError(f"{session.name}: what the roles decided was not recorded; it cannot be played again")
     if session.header.seed is None:
         raise SessionError(f"{session.name}: has no seed; it cannot be played again")
-    config = _config(session.header)
+    config = config_of(session.header)
     engine = SessionEngine(town, config=config, max_cycles=_cycles(session, config))
     engine.reset(scenario=_scenario(session, town, storyboard))
     return engine
@@ -145,16 +145,10 @@ def _fits(scenario: Scenario, header: SessionHeader) -> bool:
     )
 
 
-def _config(header: SessionHeader) -> EnvConfig:
+def config_of(header: SessionHeader) -> EnvConfig:
     """Returns the configuration in a header."""
-    values: dict[str, Any] = dict(header.config)
-    try:
-        world, rewards = values.pop("world", {}), values.pop("rewards", {})
-        if not isinstance(world, Mapping) or not isinstance(rewards, Mapping):
-            raise TypeError("world and rewards must be objects")
-        return EnvConfig(**values, world=WorldConfig(**world), rewards=RewardWeights(**rewards))
-    except (TypeError, ValueError) as error:
-        raise SessionError(f"header: field 'config' is that of no environment of this version ({error})") from None
+    with raising(SessionError):
+        return checked(dict(header.config), EnvConfig, "header, config")
 
 
 # --- Checks ----------------------------------------------------------------------------------------------------------

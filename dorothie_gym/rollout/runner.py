@@ -6,7 +6,6 @@ take from each session. Replay checks write no sessions and use the pool below t
 
 from __future__ import annotations
 
-import json
 import logging
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
@@ -18,8 +17,9 @@ from typing import Final, Generic, TypeVar
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import InputFileError, SessionError
 from dorothie_gym.files import write_atomically
+from dorothie_gym.input_files import MAX_SMALL_JSON, checked, read_json
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Player
@@ -240,9 +240,9 @@ def _no_report(finished: int, planned: int) -> None:
 def _add_cost(file: Path, wall: float, processor: float, workers: int) -> None:
     """Adds the cost of a run to that of the runs before; a file that cannot be read counts as none."""
     try:
-        before = json.loads(file.read_text(encoding="utf-8"))
+        before = checked(read_json(file, MAX_SMALL_JSON), dict[str, float], file)
         wall, processor = wall + before["wall_seconds"], processor + before["cpu_seconds"]
-    except (FileNotFoundError, ValueError, KeyError, TypeError):
+    except (FileNotFoundError, InputFileError, KeyError):
         _LOG.debug("%s: no earlier cost; a new file is written", file)
     cost = {"wall_seconds": round(wall, 3), "cpu_seconds": round(processor, 3), "workers": workers}
     write_atomically(file, to_page(cost))

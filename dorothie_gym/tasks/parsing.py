@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 import re
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -11,8 +10,9 @@ from importlib import resources
 from pathlib import Path
 from typing import NoReturn
 
-from dorothie_gym.errors import StoryboardError, did_you_mean
+from dorothie_gym.errors import InputFileError, StoryboardError, did_you_mean
 from dorothie_gym.files import JsonValue
+from dorothie_gym.input_files import MAX_SMALL_JSON, parse_json, read_text
 from dorothie_gym.tasks.binding import cast
 from dorothie_gym.tasks.catalogue import find_kind
 from dorothie_gym.tasks.storyboard import (
@@ -137,25 +137,12 @@ def read_json(text: str, source: str) -> JsonValue:
     Raises:
         StoryboardError: if the text is malformed (with line and column), or if an object contains a field twice.
     """
-
-    def unique_fields(pairs: list[tuple[str, JsonValue]]) -> dict[str, JsonValue]:
-        fields: dict[str, JsonValue] = {}
-        for key, value in pairs:
-            if key in fields:
-                raise StoryboardError(source, key, "this field is given twice in one object; remove one")
-            fields[key] = value
-        return fields
-
     # Commas are replaced by spaces, so that error positions refer to the file.
     strict = _STRING_OR_LAST_COMMA.sub(lambda match: match[0] if match[1] is None else f"{match[1]} ", text)
     try:
-        value: JsonValue = json.loads(strict, strict=False, object_pairs_hook=unique_fields)
-    except json.JSONDecodeError as error:
-        place = f"line {error.lineno}, column {error.colno}"
-        raise StoryboardError(source, place, f"not JSON: {error.msg}; correct the file there") from error
-    except RecursionError as error:
-        raise StoryboardError(source, "text", "not a template: brackets are nested too deeply") from error
-    return value
+        return parse_json(strict, source, line_breaks=True)
+    except InputFileError as error:
+        raise StoryboardError(source, error.place or "text", error.reason) from None
 
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
@@ -324,13 +311,12 @@ def load_template(name_or_path: str | Path) -> StoryboardTemplate:
         reason = f"there is no such template; {hint}use one of {known}, or a .json file"
         raise StoryboardError(name_or_path, "name", reason)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, MAX_SMALL_JSON)
     except OSError as error:
         reason = f"cannot be read ({error.strerror}); give the path of a template"
         raise StoryboardError(str(name_or_path), "file", reason) from error
-    except UnicodeDecodeError as error:
-        reason = f"is not UTF-8 text (byte {error.start}); save it as UTF-8"
-        raise StoryboardError(str(name_or_path), "file", reason) from error
+    except InputFileError as error:
+        raise StoryboardError(str(name_or_path), "file", error.reason) from None
     return parse_template(text, path.stem, source=str(name_or_path))
 
 

@@ -113,7 +113,7 @@ def test_error_of_wrong_row_names_row_and_remedy(tmp_path: Path, row: dict[str, 
 
 def test_of_many_wrong_rows_the_first_are_named(tmp_path: Path) -> None:
     message = refusal(tmp_path, *({**ROW, "event": k, "move": "no"} for k in range(9)))
-    assert len(message.splitlines()) == 6 and message.endswith("... and 4 more rows")
+    assert len(message.splitlines()) == 1 and message.count("move is") == 5 and message.endswith("... and 4 more rows")
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_error_of_wrong_column_names_it(tmp_path: Path, change: dict[str, Any], 
 
 def test_file_that_is_not_parquet_is_refused(tmp_path: Path) -> None:
     (tmp_path / "p.parquet").write_text("session,event\n")
-    with pytest.raises(PredictionError, match=r"p\.parquet: is no parquet file"):
+    with pytest.raises(PredictionError, match=r"p\.parquet: not a readable Parquet file"):
         read_predictions(tmp_path / "p.parquet")
 
 
@@ -144,14 +144,14 @@ def test_damage_is_refused_or_does_no_harm(tmp_path: Path, offset: int) -> None:
     with contextlib.suppress(PredictionError):
         read_predictions(tmp_path / "d.parquet")
     (tmp_path / "d.parquet").write_bytes(whole[:offset])
-    with pytest.raises(PredictionError, match="is no parquet file, or damaged"):
+    with pytest.raises(PredictionError, match="not a readable Parquet file"):
         read_predictions(tmp_path / "d.parquet")
 
 
 def test_metadata_of_a_file_must_be_json(tmp_path: Path) -> None:
     table = pa.Table.from_pylist([ROW]).replace_schema_metadata({"dorothie_gym.about": "hashing"})
     pq.write_table(table, tmp_path / "p.parquet")
-    with pytest.raises(PredictionError, match="about in its metadata is not valid JSON"):
+    with pytest.raises(PredictionError, match="about in its metadata, line 1, column 1: not JSON"):
         read_about(tmp_path / "p.parquet")
 
 

@@ -49,7 +49,7 @@ def test_a_file_that_is_no_town_is_refused(tmp_path: Path, text: str | bytes, li
 
 
 def test_paths_that_are_no_files_are_refused(tmp_path: Path) -> None:
-    check(tmp_path, None, "cannot be read: it is a directory; name a town file (.yaml)")
+    check(tmp_path, None, "cannot be read: it is a folder, not a regular file")
     check(tmp_path / "missing.yaml", None, "cannot be read (No such file or directory); check the path")
 
 

@@ -201,7 +201,7 @@ WRONG_FILES = {
     ),
     "not UTF-8": (b"name: x\nspeed: \xff\xfe", 2, "is not UTF-8 text (byte 15 of the file); save the file as UTF-8"),
     "UTF-16": (ROAD.encode("utf-16"), 1, "is not UTF-8 text (byte 0 of the file)"),
-    "too large": ("#" * 1_000_001, None, "is larger than 1000 kB; name a town file (.yaml)"),
+    "too large": ("#" * 1_000_001, None, "is larger than 1000 kB, the limit of its kind"),
     "nested without end": ("name: " + "[" * 500_000, 1, "lists are nested more than 20 deep; check the brackets"),
     "a billion laughs": (
         "a: &a [lol, lol]\nb: &b [*a, *a]\nc: &c [*b, *b]\n",

@@ -117,7 +117,7 @@ def test_manifest_that_was_changed_itself_is_noticed(corpus: Corpus) -> None:
     with pytest.raises(SessionError, match="version"):
         corpus.verify()
     path.write_text(whole[: len(whole) // 2])
-    with pytest.raises(SessionError, match="manifest.json: not JSON"):
+    with pytest.raises(SessionError, match="manifest.json, line 33, column 14: not JSON"):
         corpus.verify()
 
 

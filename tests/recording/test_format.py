@@ -123,7 +123,7 @@ def damaged(table: pa.Table, fault: str) -> pa.Table:
     [
         ("column", "column 'speed' is missing"),
         ("order", "column 'frame': frame 1 after 2"),
-        ("text", "not a readable Parquet file"),
+        ("text", "column 'x' holds .*it must hold numbers"),
         ("infinite", "column 'x' has"),
         ("actors", "column 'actors' must hold lists of structs, not int64"),
     ],
@@ -148,7 +148,7 @@ def test_named_pipe_instead_of_a_file_does_not_block(tmp_path: Path) -> None:
     folder = write(tmp_path / "one", frames=2)
     (folder / "events.jsonl").unlink()
     os.mkfifo(folder / "events.jsonl")
-    with pytest.raises(SessionError, match="events.jsonl: is not a regular file"):
+    with pytest.raises(SessionError, match="events.jsonl: cannot be read: it is a pipe, socket or device"):
         Session.load(folder)
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from dorothie_gym.input_files import MAX_SESSION_TEXT
 from dorothie_gym.recording import FORMAT_VERSION, Corpus, EventType, LandmarkRow, SubgoalRow
-from dorothie_gym.recording.file_names import MAX_EVENTS, MAX_FRAMES, MAX_TEXT_FILE
+from dorothie_gym.recording.file_names import MAX_EVENTS, MAX_FRAMES
 from tests.recording.builders import write
 from tests.recording.dialogues import talk
 from tests.recording.test_scene import record
@@ -53,4 +54,4 @@ def test_checked_types_are_on_the_page(kind: EventType) -> None:
 
 def test_version_and_limits_are_those_of_the_code() -> None:
     assert f"version {FORMAT_VERSION}." in PAGE
-    assert f"{MAX_EVENTS:,} events and {MAX_FRAMES:,} frames" in PAGE and f"{MAX_TEXT_FILE >> 20} MiB" in PAGE
+    assert f"{MAX_EVENTS:,} events and {MAX_FRAMES:,} frames" in PAGE and f"{MAX_SESSION_TEXT >> 20} MiB" in PAGE

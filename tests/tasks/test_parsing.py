@@ -49,7 +49,7 @@ def test_json_error_contains_line_and_column_of_the_file():
 
 
 def test_duplicate_field_raises_error():
-    with pytest.raises(StoryboardError, match="story: this field is given twice"):
+    with pytest.raises(StoryboardError, match="story.: is given twice"):
         read_json('{"story": "a", "story": "b"}', "t")
 
 

@@ -21,7 +21,8 @@ from dorothie_gym.baselines.model_zoo import build_model, find_row, retell
 from dorothie_gym.baselines.toto import TOTO, TOTOConfig
 from dorothie_gym.benchmark.features import Columns, PointTable, points
 from dorothie_gym.benchmark.features.session_columns import town_graph
-from dorothie_gym.errors import CheckpointError
+from dorothie_gym.errors import CheckpointError, DorothieGymError, ModelFileError, one_line
+from dorothie_gym.input_files import MAX_WEIGHTS, check_file, raising
 from dorothie_gym.maps import Town
 from dorothie_gym.recording import Task
 
@@ -47,8 +48,13 @@ class BenchmarkModel:
         self.weights = folder / description.weights
         self.row = find_row(description.row)
         self.config = TOTOConfig.from_json(description.config)
-        if not self.weights.is_file() or sha256_of(self.weights) != description.weights_sha256:
+        with raising(ModelFileError):
+            if self.weights.exists():
+                check_file(self.weights, MAX_WEIGHTS)
+        if not self.weights.exists() or sha256_of(self.weights) != description.weights_sha256:
             raise ValueError(f"{self.weights}: is missing, or differs from the trained weights; train the model again")
+        if 4 * self.config.weights_at_least > self.weights.stat().st_size:
+            raise ModelFileError(f"{folder}: field 'config' asks for more weights than {self.weights.name} has")
         encoder = text_encoder(description.encoder)
         if encoder.id != description.encoder_id:
             raise ValueError(f"{folder}: was trained with the encoder {description.encoder_id}; here is {encoder.id}")
@@ -62,9 +68,15 @@ class BenchmarkModel:
         """Reads a model, once in a process.
 
         Raises:
-            ValueError: as above, or the description cannot be read.
+            ModelFileError: as above, or the description cannot be read.
         """
-        return cls(ModelCard.read(path), path if path.is_dir() else path.parent)
+        card = ModelCard.read(path)
+        try:
+            return cls(card, path if path.is_dir() else path.parent)
+        except DorothieGymError:
+            raise
+        except ValueError as error:
+            raise ModelFileError(f"{path}: {one_line(error)}") from None
 
     def _in_town(self, town: Town) -> TownModel:
         return TownModel(self, town)
@@ -127,7 +139,7 @@ class TownModel:
             try:
                 restore(trained.weights, model)
             except CheckpointError as error:
-                raise ValueError(str(error)) from None
+                raise ModelFileError(str(error)) from None
             self._model = model.eval()
         else:
             retell(self._model, material)

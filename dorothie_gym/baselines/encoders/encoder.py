@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.files import replacing
+from dorothie_gym.input_files import ARRAY_ERRORS
+from dorothie_gym.user_cache import is_private, make_private
 
 if TYPE_CHECKING:
     from sklearn.feature_extraction.text import HashingVectorizer
@@ -68,7 +70,7 @@ def text_table(encoder: TextEncoder, texts: Sequence[str], cache: Path | None = 
     if cache is None:
         return encoder.encode(texts)
     path = cache / f"{table_key(encoder.id, texts)}.npy"
-    if path.is_file():
+    if path.is_file() and is_private(cache) and is_private(path):
         kept = _read(path, (len(texts), encoder.dim))
         if kept is not None:
             return kept
@@ -89,16 +91,19 @@ def table_key(encoder_id: str, texts: Sequence[str]) -> str:
 def _read(path: Path, shape: tuple[int, int]) -> Vectors | None:
     """Returns a cached table; None if the file is damaged."""
     try:
-        table = np.load(path, allow_pickle=False)
-    except (ValueError, EOFError):
+        mapped = np.load(path, mmap_mode="r", allow_pickle=False)  # a header cannot state more than the file holds
+    except ARRAY_ERRORS:
         return None
-    return table if table.shape == shape and table.dtype == np.float32 else None
+    if mapped.shape != shape or mapped.dtype != np.float32 or not np.all(np.isfinite(mapped)):
+        return None
+    return np.array(mapped)
 
 
 def _write(path: Path, table: Vectors) -> None:
     """Writes a table atomically; two processes may write the same one at once."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_private(path.parent)
     with replacing(path, shared=True) as part, part.open("wb") as file:
+        part.chmod(0o600)
         np.save(file, table, allow_pickle=False)
 
 

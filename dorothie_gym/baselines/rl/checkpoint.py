@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, TypeVar
 
 import torch
 from safetensors import SafetensorError
@@ -16,10 +17,11 @@ from safetensors.torch import load_file, save_file
 from stable_baselines3.common.vec_env import VecEnv
 
 from dorothie_gym.baselines.rl.environments import make_env
-from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, Page, RunSettings, TrainingSettings
+from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, ON_POLICY, Page, RunSettings, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import AnyEnv
-from dorothie_gym.errors import ModelFileError, SettingsError
+from dorothie_gym.errors import InputFileError, ModelFileError, SettingsError, one_line
 from dorothie_gym.files import replacing
+from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, raising, read_json
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 
 Model: TypeAlias = Any
@@ -27,6 +29,8 @@ Model: TypeAlias = Any
 
 Network: TypeAlias = Any
 """Policy network of a `Model`, for the same reasons without a type."""
+
+Settings = TypeVar("Settings", bound=RunSettings)
 
 TENSORS: Final = "model.safetensors"
 """File of a model beside `model.json`."""
@@ -122,12 +126,11 @@ def read_description(folder: Path) -> Page:
         ModelFileError: the file is missing, damaged, or of another version.
     """
     path = folder / DESCRIPTION
-    try:
-        page = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ModelFileError(f"{path}: does not exist; `dorothie-gym train-rl --out {folder}` makes one") from None
-    except json.JSONDecodeError as error:
-        raise ModelFileError(f"{path}, line {error.lineno}: {error.msg}") from None
+    with raising(ModelFileError):
+        try:
+            page = read_json(path, MAX_MODEL_JSON)
+        except FileNotFoundError:
+            raise ModelFileError(f"{path}: does not exist; `dorothie-gym train-rl --out {folder}` makes one") from None
     if not isinstance(page, dict) or page.get("format") != MODEL_FORMAT:
         raise ModelFileError(f"{path}: format is not {MODEL_FORMAT}; the model is of another version of dorothie_gym")
     return page
@@ -142,9 +145,19 @@ def restore(model: Model, folder: Path) -> None:
     page = read_description(folder)
     path = folder / TENSORS
     try:
+        check_file(path, MAX_WEIGHTS)
         tensors = load_file(path)
-    except (SafetensorError, OSError) as error:
-        raise ModelFileError(f"{path}: cannot be read ({error})") from None
+    except (SafetensorError, OSError, InputFileError) as error:
+        raise ModelFileError(f"{path}: cannot be read ({one_line(error)})") from None
+    if any(value.is_floating_point() and not bool(value.isfinite().all()) for value in tensors.values()):
+        raise ModelFileError(f"{path}: has a weight that is no finite number")
+    try:
+        _restore(model, page, tensors)
+    except (ValueError, RuntimeError, KeyError, TypeError, AttributeError, IndexError) as error:
+        raise ModelFileError(f"{path}: does not fit the environment or the network ({one_line(error)})") from None
+
+
+def _restore(model: Model, page: Page, tensors: Mapping[str, torch.Tensor]) -> None:
     variables = {name.split("/", 1)[1]: value for name, value in tensors.items() if name.startswith("variables/")}
     parameters = {
         name: _optimiser(name, page["optimisers"], tensors)
@@ -152,10 +165,7 @@ def restore(model: Model, folder: Path) -> None:
         else _tensors_under(f"{name}/", tensors)
         for name in model.get_parameters()
     }
-    try:
-        model.set_parameters(parameters, exact_match=True, device="cpu")
-    except (ValueError, RuntimeError, KeyError) as error:
-        raise ModelFileError(f"{path}: does not fit the environment or the network ({error})") from None
+    model.set_parameters(parameters, exact_match=True, device="cpu")
     for name, value in _variables(model):
         value.data.copy_(variables[name])
     model.num_timesteps, model._n_updates = int(page["steps"]), int(page["updates"])
@@ -173,11 +183,43 @@ def load_model(folder: str | Path) -> tuple[Model, TrainingSettings]:
     """
     folder = Path(folder)
     folder = folder.parent if folder.is_file() else folder
-    settings = TrainingSettings(**read_description(folder)["settings"])
+    settings = read_settings(read_description(folder), TrainingSettings, folder)
     env = make_env(settings.env, settings.env_settings)
-    model = make_model(with_fitting_batches(settings, rows=1), env)
+    model = make_model(for_playing(settings), env)
     restore(model, folder)
     return model, settings
+
+
+def read_settings(page: Page, kind: type[Settings], folder: Path) -> Settings:
+    """Returns the settings in `model.json`.
+
+    Args:
+        page: content of the file.
+        kind: class of the settings.
+        folder: folder of the model.
+
+    Raises:
+        ModelFileError: a setting is missing, unknown, of another type or out of range, or asks for a network that is
+            larger than the weights in the folder.
+    """
+    with raising(ModelFileError):
+        settings = checked(page.get("settings"), kind, folder / DESCRIPTION)
+    weights = folder / TENSORS
+    wanted = 4 * sum(one * other for one, other in itertools.pairwise(settings.network))
+    if weights.is_file() and wanted > weights.stat().st_size:
+        raise ModelFileError(
+            f"{folder / DESCRIPTION}: field 'settings.network' is {list(settings.network)}, which asks for more "
+            f"weights than {TENSORS} has"
+        )
+    return settings
+
+
+def for_playing(settings: TrainingSettings) -> TrainingSettings:
+    """Returns settings with the smallest buffers, for a model that does not learn."""
+    parameters = dict(settings.parameters)
+    smallest = {"n_steps": 2, "batch_size": 2} if settings.algorithm in ON_POLICY else {"buffer_size": 1}
+    known = {name: value for name, value in smallest.items() if name in parameters or name == "buffer_size"}
+    return replace(settings, parameters={**parameters, **known})
 
 
 def with_fitting_batches(settings: TrainingSettings, rows: int) -> TrainingSettings:

@@ -13,7 +13,9 @@ from typing import Final, Generic, Self, TypeAlias, TypeVar
 import torch
 
 from dorothie_gym.baselines.rl.settings import Page
+from dorothie_gym.errors import ModelFileError, one_line
 from dorothie_gym.files import write_atomically
+from dorothie_gym.input_files import MAX_MODEL_JSON, parse_json, raising, read_text
 
 PROGRESS: Final = "progress.jsonl"
 """File of a run with a line for each evaluation."""
@@ -107,8 +109,13 @@ class Run(Generic[Evaluation]):
 
     def _read_rows(self, kind: type[Evaluation]) -> list[Evaluation]:
         path = self.folder / PROGRESS
-        lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-        return [kind.from_json(json.loads(line)) for line in lines]
+        with raising(ModelFileError):
+            lines = read_text(path, MAX_MODEL_JSON).splitlines() if path.exists() else []
+            pages = [parse_json(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1)]
+        try:
+            return [kind.from_json(page) for page in pages if isinstance(page, dict)]
+        except (KeyError, TypeError, ValueError) as error:
+            raise ModelFileError(f"{path}: is no learning curve of this version ({one_line(repr(error))})") from None
 
     def _write_rows(self) -> None:
         lines = "".join(json.dumps(row.as_json()) + "\n" for row in self.rows)

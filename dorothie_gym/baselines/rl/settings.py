@@ -10,7 +10,7 @@ from typing import Any, Final, Self, TypeAlias
 
 import yaml
 
-from dorothie_gym.errors import SettingsError, did_you_mean
+from dorothie_gym.errors import SettingsError, did_you_mean, short_repr
 
 Arguments: TypeAlias = Mapping[str, Any]
 """Keyword arguments of an environment or an algorithm, of any type; both check them."""
@@ -38,6 +38,15 @@ DEFAULT: Final = "default"
 
 FINAL_RATE: Final = "final_learning_rate"
 """Additional parameter: the learning rate falls linearly from `learning_rate` to this."""
+
+MAX_ENVIRONMENTS: Final = 4096
+"""Largest number of parallel environments."""
+
+MAX_LAYERS, MAX_WIDTH = 16, 8192
+"""Largest number of hidden layers, and of numbers in a layer."""
+
+MAX_PARAMETER: Final = 1e8
+"""Largest number among an algorithm's parameters, such as the size of a replay buffer."""
 
 RESUMABLE: Final = ("steps", "evaluate_every", "episodes", "workers")
 """Settings that may change when a run is resumed."""
@@ -74,6 +83,13 @@ class RunSettings:
         for name in ("steps", "environments", "evaluate_every", "episodes"):
             if not isinstance(getattr(self, name), int) or getattr(self, name) < 1:
                 raise SettingsError(f"{name} is {getattr(self, name)!r}; it must be a whole number of at least 1")
+        if self.environments > MAX_ENVIRONMENTS:
+            raise SettingsError(f"environments is {self.environments}; it must be in 1..{MAX_ENVIRONMENTS}")
+        if len(self.network) > MAX_LAYERS or not all(type(w) is int and 1 <= w <= MAX_WIDTH for w in self.network):
+            raise SettingsError(
+                f"network is {short_repr(self.network)}; it must be up to {MAX_LAYERS} widths in 1..{MAX_WIDTH}"
+            )
+        _check_parameters(self.parameters)
         if not 0 <= self.workers <= self.environments:
             raise SettingsError(f"workers is {self.workers}; it must be in 0..{self.environments}, the environments")
         if not 0 <= self.seed < 2**31:
@@ -93,6 +109,15 @@ class RunSettings:
                     f"{folder}: a run with another {name} is there ({same[name]}, not {value}); "
                     "choose another folder, or resume with the same settings"
                 )
+
+
+def _check_parameters(parameters: Arguments) -> None:
+    """Raises `SettingsError` for a parameter of the algorithm that is larger than any memory."""
+    for name, value in parameters.items():
+        if not isinstance(value, bool | str | int | float | list | tuple | None):
+            raise SettingsError(f"parameters.{name} is {short_repr(value)}; it must be a number, text or list")
+        if isinstance(value, int | float) and not abs(value) <= MAX_PARAMETER:
+            raise SettingsError(f"parameters.{name} is {short_repr(value)}; it must be at most {MAX_PARAMETER:g}")
 
 
 # --- Reinforcement learning -------------------------------------------------------------------------------------------

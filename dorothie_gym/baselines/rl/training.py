@@ -13,7 +13,7 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from dorothie_gym.baselines.learning_curves import draw_reward_curve
 from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, CriticWarmUp, clone, read_demonstrations
-from dorothie_gym.baselines.rl.checkpoint import Model, make_model, read_description, restore, save_model
+from dorothie_gym.baselines.rl.checkpoint import Model, make_model, read_description, read_settings, restore, save_model
 from dorothie_gym.baselines.rl.environments import EnvFactory, make_training_env
 from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics, evaluate_policy, greedy_policy
 from dorothie_gym.baselines.rl.run import (
@@ -97,7 +97,7 @@ class Training(Run[TrainingEvaluation]):
         self.cloned: CloningResult | None = None
         page = read_description(folder) if (folder / DESCRIPTION).is_file() else None
         if page is not None:
-            settings.check_resumable(TrainingSettings(**page["settings"]), folder)
+            settings.check_resumable(read_settings(page, TrainingSettings, folder), folder)
             self.rows = self._read_rows(TrainingEvaluation)
         folder.mkdir(parents=True, exist_ok=True)
         self._vector = make_training_env(settings, ray)

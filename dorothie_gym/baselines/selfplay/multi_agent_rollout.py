@@ -18,7 +18,8 @@ from dorothie_gym.baselines.rl.settings import Arguments, SelfPlaySettings
 from dorothie_gym.baselines.rl.vector_env import make_vector_env
 from dorothie_gym.baselines.selfplay.env import RoleLayout, SelfPlayEnv
 from dorothie_gym.baselines.selfplay.learner import Learner, make_network, sample_actions
-from dorothie_gym.errors import ModelFileError
+from dorothie_gym.errors import InputFileError, ModelFileError, one_line
+from dorothie_gym.input_files import MAX_WEIGHTS, check_file
 from dorothie_gym.ontology import AGENT_ROLES, Role
 
 AD_WIZARD: Final = AGENT_ROLES.index(Role.AD_WIZARD)
@@ -67,13 +68,14 @@ class OpponentPool:
         """Reads a saved pool; raises `ModelFileError` if it cannot be read."""
         path = folder / POOL_FILE
         try:
+            check_file(path, MAX_WEIGHTS)
             tensors = load_file(path)
-        except (SafetensorError, OSError) as error:
-            raise ModelFileError(f"{path}: cannot be read ({error})") from None
-        self._weights = [{} for _ in {name.split("/", 1)[0] for name in tensors}]
-        for name, value in tensors.items():
-            number, key = name.split("/", 1)
-            self._weights[int(number)][key] = value
+            self._weights = [{} for _ in {name.split("/", 1)[0] for name in tensors}]
+            for name, value in tensors.items():
+                number, key = name.split("/", 1)
+                self._weights[int(number)][key] = value
+        except (SafetensorError, OSError, InputFileError, ValueError, IndexError) as error:
+            raise ModelFileError(f"{path}: cannot be read ({one_line(error)})") from None
 
 
 # --- Rollouts ---------------------------------------------------------------------------------------------------------

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from dorothie_gym.baselines.rl.checkpoint import Model, read_description, restore
-from dorothie_gym.baselines.rl.settings import SelfPlaySettings, TrainingSettings
+from dorothie_gym.baselines.rl.checkpoint import Model, for_playing, read_description, read_settings, restore
+from dorothie_gym.baselines.rl.settings import MAX_WIDTH, SelfPlaySettings, TrainingSettings
 from dorothie_gym.baselines.selfplay.env import RoleLayout, make_interface, pad_masks, pad_vectors
 from dorothie_gym.baselines.selfplay.learner import make_network, sample_actions
 from dorothie_gym.baselines.selfplay.role_interface import AnyRoleInterface
-from dorothie_gym.errors import ModelFileError
+from dorothie_gym.errors import ModelFileError, one_line
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy
@@ -97,9 +97,11 @@ def read_policy(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:
         learned, size, actions = Role(page["role"]), int(page["size"]), int(page["actions"])
         if page["padded"] is not None:
             padded = int(page["padded"][0]), int(page["padded"][1])
-        settings: TrainingSettings = SelfPlaySettings(**page["settings"]).learner()
+        settings: TrainingSettings = for_playing(read_settings(page, SelfPlaySettings, folder).learner())
+    except ModelFileError:
+        raise
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise ModelFileError(f"{folder / DESCRIPTION}: is no model of self-play ({error!r})") from None
+        raise ModelFileError(f"{folder / DESCRIPTION}: is no model of self-play ({one_line(repr(error))})") from None
     if learned is not role:
         raise ModelFileError(f"{folder}: plays {learned}, not {role}")
     layout, index = RoleLayout.of(limits), AGENT_ROLES.index(role)
@@ -107,6 +109,10 @@ def read_policy(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:
         raise ModelFileError(
             f"{folder / DESCRIPTION}: takes {size} numbers and has {actions} actions, {role} has "
             f"{layout.sizes[index]} and {layout.actions[index]}: the model is of another version of dorothie_gym"
+        )
+    if padded is not None and not (size <= padded[0] <= MAX_WIDTH and actions <= padded[1] <= MAX_WIDTH):
+        raise ModelFileError(
+            f"{folder / DESCRIPTION}: field 'padded' is {list(padded)}; it must be at least {[size, actions]}"
         )
     torch.set_num_threads(1)  # small networks: more threads only wait for each other
     model = make_network(settings, *(padded or (size, actions)))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.learning_curves import draw_selfplay_curve
-from dorothie_gym.baselines.rl.checkpoint import read_description, restore, save_model
+from dorothie_gym.baselines.rl.checkpoint import read_description, read_settings, restore, save_model
 from dorothie_gym.baselines.rl.evaluation import FIRST_SEED, Act, EpisodeStatistics, evaluate_policy
 from dorothie_gym.baselines.rl.run import (
     CURVE,
@@ -106,7 +106,7 @@ class SelfPlayTraining(Run[SelfPlayEvaluation]):
         begun = (folder / AGENT_ROLES[AD_WIZARD] / DESCRIPTION).is_file()
         if begun:
             page = read_description(folder / AGENT_ROLES[AD_WIZARD])
-            settings.check_resumable(SelfPlaySettings(**page["settings"]), folder)
+            settings.check_resumable(read_settings(page, SelfPlaySettings, folder), folder)
         folder.mkdir(parents=True, exist_ok=True)
         self.rollout = MultiAgentRollout(settings, self._log_folder(), ray)
         try:

@@ -10,6 +10,8 @@ from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
 from dorothie_gym.benchmark.features import HISTORY, BatchSpec, HistorySizes
+from dorothie_gym.errors import InputFileError
+from dorothie_gym.input_files import checked
 
 
 class Channel(enum.StrEnum):
@@ -70,6 +72,30 @@ class LossWeights:
     action: float = 1.0
     angle: float = 1e-2
     belief: float = 1e-3
+
+
+MAX_SIZE: Final = 8192
+"""Largest width of a layer."""
+
+_RANGES: Final = (
+    *((name, 1, MAX_SIZE) for name in ("width", "feed_forward", "text_width", "lane_width", "id_width")),
+    *((name, 0, MAX_SIZE) for name in ("image_width", "sound_width")),
+    *((name, 1, 64) for name in ("layers", "heads", "map_heads", "text_layers")),
+    ("text_tokens", 1, 512),
+    ("vocabulary", 1, 1 << 16),
+    ("roads", 1, 1 << 16),
+    ("junctions", 1, 1 << 16),
+    ("batch_size", 1, 1 << 16),
+    ("patience", 1, 1 << 16),
+    ("min_epochs", 0, 1 << 20),
+    ("max_epochs", 1, 1 << 20),
+    ("dropout", 0.0, 0.999),
+    ("attention_dropout", 0.0, 0.999),
+    ("learning_rate", 0.0, 10.0),
+    ("weight_decay", 0.0, 10.0),
+    ("clip", 0.0, 1e6),
+)
+"""Least and greatest values of numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,6 +168,8 @@ class TOTOConfig(HistorySizes):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if min(self.heads, self.map_heads) < 1:
+            raise ValueError(f"TOTOConfig: heads {self.heads} and map_heads {self.map_heads} must be at least 1")
         if self.width % self.heads:
             raise ValueError(f"TOTOConfig.width is {self.width}; it must be a multiple of heads, {self.heads}")
         if self.width % 2:
@@ -154,9 +182,17 @@ class TOTOConfig(HistorySizes):
             raise ValueError("TOTOConfig.channels is empty; a model needs an input")
         if self.min_epochs > self.max_epochs:
             raise ValueError(f"TOTOConfig.min_epochs is {self.min_epochs}, above max_epochs, {self.max_epochs}")
-        for name in ("layers", "heads", "batch_size", "patience", "roads", "junctions", "max_epochs"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"TOTOConfig.{name} is {getattr(self, name)}; it must be at least 1")
+        if self.detector is not None and not all(0 < size <= MAX_SIZE for size in self.detector):
+            raise ValueError(f"TOTOConfig.detector is {self.detector}; both numbers must be in 1..{MAX_SIZE}")
+        for name, least, most in _RANGES:
+            if not least <= getattr(self, name) <= most:
+                raise ValueError(f"TOTOConfig.{name} is {getattr(self, name)}; it must be in {least:g}..{most:g}")
+
+    @property
+    def weights_at_least(self) -> int:
+        """Lower bound of the number of weights of a model: those of its largest layers."""
+        layer = 4 * self.width**2 + 2 * self.width * self.feed_forward
+        return self.layers * layer + self.id_width * (self.roads + self.junctions)
 
     @classmethod
     def paper(cls) -> Self:
@@ -208,15 +244,8 @@ class TOTOConfig(HistorySizes):
         """Reads what `to_json` returned.
 
         Raises:
-            ValueError: a field is unknown, missing or out of its range.
+            InputFileError: a field is unknown, missing, of another type or out of its range.
         """
-        known = dict(fields)
-        try:
-            if missing := {field.name for field in dataclass_fields(cls)} - set(known):
-                raise KeyError(*sorted(missing))
-            known["channels"] = tuple(Channel(name) for name in known["channels"])
-            known["detector"] = None if known["detector"] is None else tuple(known["detector"])
-            known["loss"] = LossWeights(**known["loss"])
-            return cls(**known)
-        except (KeyError, TypeError) as error:
-            raise ValueError(f"TOTOConfig: the fields do not fit this version: {error}") from None
+        if missing := sorted({field.name for field in dataclass_fields(cls)} - set(fields)):
+            raise InputFileError("TOTOConfig", f"the field {missing[0]!r} is missing; the model is of another version")
+        return checked(dict(fields), cls, "TOTOConfig")

@@ -24,16 +24,18 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.benchmark.features.column_checks import fault_in
 from dorothie_gym.benchmark.features.columns import GROUPS, NO_TEXT, Columns, SessionRows, TownGraph
 from dorothie_gym.benchmark.features.session_columns import SessionColumns, extract, town_graph
-from dorothie_gym.errors import FeatureStoreError, SessionError, TownError
+from dorothie_gym.errors import FeatureStoreError, SessionError, TownError, one_line
 from dorothie_gym.files import PART
+from dorothie_gym.input_files import ARRAY_ERRORS, MIB, checked, parse_json, raising, read_text
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.cache import compiler_digest
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import FOLDS, Corpus, CorpusEntry, Fold, Session
 from dorothie_gym.recording.file_names import ACTIONS_FILE
-from dorothie_gym.user_cache import cache_folder
+from dorothie_gym.user_cache import cache_folder, is_private, is_signed, make_private, sign
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -245,6 +247,12 @@ def _column(rows: Sequence[_Shifted], group: str, name: str) -> NDArray[np.gener
 
 INDEX_FILE: Final = "columns.json"
 
+SIGNATURE_FILE: Final = "columns.signature"
+"""File with the signature of the index, which holds the hashes of all other files."""
+
+MAX_INDEX: Final = 256 * MIB
+"""Largest index [bytes]; it holds every text of the corpus once."""
+
 EMPTY: Final = 128
 """Size of an empty `.npy` file, which is its header [bytes]."""
 
@@ -264,6 +272,10 @@ def recall(key: str) -> Columns | None:
     if folder is None:
         return None
     try:
+        index = (folder / key / INDEX_FILE).read_bytes()
+        signature = (folder / key / SIGNATURE_FILE).read_bytes()
+        if not is_private(folder / key) or not is_signed(index, signature, folder.parent):
+            raise FeatureStoreError(f"{folder / key}: was not written by this user")
         columns = read_columns(folder / key)
         os.utime(folder / key)
     except FileNotFoundError:
@@ -280,10 +292,11 @@ def keep(columns: Columns) -> None:
     if folder is None:
         return
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_private(folder)
         part = Path(tempfile.mkdtemp(prefix=f"{columns.key[:16]}.", suffix=PART, dir=folder))
         try:
             write_columns(columns, part)
+            (part / SIGNATURE_FILE).write_bytes(sign((part / INDEX_FILE).read_bytes(), folder.parent))
             _publish(part, folder / columns.key)
         finally:
             shutil.rmtree(part, ignore_errors=True)
@@ -337,20 +350,24 @@ def read_columns(folder: Path) -> Columns:
         OSError: a file cannot be read.
     """
     page = _page(folder / INDEX_FILE)
-    arrays = {name: _array(folder / f"{name}.npy", digest) for name, digest in page["files"].items()}
     try:
-        return _columns(page, arrays)
-    except (KeyError, TypeError) as error:
-        raise FeatureStoreError(f"{folder}: {error} is missing") from None
+        arrays = {name: _array(folder / f"{Path(name).name}.npy", digest) for name, digest in page["files"].items()}
+        columns = _columns(page, arrays)
+    except (KeyError, AttributeError, *ARRAY_ERRORS) as error:
+        raise FeatureStoreError(f"{folder}: is no entry of this version ({one_line(repr(error))})") from None
+    if fault := fault_in(columns):
+        raise FeatureStoreError(f"{folder}: {fault}")
+    return columns
 
 
 def _page(path: Path) -> dict[str, Any]:
-    digest, _, text = path.read_text(encoding="utf-8").partition("\n")
+    with raising(FeatureStoreError):
+        digest, _, text = read_text(path, MAX_INDEX).partition("\n")
     text = text.removesuffix("\n")
     if hashlib.sha256(text.encode()).hexdigest() != digest:
         raise FeatureStoreError(f"{path}: does not fit its checksum")
-    page: dict[str, Any] = json.loads(text)
-    return page
+    with raising(FeatureStoreError):
+        return checked(parse_json(text, path), dict[str, Any], path)
 
 
 def _array(path: Path, digest: str) -> NDArray[np.generic]:

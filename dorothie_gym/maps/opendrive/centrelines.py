@@ -9,6 +9,7 @@ import numpy as np
 
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.opendrive.parse import MAX_NUMBER
 from dorothie_gym.maps.opendrive.records import SIDEWALK_TYPES, OpenDriveRecords, RoadRecord
 from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
 
@@ -112,6 +113,8 @@ def _is_open(widths: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
 def _without_wedges(line: Array, at_start: bool, at_end: bool) -> Array:
     """Removes the samples at the ends of a centre line (n, 4) where the lane is still opening or already closing."""
     wide = np.flatnonzero(_is_open(line[:, 3]))
+    if not len(wide):  # a width that is no number
+        return line
     first, last = wide[0] if at_start else 0, wide[-1] if at_end else len(line) - 1
     kept = line[first : last + 1]
     return kept if np.hypot(*np.ptp(kept[:, :2], axis=0)) >= SHORTEST_LANE else line
@@ -119,6 +122,8 @@ def _without_wedges(line: Array, at_start: bool, at_end: bool) -> Array:
 
 def _fault(dense: Array) -> str:
     """Returns the reason why a centre line (n, 4) cannot be driven; empty if there is none."""
+    if not np.all(np.abs(dense) <= MAX_NUMBER):  # also for NaN
+        return "its centre line has a position that is no finite number; check geometry, offsets and widths"
     if np.hypot(*np.ptp(dense[:, :2], axis=0)) < SHORTEST_LANE / 2:
         return "its centre line shrinks to a point: the bend is too sharp for it"
     jump = float(np.max(np.hypot(*np.diff(dense[:, :2], axis=0).T)))

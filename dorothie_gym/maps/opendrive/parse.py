@@ -10,7 +10,8 @@ from typing import NoReturn, TypeAlias
 import numpy as np
 from lxml import etree
 
-from dorothie_gym.errors import TownError
+from dorothie_gym.errors import InputFileError, TownError, short_repr
+from dorothie_gym.input_files import MAX_OPENDRIVE, MAX_XML_ELEMENTS, read_file
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.geometry import (
     NO_CUBICS,
@@ -38,6 +39,9 @@ Element: TypeAlias = etree._Element
 
 # Metres per second of each unit; limits without a unit are in m/s (OpenDRIVE 1.4, section 5.3.2.2).
 SPEED_UNITS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
+
+# Largest magnitude of a number. Ids, angles and metres of real maps stay far below it.
+MAX_NUMBER = 2.0**40
 
 # Grouping elements, which names of elements omit.
 _GROUPS = ("left", "right", "center", "lanes", "planView", "signals", "objects")
@@ -72,10 +76,13 @@ class ElementReader:
         """Returns the root element; namespaces are removed from all names."""
         parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
         try:
-            text = Path(self.source).read_bytes()
-        except (OSError, ValueError) as error:  # ValueError: a null character in the path
-            reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-            raise TownError(self.source, "file", f"cannot be opened: {reason}") from error
+            text = read_file(Path(self.source), MAX_OPENDRIVE)
+        except OSError as error:
+            raise TownError(self.source, "file", f"cannot be opened: {error.strerror or error}") from error
+        except InputFileError as error:
+            raise TownError(self.source, "file", f"cannot be opened: {error.reason}") from None
+        if text.count(b"<") > MAX_XML_ELEMENTS or text.count(b"=") > 8 * MAX_XML_ELEMENTS:
+            raise TownError(self.source, "file", f"has more than {MAX_XML_ELEMENTS} elements; it is not read")
         try:
             root = etree.fromstring(text, parser)
         except etree.XMLSyntaxError as error:
@@ -110,17 +117,20 @@ class ElementReader:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
-            self.fail(element, f"attribute {name} must be a number, not {text!r}")
+        if not abs(value) <= MAX_NUMBER:
+            self.fail(element, f"attribute {name} must be a number up to {MAX_NUMBER:g}, not {short_repr(text)}")
         return value
 
     def integer(self, element: Element, name: str) -> int:
         """Returns a required integer."""
         text = self.text(element, name)
         try:
-            return int(text)
+            value = int(text)
         except ValueError:
-            self.fail(element, f"attribute {name} must be a whole number, not {text!r}")
+            value = None
+        if value is None or not abs(value) <= MAX_NUMBER:
+            self.fail(element, f"attribute {name} must be a whole number up to {MAX_NUMBER:g}, not {short_repr(text)}")
+        return value
 
     def cubics(self, parent: Element, path: str, start: str) -> Cubics:
         """Returns a profile: rows of start and four coefficients, sorted by start."""
@@ -133,7 +143,7 @@ class ElementReader:
             return None
         unit = element.get("unit") or "m/s"
         if unit not in SPEED_UNITS:
-            self.fail(element, f"attribute unit must be one of {', '.join(SPEED_UNITS)}, not {unit!r}")
+            self.fail(element, f"attribute unit must be one of {', '.join(SPEED_UNITS)}, not {short_repr(unit)}")
         limit = self.number(element, "max") * SPEED_UNITS[unit]
         return limit if limit > 0.0 else None
 
@@ -215,6 +225,9 @@ def _open_ring(corners: Array) -> Array:
 # Largest length of a road [m]; a longer one is an error that would exhaust memory.
 LONGEST_ROAD = 100_000.0
 
+# Largest length of all lanes [m], likewise. The roads of a CARLA map of 10 km x 10 km have 800 km of lanes.
+LONGEST_LANES = 4_000_000.0
+
 # Tolerance for the start of a lane section beyond the end of its road [m]: exporters round.
 ROUNDING = 0.1
 
@@ -244,6 +257,10 @@ class _Parser(ElementReader):
             roads[road.id] = road
         if not roads:
             self.fail(root, "has no roads; export the map again")
+        sections = (section for road in roads.values() for section in road.sections)
+        lanes = sum((section.end - section.start) * len(section.lanes) for section in sections)
+        if lanes > LONGEST_LANES:
+            self.fail(root, f"has {lanes / 1000:,.0f} km of lanes; at most {LONGEST_LANES / 1000:,.0f} km are read")
         junctions = {}
         for element in root.iterfind("junction"):
             connections = (self._connection(c, roads) for c in element.iterfind("connection"))

@@ -11,7 +11,8 @@ from typing import NoReturn
 
 import yaml
 
-from dorothie_gym.errors import TownError
+from dorothie_gym.errors import InputFileError, TownError
+from dorothie_gym.input_files import MAX_TOWN_YAML, read_file
 
 _NULL, _BOOL, _MERGE = (f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "merge"))
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")
@@ -192,8 +193,6 @@ def listed(names: Collection[str]) -> str:
 
 # --- Files -----------------------------------------------------------------------------------------------------------
 
-LARGEST_FILE = 1_000_000
-"""Largest size of a town file [bytes]: a city of 500 lanes takes 10 kB."""
 DEEPEST = 20
 """Largest nesting depth; the town language needs 7. libyaml overflows the process stack on deep nesting."""
 _UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
@@ -230,12 +229,9 @@ def _fail(source: str, line: int, reason: str) -> NoReturn:
 
 def _text(path: Path, source: str) -> str:
     try:
-        if path.exists() and not path.is_file():  # a pipe would wait for ever
-            what = "a directory" if path.is_dir() else "no regular file"
-            raise TownError(source, "file", f"cannot be read: it is {what}; name a town file (.yaml)")
-        if path.stat().st_size > LARGEST_FILE:
-            raise TownError(source, "file", f"is larger than {LARGEST_FILE // 1000} kB; name a town file (.yaml)")
-        data = path.read_bytes()
+        data = read_file(path, MAX_TOWN_YAML)
+    except InputFileError as error:
+        raise TownError(source, "file", error.reason) from None
     except OSError as error:
         raise TownError(source, "file", f"cannot be read ({error.strerror}); check the path") from error
     try:

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Final, TypeAlias
 
 from dorothie_gym.errors import SessionError
+from dorothie_gym.input_files import LONG_NUMBER, MAX_DEPTH, MAX_DIGITS, check_value_count, raising
 from dorothie_gym.recording.file_names import MAX_EVENTS, MAX_FRAME
-from dorothie_gym.recording.json_io import MAX_DEPTH, decode_text, read_bytes
+from dorothie_gym.recording.json_io import decode_text, read_bytes
 from dorothie_gym.recording.validation import ReadReport
 
 CONFIG_FILE: Final = "config.json"
@@ -91,14 +92,15 @@ def read_json(path: Path, report: ReadReport) -> object:
         raise SessionError(f"{path}: is empty")
     if text.lstrip().startswith("["):
         return read_list(path, report, text)
-    value, place = _decode(text, _skip(text, 0), path, "", report)
+    decode = _Decoder(text, path, report)
+    value, place = decode(_skip(text, 0), "")
     place = _skip(text, place)
     if place == len(text):
         return value
     items = [value]
     while place < len(text):
         _check_count(len(items), path)
-        item, place = _decode(text, place, path, f", item {len(items)}", report)
+        item, place = decode(place, f", item {len(items)}")
         items.append(item)
         place = _skip(text, place)
     report.repair(f"{path.name}: a row on each line was read as a list")
@@ -116,10 +118,11 @@ def read_list(path: Path, report: ReadReport, text: str | None = None) -> list[o
     if text[place : place + 1] != "[":
         raise SessionError(f"{path}: a JSON list is expected" + ("" if text.strip() else ", the file is empty"))
     items: list[object] = []
+    decode = _Decoder(text, path, report)
     place = _skip(text, place + 1)
     while text[place : place + 1] != "]":
         _check_count(len(items), path)
-        item, place = _decode(text, place, path, f", item {len(items)}", report)
+        item, place = decode(place, f", item {len(items)}")
         items.append(item)
         place = _skip(text, place)
         if text[place : place + 1] == ",":
@@ -231,21 +234,37 @@ def _skip(text: str, place: int) -> int:
     return match.end() if match else place
 
 
-def _decode(text: str, place: int, path: Path, item: str, report: ReadReport) -> tuple[object, int]:
-    bad: Counter[str] = Counter()
+class _Decoder:
+    """Decoder of the JSON values in a text; numbers that JSON or a session does not have become null."""
 
-    def note(name: str) -> None:
-        bad[name] += 1
+    def __init__(self, text: str, path: Path, report: ReadReport) -> None:
+        with raising(SessionError):
+            check_value_count(text, path)
+        self._text, self._path, self._report = text, path, report
+        self._bad: Counter[str] = Counter()
+        long = LONG_NUMBER.search(text) is not None
+        self._decoder = json.JSONDecoder(parse_constant=self._note, parse_int=self._whole if long else None)
 
-    decoder = json.JSONDecoder(parse_constant=note)
-    try:
-        value, end = decoder.raw_decode(text, place)
-    except json.JSONDecodeError as error:
-        raise SessionError(f"{path}, line {error.lineno}{item}: not JSON ({error.msg}); is the file cut off?") from None
-    except ValueError as error:  # a number of more digits than Python reads
-        raise SessionError(f"{path}{item}: not readable ({error})") from None
-    except RecursionError:
-        raise SessionError(f"{path}{item}: the JSON is nested too deeply to be read") from None
-    for name, count in bad.items():
-        report.repair(f"{path.name}: {name} was read as unknown", count)
-    return value, end
+    def __call__(self, place: int, item: str) -> tuple[object, int]:
+        """Returns the value at a place, and the place after it; `item` names the value in messages."""
+        where = f"{self._path}{item}"
+        try:
+            value, end = self._decoder.raw_decode(self._text, place)
+        except json.JSONDecodeError as error:
+            where = f"{self._path}, line {error.lineno}{item}"
+            raise SessionError(f"{where}: not JSON ({error.msg}); is the file cut off?") from None
+        except RecursionError:
+            raise SessionError(f"{where}: the JSON is nested too deeply to be read") from None
+        for name, count in self._bad.items():
+            self._report.repair(f"{self._path.name}: {name} was read as unknown", count)
+        self._bad.clear()
+        return value, end
+
+    def _note(self, name: str) -> None:
+        self._bad[name] += 1
+
+    def _whole(self, text: str) -> int | None:
+        if len(text) <= MAX_DIGITS:
+            return int(text)
+        self._note(f"a whole number of more than {MAX_DIGITS} digits")
+        return None

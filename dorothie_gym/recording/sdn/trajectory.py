@@ -217,7 +217,9 @@ def read_places(path: Path, report: ReadReport) -> CarPoses:
         if name not in names:
             shown = ", ".join(names)[:100]
             raise SessionError(f"{path}, line {start + 1}: the columns are {shown!r}; {name!r} is missing")
-    for name in names:
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise SessionError(f"{path}, line {start + 1}: the column {name[:40]!r} is there twice; keep one of them")
         if name not in CSV_COLUMNS:
             report.keep(f"{path.name}: column {name[:40]!r}")
     for name in _IDS:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import RolloutError
+from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
 from dorothie_gym.ontology import Role
 from dorothie_gym.rendering.charts import INK, dress_percent_axes, empty_figure
 from dorothie_gym.rollout.closed_loop.metrics import ClosedLoopMetric, RecoverySeconds
@@ -24,6 +24,7 @@ from dorothie_gym.rollout.closed_loop.results import (
     read_result,
 )
 from dorothie_gym.rollout.closed_loop.running import command_of, fold_of_towns
+from dorothie_gym.rollout.closed_loop.session_record import Amount
 from dorothie_gym.rollout.runner import COST_FILE
 
 if TYPE_CHECKING:
@@ -249,10 +250,9 @@ def _with_results(folders: Sequence[Path | str]) -> list[Path]:
 def _read(folder: Path) -> LeaderboardEntry:
     result = read_result(folder)
     file = folder / COST_FILE
-    try:
-        cost = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
-    except ValueError as error:
-        raise RolloutError(f"{file}: is not valid JSON ({error}); remove it, and run the rollout again") from None
+    with raising(lambda message: RolloutError(f"{message}; remove the file, and run the rollout again")):
+        page = read_json(file, MAX_SMALL_JSON) if file.exists() else {}
+        cost = checked(page, dict[str, Amount], file)
     return LeaderboardEntry(folder=folder, result=result, table=result.table(), cost=cost)
 
 

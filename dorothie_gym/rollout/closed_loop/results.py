@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, NotRequired, TypedDict
 
+from msgspec import Meta
 from rich.console import Console
 from rich.table import Table
 
 from dorothie_gym.analysis.intervals import CONFIDENCE, RESAMPLES
-from dorothie_gym.errors import RolloutError
+from dorothie_gym.errors import InputFileError, RolloutError
+from dorothie_gym.files import JsonValue
+from dorothie_gym.input_files import MAX_RESULT_JSON, checked, raising, read_json
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind
 from dorothie_gym.rollout.closed_loop.metrics import (
     BOOTSTRAP_SEED,
@@ -23,7 +25,7 @@ from dorothie_gym.rollout.closed_loop.metrics import (
     RecoverySeconds,
     figures_of,
 )
-from dorothie_gym.rollout.closed_loop.session_record import SessionRecord
+from dorothie_gym.rollout.closed_loop.session_record import SessionRecord, SessionRecordPage
 
 RESULT_FILE: Final = "rollout.json"
 """File of rows and table in the folder of a rollout."""
@@ -153,28 +155,73 @@ class RolloutResult:
         return {**found, NO_EXCEPTION: RolloutTable.of(free)} if free else found
 
 
-def result_from_json(page: Any, where: str) -> RolloutResult:
+class _RowPage(TypedDict):
+    """Row in JSON types; fields as of `RolloutRow`."""
+
+    number: Annotated[int, Meta(ge=0)]
+    town: str
+    seed: Annotated[int, Meta(ge=0)]
+    error: str | None
+    record: SessionRecordPage | None
+
+
+class _ConfigPage(TypedDict):
+    """Settings of the engine that tables and commands show."""
+
+    max_seconds: float
+    word_error_rate: float
+
+
+class _TrainingPage(TypedDict, total=False):
+    """Cost of the training of a learned player."""
+
+    steps: Annotated[float, Meta(ge=0)]
+    seconds: Annotated[float, Meta(ge=0)]
+
+
+class _SettingsPage(TypedDict):
+    """Output of `RolloutSettings.to_json`, as far as it is read."""
+
+    participant: str
+    co_wizard: str
+    ad_wizard: str
+    towns: list[str]
+    sessions_planned: Annotated[int, Meta(ge=1, lt=2**31)]
+    seed: Annotated[int, Meta(ge=0)]
+    config: _ConfigPage
+    training: NotRequired[dict[str, _TrainingPage]]
+
+
+class _ResultPage(TypedDict):
+    """Output of `RolloutResult.to_json`, as far as it is read; the tables follow from the rows."""
+
+    version: str
+    settings: _SettingsPage
+    rows: list[_RowPage]
+
+
+def result_from_json(page: JsonValue, where: str) -> RolloutResult:
     """Parses the output of `RolloutResult.to_json`; raises `RolloutError`, naming `where`, if it is malformed."""
-    try:
-        if str(page["version"]).split(".")[0] != RESULT_VERSION.split(".")[0]:
-            raise RolloutError(f"{where}: is of version {page['version']}; this package reads {RESULT_VERSION}")
-        settings = dict(page["settings"])
-        int(settings["sessions_planned"])
+    with raising(RolloutError):
+        version = page.get("version") if isinstance(page, Mapping) else None
+        if isinstance(version, str) and version.split(".")[0] != RESULT_VERSION.split(".")[0]:
+            raise RolloutError(f"{where}: is of version {version[:40]}; this package reads {RESULT_VERSION}")
+        try:
+            found = checked(page, _ResultPage, where)
+        except InputFileError as error:
+            raise RolloutError(f"{error}; give a {RESULT_FILE} from `dorothie-gym rollout --out`") from None
         rows = [
             RolloutRow(
-                number=int(row["number"]),
-                town=str(row["town"]),
-                seed=int(row["seed"]),
+                number=row["number"],
+                town=row["town"],
+                seed=row["seed"],
                 record=None if row["record"] is None else SessionRecord.from_json(row["record"]),
                 error=row["error"],
             )
-            for row in page["rows"]
+            for row in found["rows"]
         ]
-    except (KeyError, TypeError, AttributeError) as error:
-        raise RolloutError(
-            f"{where}: is not the result of a rollout ({type(error).__name__}: {error}); "
-            f"give a {RESULT_FILE} from `dorothie-gym rollout --out`"
-        ) from None
+    # With the settings that are not read here, such as the other ones of the engine.
+    settings = checked(page, dict[str, Any], where)["settings"]
     return RolloutResult(settings=settings, rows=tuple(rows))
 
 
@@ -188,12 +235,11 @@ def read_result(path: Path | str) -> RolloutResult:
         RolloutError: the file is missing or damaged.
     """
     file = Path(path) / RESULT_FILE if Path(path).is_dir() else Path(path)
-    if not file.is_file():
-        raise RolloutError(f"{file}: does not exist; write it with `dorothie-gym rollout --out`")
-    try:
-        page = json.loads(file.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise RolloutError(f"{file}: is not valid JSON ({error}); write it again with `dorothie-gym rollout`") from None
+    with raising(RolloutError):
+        try:
+            page = read_json(file, MAX_RESULT_JSON)
+        except FileNotFoundError:
+            raise RolloutError(f"{file}: does not exist; write it with `dorothie-gym rollout --out`") from None
     return result_from_json(page, str(file))
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from typing import Final, TypedDict
+from dataclasses import dataclass, field
+from typing import Annotated, Final, TypeAlias, TypedDict
 
 import numpy as np
+from msgspec import Meta
 
 from dorothie_gym.analysis.exception_attribution import MEETING_DISTANCE, kind_of, time_met
 from dorothie_gym.analysis.units import Units
 from dorothie_gym.dialogue.exchanges import ExchangeState
+from dorothie_gym.errors import RolloutError, short_repr
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import DialogueMove, ExceptionKind, ObjectClass
@@ -28,8 +30,26 @@ from dorothie_gym.rollout.closed_loop.task_progress import (
     without_reached,
 )
 
+Count: TypeAlias = Annotated[int, Meta(ge=0, lt=2**31)]
+"""Number in JSON."""
+
+Amount: TypeAlias = Annotated[float, Meta(ge=0.0, le=1e12)]
+"""Duration or length in JSON [s, m]."""
+
+Share: TypeAlias = Annotated[float, Meta(ge=0.0, le=1.0)]
+"""Share in JSON."""
+
 CLARIFICATIONS: Final = frozenset({DialogueMove.CONFUSE, DialogueMove.CLARIFY, DialogueMove.CHECK})
 """Moves that repair or check understanding (spec: metrics)."""
+
+
+class TalkPage(TypedDict):
+    """Counts of a session's dialogue in JSON types; fields as of `TalkRecord`."""
+
+    utterances: Count
+    exchanges: Count
+    abandoned: Count
+    clarifications: Count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,12 +68,17 @@ class TalkRecord:
     abandoned: int = 0
     clarifications: int = 0
 
-    def to_json(self) -> dict[str, int]:
+    def to_json(self) -> TalkPage:
         """Returns the fields in JSON types."""
-        return asdict(self)
+        return {
+            "utterances": self.utterances,
+            "exchanges": self.exchanges,
+            "abandoned": self.abandoned,
+            "clarifications": self.clarifications,
+        }
 
     @classmethod
-    def from_json(cls, row: Mapping[str, int]) -> TalkRecord:
+    def from_json(cls, row: TalkPage) -> TalkRecord:
         """Parses the output of `to_json`."""
         return cls(**row)
 
@@ -84,8 +109,8 @@ class MetExceptionPage(TypedDict):
     """Exception in JSON types; fields as of `MetException`."""
 
     kind: str
-    met: float | None
-    seconds: float | None
+    met: Amount | None
+    seconds: Amount | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,8 +133,11 @@ class MetException:
 
     @classmethod
     def from_json(cls, row: MetExceptionPage) -> MetException:
-        """Parses the output of `to_json`."""
-        return cls(kind=ExceptionKind[row["kind"].upper()], met=row["met"], seconds=row["seconds"])
+        """Parses the output of `to_json`; raises `RolloutError` if the kind is unknown."""
+        kind = ExceptionKind.__members__.get(row["kind"].upper())
+        if kind is None:
+            raise RolloutError(f"field 'kind' is {short_repr(row['kind'])}; it must be a kind of exceptions")
+        return cls(kind=kind, met=row["met"], seconds=row["seconds"])
 
 
 def met_exceptions(session: Session, town: Town) -> tuple[MetException, ...]:
@@ -227,16 +255,16 @@ _TOUCHED: Final = {ObjectClass.PEDESTRIAN: "pedestrian", ObjectClass.VEHICLES: "
 class SessionRecordPage(TypedDict):
     """Measures of one session in JSON types; fields as of `SessionRecord`."""
 
-    live: int
-    reached: int
+    live: Count
+    reached: Count
     success: bool
-    shortest: float | None
-    driven: float
-    completion: float | None
-    seconds: float
-    decisions: int
-    infractions: dict[str, int]
-    talk: dict[str, int]
+    shortest: Amount | None
+    driven: Amount
+    completion: Share | None
+    seconds: Amount
+    decisions: Count
+    infractions: dict[str, Count]
+    talk: TalkPage
     exceptions: list[MetExceptionPage]
 
 
@@ -289,7 +317,9 @@ class SessionRecord:
 
     @classmethod
     def from_json(cls, row: SessionRecordPage) -> SessionRecord:
-        """Parses the output of `to_json`; raises `KeyError` or `TypeError` for other input."""
+        """Parses the output of `to_json`; raises `RolloutError` if the fields contradict each other."""
+        if row["reached"] > row["live"]:
+            raise RolloutError(f"field 'reached' is {row['reached']}, more than the {row['live']} live subgoals")
         return cls(
             live=row["live"],
             reached=row["reached"],

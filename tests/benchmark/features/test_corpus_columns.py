@@ -99,7 +99,7 @@ def test_the_faster_of_two_processes_wins(corpus: Path) -> None:
 
 def test_pickled_objects_in_the_cache_are_refused(corpus: Path) -> None:
     build(corpus)
-    assert {path.suffix for path in entry().iterdir()} == {".npy", ".json"}
+    assert {path.suffix for path in entry().iterdir()} == {".npy", ".json", ".signature"}
     for path in entry().glob("*.npy"):
         assert np.load(path, allow_pickle=False).dtype.kind in "biuf"
 

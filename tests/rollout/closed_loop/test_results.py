@@ -55,9 +55,13 @@ def test_result_survives_its_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [('{"version": ', "is not valid JSON"), ("[]", "is not the result"), ('{"version": "1.0"}', "KeyError: 'settings'"),
-     ('{"version": "2.0"}', "is of version 2.0")],
-)  # fmt: skip
+    [
+        ('{"version": ', "not JSON"),
+        ("[]", "Expected `object`, got `array`; give a rollout.json"),
+        ('{"version": "1.0"}', "missing required field `settings`"),
+        ('{"version": "2.0"}', "is of version 2.0"),
+    ],
+)
 def test_other_files_are_rejected(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "rollout.json").write_text(text)
     with pytest.raises(RolloutError, match=message):
