@@ -41,6 +41,12 @@ SIMULATED = frozenset(
 _FOLDER = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Adds the size and the seed of the test of mutated files (`tests/malformed`)."""
+    parser.addoption("--malformed-files", type=int, default=0, help="number of mutated files; default: a few")
+    parser.addoption("--malformed-seed", type=int, default=0, help="seed of the mutations")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Points the package's cache at a folder of this run, which the parallel workers share."""
     if not hasattr(config, "workerinput"):

@@ -1,0 +1,392 @@
+"""Kinds of files that users provide: a sound original of each, and what the package does with it."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from tests.maps import opendrive_text as xodr
+from tests.maps.yaml_text import MIDTOWN
+from tests.recording.builders import write
+from tests.recording.dialogues import talk
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Kind of files.
+
+    Attributes:
+        make: writes a sound original into an empty folder.
+        read: reads what is in the folder, and uses it.
+        slow: whether a reading takes more than some hundredths of a second.
+    """
+
+    make: Callable[[Path], object]
+    read: Callable[[Path], object]
+    slow: bool = False
+
+
+# --- Sessions, corpora, predictions ----------------------------------------------------------------------------------
+
+
+def _release(folder: Path) -> None:
+    from tests.recording.sdn.builders import release
+
+    release(folder / "one")
+
+
+def _sample(folder: Path) -> None:
+    from tests.recording.sdn.builders import sample
+
+    sample(folder / "one")
+
+
+def _hub(folder: Path) -> None:
+    from tests.recording.sdn.builders import hub
+
+    hub(folder / "one")
+
+
+def _native(folder: Path) -> None:
+    from tests.recording.test_scene import record
+
+    write(folder / "one", talk(), config={"world": {"vehicles": 3}, "rewards": {"time": -0.1}, "max_seconds": 60.0})
+    record(folder / "two", finish=True)
+
+
+def _read_sessions(folder: Path) -> None:
+    from dorothie_gym.analysis.transcript import transcript_lines
+    from dorothie_gym.benchmark import labels_of
+    from dorothie_gym.benchmark.features import columns_of
+    from dorothie_gym.errors import DorothieGymError
+    from dorothie_gym.recording import Corpus, Session
+
+    labels_of(folder, "all")
+    for entry in Corpus.load(folder).entries:
+        try:
+            session = entry.load()
+        except DorothieGymError:
+            continue
+        session.check()
+        columns_of(session)
+        transcript_lines(session)
+        _replay_config(session)
+        saved = session.save(folder / ".saved" / entry.name)
+        assert Session.load(saved).events == session.events
+
+
+def _replay_config(session: object) -> None:
+    from dorothie_gym.errors import SessionError
+    from dorothie_gym.recording import Session
+    from dorothie_gym.rollout.replay import config_of
+
+    assert isinstance(session, Session)
+    try:
+        config_of(session.header)
+    except SessionError as error:
+        check_message(error)
+
+
+def _corpus(folder: Path) -> None:
+    from dorothie_gym.recording import Corpus
+    from tests.benchmark.corpora import corpus
+
+    Corpus.load(corpus(folder / "corpus", ("train", "test/seen"))).write_manifest()
+
+
+def _read_corpus(folder: Path) -> None:
+    from dorothie_gym.recording import Corpus
+
+    corpus = Corpus.load(folder / "corpus")
+    corpus.verify()
+    corpus.filter(exception="task")
+    corpus.filter(town="crossing")
+
+
+def _predictions(folder: Path) -> None:
+    from dorothie_gym.benchmark import labels_of, write_predictions
+    from tests.benchmark.corpora import corpus, oracle
+
+    labels = labels_of(corpus(folder / ".corpus", ("test/seen",)), "all")
+    write_predictions(folder / "p.parquet", oracle(labels), about={"encoder": "hashing", "sizes": [1, 2]})
+
+
+def _read_predictions(folder: Path) -> None:
+    from dorothie_gym.benchmark import evaluate_predictions, labels_of, read_about, read_predictions
+
+    path = folder / "p.parquet"
+    about = {str(path): read_about(path)}
+    evaluate_predictions(read_predictions(path), labels_of(folder / ".corpus", "all"), about=about).to_json()
+
+
+# --- Towns and storyboards -------------------------------------------------------------------------------------------
+
+
+def _yaml_town(folder: Path) -> None:
+    (folder / "midtown.yaml").write_text(MIDTOWN)
+
+
+def _opendrive_town(folder: Path) -> None:
+    profile = '<elevation s="0" a="1" b="0.01" c="0" d="0"/>'
+    signals = '<signals><signal s="90" t="-4" id="7" type="1000001" dynamic="yes" orientation="+"/></signals>'
+    crossing = '<objects><object type="crosswalk" id="3" s="50" t="0" length="3" width="8" hdg="0"/></objects>'
+    plan = xodr.geometry("<line/>", 60.0) + xodr.geometry('<arc curvature="0.01"/>', 40.0, s=60.0, x=60.0)
+    onward = '<successor elementType="road" elementId="2" contactPoint="start"/>'
+    sections = xodr.section(
+        0.0, xodr.lane(1), xodr.lane(-1, more=xodr.linked(after=-1)), xodr.lane(-2, kind="sidewalk")
+    )
+    second = (
+        xodr.geometry('<spiral curvStart="0" curvEnd="0.02"/>', 30.0, x=98.9, y=7.9, hdg=0.4)
+        + xodr.geometry('<poly3 a="0" b="0" c="0.001" d="0"/>', 20.0, s=30.0, x=127.0, y=22.0, hdg=0.7)
+        + xodr.geometry(
+            '<paramPoly3 aU="0" bU="20" cU="0" dU="0" aV="0" bV="0" cV="1" dV="0"/>', 20.0, s=50.0, x=142.0, y=35.0
+        )
+    )  # fmt: skip
+    text = xodr.opendrive(
+        xodr.road(1, plan=plan, sections=sections, link=onward, profile=profile, more=signals + crossing),
+        xodr.road(2, length=70.0, plan=second, offset='<laneOffset s="0" a="0.1" b="0" c="0" d="0"/>'),
+        '<junction id="5"><connection id="0" incomingRoad="1" connectingRoad="2" contactPoint="start">'
+        '<laneLink from="-1" to="-1"/></connection></junction>',
+    )
+    (folder / "town.xodr").write_text(text)
+
+
+def _read_town(folder: Path) -> None:
+    from dorothie_gym.maps import describe, load_town
+    from dorothie_gym.maps.lint import check_town
+    from dorothie_gym.sim.network.network import TownNetwork
+    from dorothie_gym.sim.state.town_arrays import town_arrays
+
+    for path in sorted(folder.iterdir()):
+        town = load_town(path)
+        describe(town)
+        check_town(town)
+        town_arrays(TownNetwork(town))
+
+
+def _storyboard(folder: Path) -> None:
+    from dorothie_gym.tasks import parsing
+
+    text = (Path(parsing.__file__).parent / "data/storyboards/low_battery.json").read_text()
+    (folder / "errand.json").write_text(json.dumps(parsing.read_json(text, "errand")))
+
+
+def _read_storyboard(folder: Path) -> None:
+    from dorothie_gym.maps import load_town
+    from dorothie_gym.tasks import bind, load_template
+
+    for path in sorted(folder.iterdir()):
+        bind(load_template(path), load_town("brookside").sites, np.random.default_rng(0))
+
+
+# --- Rollouts --------------------------------------------------------------------------------------------------------
+
+
+def _rollout(folder: Path) -> None:
+    from dorothie_gym import __version__
+    from dorothie_gym.ontology import ExceptionKind, Role
+    from dorothie_gym.policies import ALL_SCRIPTED, Player
+    from dorothie_gym.recording import FORMAT_VERSION
+    from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutRow, RolloutSettings
+    from dorothie_gym.rollout.closed_loop.session_record import MetException
+    from tests.rollout.closed_loop.drives import record
+
+    player = Player(name="ppo", training={"steps": 50_000, "seconds": 1200.0})
+    made = RolloutSettings(cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, sessions=3)
+    met = MetException(kind=ExceptionKind.WEATHER, met=3.0, seconds=4.5)
+    rows = (
+        RolloutRow(number=0, town="brookside", seed=3, record=record(exceptions=(met,), infractions={"vehicle": 1})),
+        RolloutRow(number=1, town="brookside", seed=4, record=record(success=False, completion=None)),
+        RolloutRow(number=2, town="brookside", seed=5, error="RuntimeError: faint"),
+    )
+    (folder / "rollout.json").write_text(json.dumps(RolloutResult(settings=made.to_json(), rows=rows).to_json()))
+    (folder / "settings.json").write_text(
+        json.dumps({"package_version": __version__, "format_version": FORMAT_VERSION, "sessions_planned": 3})
+    )
+    (folder / "cost.json").write_text('{"wall_seconds": 100.0, "cpu_seconds": 180.0, "workers": 2}')
+
+
+def _read_rollout(folder: Path) -> None:
+    from rich.console import Console
+
+    from dorothie_gym.rollout.closed_loop.leaderboard import leaderboard_page, read_entries
+    from dorothie_gym.rollout.closed_loop.results import print_result
+    from dorothie_gym.rollout.folder import locked_folder
+
+    entries = read_entries([folder])
+    leaderboard_page(entries)
+    for entry in entries:
+        assert all(0.0 <= (figure["mean"] or 0.0) < 1e12 for figure in entry.table.figures.values())
+        print_result(entry.result, Console(file=io.StringIO()))
+    with locked_folder(folder, "settings.json", {"sessions_planned": 3}):
+        pass
+
+
+# --- Models ----------------------------------------------------------------------------------------------------------
+
+
+def _rl_model(folder: Path) -> None:
+    from dorothie_gym.baselines.rl.checkpoint import make_model, save_model
+    from dorothie_gym.baselines.rl.environments import make_env
+    from dorothie_gym.baselines.rl.settings import NAVIGATION, tuned_settings
+
+    given = {"max_seconds": 10.0, "traffic": "none", "guidance": "turns", "town": "brookside"}
+    settings = tuned_settings("maskable_ppo", NAVIGATION, env_settings=given, network=(8,))
+    save_model(make_model(settings, make_env(NAVIGATION, given)), settings, folder / "rl", 12.0)
+
+
+def _selfplay_model(folder: Path) -> None:
+    from dorothie_gym.baselines.rl.checkpoint import save_model
+    from dorothie_gym.baselines.rl.settings import SELFPLAY, selfplay_settings
+    from dorothie_gym.baselines.selfplay.env import RoleLayout
+    from dorothie_gym.baselines.selfplay.learner import make_network
+    from dorothie_gym.ontology import AGENT_ROLES, Role
+    from dorothie_gym.spaces import SpaceLimits
+
+    settings, layout, k = (
+        selfplay_settings(network=(8,)),
+        RoleLayout.of(SpaceLimits()),
+        AGENT_ROLES.index(Role.CO_WIZARD),
+    )
+    size, actions = layout.sizes[k], layout.actions[k]
+    fields = {
+        "kind": SELFPLAY,
+        "role": "co_wizard",
+        "size": size,
+        "actions": actions,
+        "padded": [size + 8, actions + 2],
+    }
+    save_model(make_network(settings.learner(), size + 8, actions + 2), settings, folder / "selfplay", 9.0, fields)
+
+
+def _benchmark_model(folder: Path) -> None:
+    import torch
+
+    from dorothie_gym.baselines.checkpoints import ModelCard, save, sha256_of
+    from dorothie_gym.baselines.encoders import text_encoder
+    from dorothie_gym.baselines.toto import TOTOConfig
+
+    path, encoder = folder / "benchmark", text_encoder("hashing")
+    save(path / "best.safetensors", torch.nn.Linear(800, 800), {"seed": 0})
+    ModelCard(
+        row="toto", config=TOTOConfig.small().to_json(), corpus="0" * 64, encoder="hashing", encoder_id=encoder.id,
+        spread=1.5, merges=((1, 2), (3, 4)), weights="best.safetensors",
+        weights_sha256=sha256_of(path / "best.safetensors"), steps=100, seconds=3.0,
+    ).write(path)  # fmt: skip
+
+
+def _read_model(folder: Path) -> None:
+    from dorothie_gym.ontology import Role
+    from dorothie_gym.policies import find_player
+    from dorothie_gym.spaces import SpaceLimits
+
+    for path in sorted(folder.iterdir()):
+        find_player(str(path), Role.CO_WIZARD).make(Role.CO_WIZARD, SpaceLimits())
+
+
+# --- Caches, with correct checksums ----------------------------------------------------------------------------------
+
+
+def _cache(folder: Path) -> None:
+    from dorothie_gym.benchmark.features import columns_of
+    from dorothie_gym.benchmark.features.corpus_columns import write_columns
+    from dorothie_gym.maps import load_town
+    from dorothie_gym.maps.cache import pack
+    from tests.recording.test_scene import record
+
+    with np.load(io.BytesIO(pack(load_town("brookside"), "key"))) as archive:
+        (folder / "document.json").write_bytes(archive["document"].tobytes())
+        np.save(folder / "floats.npy", archive["floats"])
+    (folder / "columns").mkdir()
+    write_columns(columns_of(record(folder / ".session", finish=True)), folder / "columns")
+    text = (folder / "columns/columns.json").read_text().partition("\n")[2]
+    (folder / "columns/columns.json").write_text(text)
+
+
+def _read_cache(folder: Path) -> None:
+    import hashlib
+
+    from dorothie_gym.benchmark.features import points
+    from dorothie_gym.benchmark.features.corpus_columns import read_columns
+    from dorothie_gym.errors import DorothieGymError
+    from dorothie_gym.recording import Task
+
+    try:
+        _unpack(folder)
+    except DorothieGymError as error:
+        check_message(error)
+    index = folder / "columns/columns.json"
+    try:
+        page = json.loads(index.read_bytes())
+        files = sorted((folder / "columns").glob("*.npy"))
+        page["files"] = {path.stem: hashlib.sha256(path.read_bytes()).hexdigest() for path in files if path.is_file()}
+        text = json.dumps(page).encode()
+    except (ValueError, TypeError, OSError):
+        text = index.read_bytes() if index.is_file() else b""
+    if not index.is_dir():
+        index.write_bytes(hashlib.sha256(text).hexdigest().encode() + b"\n" + text + b"\n")
+    columns = read_columns(folder / "columns")
+    for task in Task:
+        points(columns, task)
+
+
+def _unpack(folder: Path) -> None:
+    import hashlib
+    import zipfile
+
+    from dorothie_gym.maps import describe
+    from dorothie_gym.maps.cache import unpack
+    from dorothie_gym.sim.network.network import TownNetwork
+    from dorothie_gym.sim.state.town_arrays import town_arrays
+
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name in ("document", "floats"):
+            member = io.BytesIO()
+            path = folder / ("document.json" if name == "document" else "floats.npy")
+            content = path.read_bytes() if path.is_file() else b""
+            if name == "document":
+                np.save(member, np.frombuffer(content, np.uint8))
+                content = member.getvalue()
+            archive.writestr(f"{name}.npy", content)
+        archive.comment = bytes(64)
+    body = buffer.getvalue()[:-64]
+    town = unpack(body + hashlib.sha256(body).hexdigest().encode(), "key")
+    describe(town)
+    town_arrays(TownNetwork(town))
+
+
+SUBJECTS: Final = MappingProxyType(
+    {
+        "native": Subject(_native, _read_sessions),
+        "release": Subject(_release, _read_sessions),
+        "sample": Subject(_sample, _read_sessions),
+        "hub": Subject(_hub, _read_sessions),
+        "corpus": Subject(_corpus, _read_corpus),
+        "predictions": Subject(_predictions, _read_predictions),
+        "yaml": Subject(_yaml_town, _read_town, slow=True),
+        "opendrive": Subject(_opendrive_town, _read_town),
+        "storyboard": Subject(_storyboard, _read_storyboard),
+        "rollout": Subject(_rollout, _read_rollout),
+        "cache": Subject(_cache, _read_cache),
+        "rl": Subject(_rl_model, _read_model, slow=True),
+        "selfplay": Subject(_selfplay_model, _read_model, slow=True),
+        "benchmark": Subject(_benchmark_model, _read_model),
+    }
+)
+"""Kinds by name; folders and files that begin with a dot are not mutated."""
+
+
+def check_message(error: Exception) -> None:
+    """Raises `AssertionError` unless an error has a message of one line that can be read at once."""
+    text = str(error)
+    assert text and "\n" not in text.strip("\n") and len(text) < 1500, (
+        f"message of {type(error).__name__}: {text[:2000]!r}"
+    )
