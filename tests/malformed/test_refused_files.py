@@ -148,7 +148,7 @@ def test_replay_refuses_a_config_of_wrong_types(config: dict[str, Any], tmp_path
     made = session(talk(), town="brookside", config=config)
     with_decisions = Session(**{**vars(made), "decisions": (Decision(frame=15, actions={}),)})
     with_decisions.save(tmp_path / "one")
-    assert "config" in refusal("replay", tmp_path / "one")
+    assert "config" in refusal("replay", tmp_path / "one", "--check")
 
 
 @pytest.mark.parametrize(("field", "value"), [("seed", -1), ("seed", 1.5), ("seed", int(LONG[:60])), ("config", [])])
