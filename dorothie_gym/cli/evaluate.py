@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dorothie_gym.cli.options import Maps
-from dorothie_gym.cli.output import Facts, check_file, fail, print_json, reporting_errors, wide_stdout
+from dorothie_gym.cli.output import Facts, check_file, fail, print_json, reporting_errors, stderr, wide_stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.benchmark import CorpusLabels, ResultsTable, Split, TaskPredictions
@@ -96,12 +96,17 @@ def _floor(
     name: str, corpus: Corpus, labels: CorpusLabels, seeds: range, tasks: Sequence[Task], save: Path | None
 ) -> list[TaskPredictions]:
     from dorothie_gym.benchmark import labels_of, predict_floor, write_predictions
+    from dorothie_gym.benchmark.labels import ALL
     from dorothie_gym.errors import SessionError
 
     try:
         train = labels_of(corpus, "train")
     except SessionError as error:
-        fail(f"the trivial baseline {name} is fitted on the split train: {error}; or give a file of predictions")
+        if labels.split != ALL:
+            fail(f"the trivial baseline {name} is fitted on the split train: {error}; or give a file of predictions")
+        note = f"There is no split train: the trivial baseline {name} is fitted on the sessions that it is scored on."
+        stderr().print(note, soft_wrap=True, markup=False)
+        train = labels
     drawn = [given for seed in seeds for given in predict_floor(name, train, labels, seed)]
     wanted = [given for given in drawn if given.task in tasks]
     if save is not None:

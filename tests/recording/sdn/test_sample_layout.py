@@ -328,7 +328,10 @@ def test_audio_headers_give_durations_and_no_start_is_negative(tmp_path: Path) -
 # --- The whole command line -------------------------------------------------------------------------------------------
 
 
-def test_evaluate_runs_on_a_sample_session(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("folders", "options"), [(("train/s0", "test/seen/s1"), []), (("s1",), ["--split", "all"])], ids=["folds", "alone"]
+)
+def test_evaluate_runs_on_a_sample_session(tmp_path: Path, folders: tuple[str, ...], options: list[str]) -> None:
     log = [
         said(90, "wizard", "Which way?", "QueryW", "Action", "Queried"),
         said(60, "dorothy", "To the KFC.", "Instruct", "Landmark", {"asset": "static.prop.kfc"}),
@@ -337,8 +340,8 @@ def test_evaluate_runs_on_a_sample_session(tmp_path: Path) -> None:
         done(130, "physical", "JTurn", "RoadID", 5),
         done(250, "physical", "Stop"),
     ]
-    for folder in ("train/s0", "test/seen/s1"):
+    for folder in folders:
         session_folder(tmp_path / folder, log, all_marks())
-    result = CliRunner().invoke(app, ["evaluate", "--corpus", str(tmp_path), "--json"])
+    result = CliRunner().invoke(app, ["evaluate", "--corpus", str(tmp_path), *options, "--json"])
     assert result.exit_code == 0, result.output
-    assert json.loads(result.output)
+    assert json.loads(result.stdout)["nfd_points"] == 3
