@@ -73,6 +73,7 @@ class TeacherForcedEnv(PointEnv):
     - `split`: `"all"`, or the fold of the sessions: `"train"`, `"val"`, `"val_seen"`, `"val_unseen"`, `"test"`,
       `"test_seen"`, `"test_unseen"`.
     - `limits`: sizes of the observation tables.
+    - `strict`: whether RfN points hide the earlier acts of the Co-Wizard's own utterance; no effect on other tasks.
     - `render_mode`: None or `"ansi"`.
 
     `reset(options={"session": number or name})` selects the session, which is drawn at random otherwise; sessions
@@ -95,10 +96,11 @@ class TeacherForcedEnv(PointEnv):
         *,
         split: str = ALL,
         limits: SpaceLimits | None = None,
+        strict: bool = False,
         render_mode: str | None = None,
     ) -> None:
         super().__init__(self.of_task, limits, render_mode)
-        self._library = _Library(corpus, split, self.of_task, self.limits)
+        self._library = _Library(corpus, split, self.of_task, self.limits, strict)
         self._session: Session | None = None
         self._town: Town | None = None
         self._done: list[tuple[ActionMapping, Point]] = []
@@ -153,16 +155,17 @@ class _Library(Lookups):
         split: see there.
         task: task of the points.
         limits: largest numbers of landmarks and streets.
+        strict: as of `TeacherForcedEnv`.
     """
 
     LOOKED_UP: ClassVar[Sequence[str]] = ("read",)
 
     def __init__(
-        self, corpus: Corpus | Path | str | Sequence[Session], split: str, task: Task, limits: SpaceLimits
+        self, corpus: Corpus | Path | str | Sequence[Session], split: str, task: Task, limits: SpaceLimits, strict: bool
     ) -> None:
         if split not in (ALL, *SPLITS):
             raise ValueError(f"split is {split!r}; it must be one of {', '.join((ALL, *SPLITS))}")
-        self._task, self._limits = task, limits
+        self._task, self._limits, self._strict = task, limits, strict
         found = _sessions(corpus, split)
         self.names = [one.name for one in found]
         self._found = found
@@ -184,7 +187,7 @@ class _Library(Lookups):
         found = self._found[number]
         session = found if isinstance(found, Session) else found.load()
         _check_size(session, self._limits)
-        return session, task_points(session, self._task)
+        return session, task_points(session, self._task, strict=self._strict)
 
 
 def _sessions(corpus: Corpus | Path | str | Sequence[Session], split: str) -> Sequence[CorpusEntry | Session]:

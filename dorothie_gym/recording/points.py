@@ -6,8 +6,10 @@ This module alone states the rule; environments read it as a `PointView`, batche
 * An utterance, with its words and all of its moves, is visible if its last move was recorded strictly before the point.
   At an NfD point, utterances of the point's own time that precede it in the record are visible as well: an action may
   obey an utterance at once.
-* At a UfN point, the words of the current utterance and the moves of its earlier spans are visible. At an RfN point
-  nothing of the current utterance is, since its words give its moves away.
+* At a UfN point, the words of the current utterance and the moves of its earlier spans are visible.
+* At an RfN point, the earlier spans of the Co-Wizard's own utterance are visible with their words and moves; nothing of
+  its other spans is. Under the strict rule nothing of the utterance is visible: its spans then have equal inputs and
+  different labels.
 * Hidden landmarks, which the car does not know, are never visible.
 """
 
@@ -131,7 +133,7 @@ class VisibleRows:
 
 
 def visible_rows(times: RecordTimes, task: Task, points: Moments, events: ArrayLike) -> VisibleRows:
-    """Returns the rows that are visible at points of a task; for UfN see also `earlier_spans`.
+    """Returns the rows that are visible at points of a task; for UfN and RfN see also `earlier_spans`.
 
     Args:
         times: times of the record.
@@ -205,7 +207,8 @@ class PointView:
         session: name of the session.
         frame: frame of the point.
         time: the same in seconds.
-        moves: past dialogue moves of both speakers, oldest first.
+        moves: past dialogue moves of both speakers, oldest first; spans of an utterance in progress (RfN) have the
+            words up to their end as `text`.
         actions: past physical actions, oldest first.
         car: the last recorded state of the car; None before the first.
         way: past states of the car, oldest first, every `WAY_STEP` frames back from `car`, which is the last; at most
@@ -233,6 +236,7 @@ class SessionHistory:
 
     Attributes:
         session: the session.
+        strict: whether RfN points hide the earlier spans of the Co-Wizard's own utterance.
         utterances: utterances of `SPEAKERS`, by the frame of their last move, then by their first event.
         moves: their moves, utterance by utterance.
         actions: the physical actions.
@@ -240,8 +244,8 @@ class SessionHistory:
         times: times of these rows in frames of the session.
     """
 
-    def __init__(self, session: Session) -> None:
-        self.session = session
+    def __init__(self, session: Session, *, strict: bool = False) -> None:
+        self.session, self.strict = session, strict
         said: Sequence[UtteranceRecord] = [said for said in session.utterances() if said.speaker in SPEAKERS]
         self.utterances = tuple(sorted(said, key=lambda said: (said.frame, said.moves[0].index)))
         self.moves = tuple(move for said in self.utterances for move in said.moves)
@@ -265,10 +269,12 @@ class SessionHistory:
         """
         seen = visible_rows(self.times, task, Moments.of_one_session(frame), [event])
         moves, utterance = self.moves[: int(seen.moves.stop[0])], ""
-        if task is Task.UFN and event in self._row_of_event:
-            row = self._row_of_event[event]
+        row = self._row_of_event.get(event)
+        if row is not None and task is not Task.NFD and not (task is Task.RFN and self.strict):
             spans = earlier_spans(self._utterance_of_move, row)
-            moves += self.moves[int(spans.start[0]) : row]
+            earlier = self.moves[int(spans.start[0]) : row]
+            moves += earlier if task is Task.UFN else tuple(_as_far_as_said(earlier, frame))
+        if row is not None and task is Task.UFN:
             utterance = self.moves[row].text
         way = self._way(int(seen.frames.stop[0]))
         return PointView(
@@ -302,6 +308,14 @@ class SessionHistory:
         rows = np.searchsorted(trajectory["frame"], wanted[wanted >= trajectory["frame"][0]])
         states = trajectory[list(_STATE)][rows].tolist()
         return tuple(CarState(**dict(zip(_STATE, state, strict=True))) for state in states)
+
+
+def _as_far_as_said(spans: Sequence[MoveRecord], frame: int) -> Iterator[MoveRecord]:
+    """Yields the earlier spans of an utterance in progress, each with the words up to its end."""
+    words = ""
+    for span in spans:
+        words = f"{words} {span.span}".strip()
+        yield replace(span, text=words, recognised=None, end=min(span.end, frame / FRAME_RATE))
 
 
 _STATE: Final = ("frame", "x", "y", "heading", "speed")
@@ -371,12 +385,18 @@ Point: TypeAlias = InferencePoint | DecisionPoint
 
 def ufn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
     """Yields a point for each flagged dialogue move of the participant, from event number `since` on."""
-    yield from _inference_points(session, Task.UFN, since)
+    yield from _inference_points(SessionHistory(session), Task.UFN, since)
 
 
-def rfn_points(session: Session, *, since: int = 0) -> Iterator[InferencePoint]:
-    """Yields a point for each flagged dialogue move of the Co-Wizard, from event number `since` on."""
-    yield from _inference_points(session, Task.RFN, since)
+def rfn_points(session: Session, *, since: int = 0, strict: bool = False) -> Iterator[InferencePoint]:
+    """Yields a point for each flagged dialogue move of the Co-Wizard, from event number `since` on.
+
+    Args:
+        session: the session.
+        since: number of the first event.
+        strict: whether the earlier spans of the Co-Wizard's own utterance are hidden.
+    """
+    yield from _inference_points(SessionHistory(session, strict=strict), Task.RFN, since)
 
 
 def nfd_points(session: Session, *, since: int = 0) -> Iterator[DecisionPoint]:
@@ -394,20 +414,19 @@ def nfd_points(session: Session, *, since: int = 0) -> Iterator[DecisionPoint]:
             )
 
 
-def _inference_points(session: Session, task: Task, since: int) -> Iterator[InferencePoint]:
-    history = SessionHistory(session)
-    for move in session.all_moves:
+def _inference_points(history: SessionHistory, task: Task, since: int) -> Iterator[InferencePoint]:
+    for move in history.session.all_moves:
         if move.index >= since and is_inference(move, task):
             yield InferencePoint(task=task, index=move.index, frame=move.frame, history=history, act=move.act)
 
 
-def task_points(session: Session, task: Task, *, since: int = 0) -> tuple[Point, ...]:
-    """Returns the points of a task in a session, from event number `since` on."""
+def task_points(session: Session, task: Task, *, since: int = 0, strict: bool = False) -> tuple[Point, ...]:
+    """Returns the points of a task in a session, from event number `since` on; `strict` as of `rfn_points`."""
     match task:
         case Task.UFN:
             return tuple(ufn_points(session, since=since))
         case Task.RFN:
-            return tuple(rfn_points(session, since=since))
+            return tuple(rfn_points(session, since=since, strict=strict))
         case Task.NFD:
             return tuple(nfd_points(session, since=since))
 

@@ -55,6 +55,7 @@ class TeacherForcing(PointEnv):
     - `task`: `Task` or its value: "ufn", "rfn", "nfd".
     - `policies`: policy of each role: "scripted" (default), "silent", "random", or a `Policy`.
     - `limits`: sizes of the observation tables; None for the sizes of the town.
+    - `strict`: whether RfN points hide the earlier acts of the Co-Wizard's own utterance; no effect on other tasks.
     - `render_mode`: None or "ansi".
 
     `reset(seed=...)` plays the same session as `DuoWizardEnv` and `play_session` with this seed. The infos hold
@@ -75,12 +76,13 @@ class TeacherForcing(PointEnv):
         *,
         policies: Mapping[Role | str, str | AnyPolicy] | None = None,
         limits: SpaceLimits | None = None,
+        strict: bool = False,
         render_mode: str | None = None,
     ) -> None:
         if task not in set(Task):
             raise ValueError(f"task is {str(task)!r}; it must be one of {', '.join(Task)}")
         super().__init__(Task(task), limits or env.limits, render_mode)
-        self.duo = env
+        self.duo, self._strict = env, strict
         self.policies = _cast(policies or {}, env)
         self._record: _Record
 
@@ -122,7 +124,8 @@ class TeacherForcing(PointEnv):
         asked = -1
         while True:
             if self._record.append():
-                for point in task_points(self._record.session(), self.task, since=asked + 1):
+                session = self._record.session()
+                for point in task_points(session, self.task, since=asked + 1, strict=self._strict):
                     asked = point.index
                     yield point
             if not self.duo.agents:

@@ -47,10 +47,28 @@ def test_ufn_sees_its_words_and_the_acts_of_earlier_spans_only() -> None:
     assert [move.act for move in points[2].view.moves] == [TO_KFC, OKAY, TURNING, YES]
 
 
-def test_rfn_sees_no_words_and_no_act_of_its_own_utterance() -> None:
+def test_rfn_sees_earlier_spans_of_its_utterance_as_far_as_they_were_said() -> None:
     points = list(rfn_points(session(talk())))
     assert [point.view.utterance for point in points] == ["", "", ""]
+    assert [move.act for move in points[0].view.moves] == [TO_KFC]
+    assert [move.act for move in points[1].view.moves] == [TO_KFC, OKAY]
+    assert [move.text for move in points[1].view.moves] == ["To the KFC please.", "Okay,"]
+
+
+def test_strict_rfn_sees_no_words_and_no_act_of_its_own_utterance() -> None:
+    points = list(rfn_points(session(talk()), strict=True))
     assert [move.act for move in points[1].view.moves] == [TO_KFC]
+
+
+def test_rfn_sees_no_time_after_its_point_where_spans_have_frames_of_their_own() -> None:
+    said = [
+        replace(event, frame=event.frame + 6 * k)
+        for k, event in enumerate(
+            utterance(60, Role.CO_WIZARD, 0, ("Okay,", OKAY), ("turning", TURNING), ("left.", STREET))
+        )
+    ]
+    for point in rfn_points(session(said)):
+        assert all(move.end <= point.view.time and move.recognised is None for move in point.view.moves)
 
 
 def test_nfd_point_sees_utterances_of_its_own_frame_that_precede_it() -> None:
@@ -65,7 +83,7 @@ def test_neither_the_point_nor_later_events_are_visible(task: Task) -> None:
     for point in task_points(session(talk()), task):
         view = point.view
         same_frame = [move for move in view.moves if move.frame == view.frame]
-        assert all(task is not Task.RFN and move.index < point.index for move in same_frame)
+        assert all(move.index < point.index for move in same_frame)
         assert all(move.frame < view.frame for move in view.moves if move not in same_frame)
         assert all(action.frame < view.frame for action in view.actions)
         assert view.car is not None and view.car.frame == view.frame - 1

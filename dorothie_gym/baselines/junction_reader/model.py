@@ -40,7 +40,7 @@ from dorothie_gym.baselines.toto.losses import angle_error
 from dorothie_gym.baselines.toto.model import TOTO, Tokens
 from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.toto.towns import POSITION_UNIT, Towns
-from dorothie_gym.benchmark.features import PARTICIPANT, Columns
+from dorothie_gym.benchmark.features import CO_WIZARD, PARTICIPANT, Columns
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
 
 WORD_BY_WORD: Final = 3
@@ -297,10 +297,10 @@ class JunctionReader(TOTO):
         return place, best > 0
 
     def _understood(self, inputs: Inputs) -> tuple[Tensor, Tensor]:
-        """Returns the mask of earlier acts of the current utterance (B, M), and the number of their pieces (B,)."""
+        """Returns the mask of earlier acts of the point's own utterance (B, M), and the number of their pieces (B,)."""
         now = (inputs["time"][:, None] - inputs["move_time"]).abs() < _SAME_TIME
-        spans = now & inputs["move_mask"] & (inputs["current_text"] >= 0)[:, None]
-        spans = spans & (inputs["move_speaker"] == PARTICIPANT)
+        speaker = torch.where(inputs["current_text"] >= 0, PARTICIPANT, CO_WIZARD)[:, None]  # of UfN, or of RfN
+        spans = now & inputs["move_mask"] & (inputs["move_speaker"] == speaker)
         taken = (self.pieces[inputs["move_text"]] != PAD).sum(-1)  # (B, M)
         return spans, (taken * spans).sum(1)
 

@@ -110,6 +110,7 @@ class TOTOConfig(HistorySizes):
         attention_dropout: share of the attention's weights that are dropped.
         channels: inputs of the model.
         current_text: whether the words of the current utterance are among the transcript.
+        strict: whether RfN points hide the earlier acts of the Co-Wizard's own utterance.
         belief: whether the model also predicts the car's next position and its goal.
         clock: origin of a token's time: the start of the "session", as published, or back from the
             "point". Tokens known from the start then have the session's time: both carry the same information.
@@ -141,6 +142,7 @@ class TOTOConfig(HistorySizes):
     attention_dropout: float = 0.1
     channels: tuple[Channel, ...] = ALL_CHANNELS
     current_text: bool = True
+    strict: bool = False
     belief: bool = False
     clock: Clock = "session"
     text: TextTraining = "frozen"
@@ -216,7 +218,7 @@ class TOTOConfig(HistorySizes):
     @property
     def spec(self) -> BatchSpec:
         """Sizes of the model's batches."""
-        return BatchSpec(**{name: getattr(self, name) for name in HISTORY})
+        return BatchSpec(**{name: getattr(self, name) for name in HISTORY}, strict=self.strict)
 
     def without(self, *channels: Channel) -> Self:
         """Returns the config of an ablation: without some inputs.
@@ -246,6 +248,7 @@ class TOTOConfig(HistorySizes):
         Raises:
             InputFileError: a field is unknown, missing, of another type or out of its range.
         """
-        if missing := sorted({field.name for field in dataclass_fields(cls)} - set(fields)):
+        known = {"strict": True, **fields}  # models without the field were trained so
+        if missing := sorted({field.name for field in dataclass_fields(cls)} - set(known)):
             raise InputFileError("TOTOConfig", f"the field {missing[0]!r} is missing; the model is of another version")
-        return checked(dict(fields), cls, "TOTOConfig")
+        return checked(known, cls, "TOTOConfig")

@@ -58,6 +58,7 @@ class BatchSpec(HistorySizes):
     Attributes:
         landmarks: landmarks (K).
         streets: streets (R).
+        strict: whether RfN points hide the earlier acts of the Co-Wizard's own utterance.
         paper_leak: whether the last move of a UfN point is the point's own label, as in the published features; only
             to measure the effect of that leak.
 
@@ -67,6 +68,7 @@ class BatchSpec(HistorySizes):
 
     landmarks: int = 10
     streets: int = 14
+    strict: bool = False
     paper_leak: bool = False
 
     def __post_init__(self) -> None:
@@ -95,7 +97,7 @@ class Batch:
         move: (B, M) id of the move, 0..14.
         move_speaker: (B, M) 0 participant, 1 Co-Wizard.
         move_slots: (B, M, 69) bool.
-        move_time: (B, M) when its utterance was over [s].
+        move_time: (B, M) when its utterance was over [s]; the time of the point for an utterance in progress.
         move_text: (B, M) words of the move.
         move_mask: (B, M).
         utterance_text, utterance_recognised: (B, U) its words; what was recognised.
@@ -218,6 +220,8 @@ def _moves(columns: Columns, table: PointTable, chosen: NDArray[np.int64], spec:
     spans, spans_stop = table.spans_start[chosen], table.spans_stop[chosen]
     if spec.paper_leak and table.task is Task.UFN:
         spans_stop = spans_stop + 1  # the point's own row follows
+    if spec.strict and table.task is Task.RFN:
+        spans_stop = spans
     past = (stop - start).astype(np.int64)
     total = past + spans_stop - spans
     place = np.maximum(total - spec.moves, 0)[:, None] + np.arange(spec.moves)
@@ -229,7 +233,7 @@ def _moves(columns: Columns, table: PointTable, chosen: NDArray[np.int64], spec:
         "move": _take(moves.move, rows, mask),
         "move_speaker": _take(moves.speaker, rows, mask),
         "move_slots": _take(moves.slots, rows, mask),
-        "move_time": _seconds(moves.tenth, rows, mask),
+        "move_time": _as_seconds(np.minimum(_take(moves.tenth, rows, mask), table.tenth[chosen][:, None])),
         "move_text": _take(moves.span_text, rows, mask, NO_TEXT),
         "move_mask": mask,
     }

@@ -31,7 +31,7 @@ class PointTable:
         row: row of the point itself in `Columns.moves` (UfN, RfN) or `Columns.actions` (NfD): its label, never input.
         handling: 0 nothing, 1 a task exception, 2 an environmental one (`Handled`).
         moves_start, moves_stop: visible rows of `Columns.moves`.
-        spans_start, spans_stop: further visible rows of it: earlier acts of the current utterance (UfN, else empty).
+        spans_start, spans_stop: further visible rows of it: earlier acts of the utterance of the point (NfD: none).
         utterances_start, utterances_stop: visible rows of `Columns.utterances`.
         actions_start, actions_stop: visible rows of `Columns.actions`.
         frames_start, frames_stop: visible rows of `Columns.frames`.
@@ -133,12 +133,13 @@ def _sessions_of(columns: Columns, fold: Fold | str | None) -> Flags:
 
 
 def _current(columns: Columns, task: Task, row: NDArray[np.int64]) -> dict[str, Any]:
-    """Returns the utterance to be understood and its earlier moves."""
-    if task is not Task.UFN:
-        nothing = np.zeros(len(row), dtype=np.int32)
+    """Returns the earlier moves of each point's own utterance, and the utterance itself where it is visible."""
+    nothing = np.zeros(len(row), dtype=np.int32)
+    if task is Task.NFD:
         return {"spans_start": nothing, "spans_stop": nothing, "current": nothing - 1}
     spans = earlier_spans(columns.moves.utterance, row)
-    return {"spans_start": spans.start, "spans_stop": spans.stop, "current": columns.moves.utterance[row]}
+    current = columns.moves.utterance[row] if task is Task.UFN else nothing - 1
+    return {"spans_start": spans.start, "spans_stop": spans.stop, "current": current}
 
 
 def _labels(columns: Columns, task: Task, row: NDArray[np.int64]) -> dict[str, Any]:

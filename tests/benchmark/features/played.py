@@ -13,7 +13,7 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, DialogueAct, DialogueMove, LandmarkName, PhysicalAction, Role, StreetName
 from dorothie_gym.policies import make_policy
-from dorothie_gym.recording import Event, EventType, SceneTable, Session
+from dorothie_gym.recording import Event, EventType, SceneTable, Session, Task
 from dorothie_gym.rollout import play_session
 from tests.recording.builders import physical, utterance
 
@@ -29,14 +29,13 @@ def play(folder: Path, *, seed: int = 0, seconds: float = 60.0, town: str = "bro
     return Session.load(folder)
 
 
-def with_another_future(session: Session, index: int, *, words: bool) -> Session:
+def with_another_future(session: Session, index: int, task: Task, *, strict: bool = False) -> Session:
     """Rewrites all that is recorded in or after the tenth of an event, the event itself too.
 
-    Args:
-        session: any.
-        index: number of the event.
-        words: whether the words of its utterance are known (UfN), and with them the acts of its earlier spans.
+    What the rule of the task shows stays: the words of the point's utterance and the acts of its earlier spans (UfN),
+    or those spans alone (RfN; under the strict rule not even they).
     """
+    words = task is Task.UFN
     point = session.events[index]
     first = point.frame - point.frame % 3
     events = []
@@ -45,6 +44,8 @@ def with_another_future(session: Session, index: int, *, words: bool) -> Session
             events.append(event)
         elif words and _said_together(event, point) and number <= index:
             events.append(event if number < index else _other_act(event))
+        elif task is Task.RFN and not strict and _said_together(event, point) and number < index:
+            events.append(replace(event, data={**event.data, "text": "other words", "end": 4242.0}))
         elif number < index and _heard_before(event, point):
             events.append(event)
         elif number <= index:
@@ -103,7 +104,7 @@ def _other(event: Event, point: Event | None) -> Event:
     if point is None:
         return Event(frame=event.frame, type=EventType.MESSAGE, source=Role.AD_WIZARD, data={"text": "other"})
     if event.type is EventType.DIALOGUE_MOVE:
-        return replace(_other_act(event), data={**_other_act(event).data, "text": "other words", "utterance": 4242})
+        return replace(_other_act(event), data={**_other_act(event).data, "text": "other words"})
     return replace(event, data={"action": PhysicalAction.U_TURN.label, "angle": None, "up": None})
 
 

@@ -23,7 +23,7 @@ def check(recorded: Session, task: Task, every: int = 1, spec: BatchSpec | None 
     table = points(columns, task)
     for row in range(0, len(table), every):
         index = int(table.event[row])
-        other = columns_of(with_another_future(recorded, index, words=task is Task.UFN))
+        other = columns_of(with_another_future(recorded, index, task, strict=spec is not None and spec.strict))
         again = points(other, task)
         (same,) = np.flatnonzero(again.event == index)
         np.testing.assert_equal(
@@ -37,6 +37,10 @@ def check(recorded: Session, task: Task, every: int = 1, spec: BatchSpec | None 
 @pytest.mark.parametrize("task", list(Task))
 def test_no_point_of_a_talk_sees_its_future(task: Task) -> None:
     assert check(session(talk()), task) >= 3
+
+
+def test_no_point_of_a_talk_sees_its_future_under_the_strict_rule() -> None:
+    assert check(session(talk()), Task.RFN, spec=BatchSpec(strict=True)) == 3
 
 
 def test_points_of_a_played_session_see_no_future(played: Session) -> None:
@@ -57,8 +61,7 @@ def test_no_observation_of_the_environments_shows_its_future(
     observation, _ = env.reset()
     for number in range(3):
         assert env._point is not None
-        words = env.task is Task.UFN
-        other = env_class([with_another_future(played, env._point.index, words=words)])
+        other = env_class([with_another_future(played, env._point.index, env.task)])
         again, _ = other.reset()
         for _ in range(number):
             again, *_ = other.step(other.action_space.sample())

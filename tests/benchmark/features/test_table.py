@@ -67,13 +67,23 @@ def test_ufn_sees_earlier_acts_of_the_utterance_and_the_paper_s_leak_its_own() -
     assert columns.texts[int(honest.current_text[0])] == "Yes, left on Fuller."
 
 
+def test_rfn_sees_earlier_acts_of_its_utterance_unless_the_rule_is_strict() -> None:
+    columns = columns_of(session(talk()))
+    table = points(columns, Task.RFN)
+    batch, strict = gather(columns, table, [1]), gather(columns, table, [1], BatchSpec(strict=True))
+    assert batch.move[0][batch.move_mask[0]].tolist() == [int(TO_KFC.move), int(OKAY.move)]
+    assert batch.move_time[0, 1] == batch.time[0] == 2.0
+    assert strict.move[0][strict.move_mask[0]].tolist() == [int(TO_KFC.move)]
+
+
+@pytest.mark.parametrize("strict", [False, True])
 @pytest.mark.parametrize("task", list(Task))
-def test_a_played_session_has_the_histories_of_its_views(played: Session, task: Task) -> None:
+def test_a_played_session_has_the_histories_of_its_views(played: Session, task: Task, strict: bool) -> None:
     """Two ways to the same: views of the session at 10 Hz, and rows of columns."""
     tenths = at_tenths(played)
-    columns, expected = columns_of(played), task_points(tenths, task)
+    columns, expected = columns_of(played), task_points(tenths, task, strict=strict)
     table = points(columns, task)
-    batch = gather(columns, table, np.arange(len(table)), BatchSpec(moves=99, actions=99))
+    batch = gather(columns, table, np.arange(len(table)), BatchSpec(moves=99, actions=99, strict=strict))
     assert table.event.tolist() == [point.index for point in expected] != []
     for row, view in enumerate(point.view for point in expected):
         assert batch.move[row][batch.move_mask[row]].tolist() == [int(move.act.move) for move in view.moves]
