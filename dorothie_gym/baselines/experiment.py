@@ -31,9 +31,12 @@ from dorothie_gym.benchmark import (
     labels_of,
     predict_floor,
     read_predictions,
+    score_task,
     write_predictions,
 )
 from dorothie_gym.benchmark.features import Columns, PointTable
+from dorothie_gym.benchmark.predictions import Predictions
+from dorothie_gym.benchmark.shallow_models import SHALLOW
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.files import write_atomically
 from dorothie_gym.input_files import MAX_MODEL_JSON, checked, raising, read_json
@@ -56,6 +59,7 @@ class Experiment:
         size: "small" or "paper".
         seed: seed of weights, order and dropout.
         out: parent of the folders of all trainings.
+        strict: whether RfN points hide the earlier acts of the Co-Wizard's own utterance.
     """
 
     corpus: Path
@@ -64,6 +68,7 @@ class Experiment:
     size: str
     seed: int
     out: Path
+    strict: bool = False
 
     @property
     def row(self) -> ModelEntry:
@@ -73,7 +78,7 @@ class Experiment:
     @property
     def folder(self) -> Path:
         """Folder of the training."""
-        return self.out / self.model / self.size / f"seed-{self.seed}"
+        return self.out / self.model / (f"{self.size}-strict" if self.strict else self.size) / f"seed-{self.seed}"
 
 
 def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambda epoch: None) -> dict[str, object]:
@@ -87,7 +92,9 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
     about = {"model": job.row.name, "version": __version__, **material.about()}
     if job.row.kind in ("ppo", "cloning"):
         return _run_policy(job, about)
-    model = make_model(job.row, job.size, material, job.seed)
+    if job.row.kind == "shallow":
+        return _run_shallow(job, material, about)
+    model = make_model(job.row, job.size, material, job.seed, strict=job.strict)
     spec = model.spec
     started = time.perf_counter(), time.process_time()
     trained = train(
@@ -111,7 +118,9 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
     rows = task_predictions(job, material.columns, material.tables(TEST), predicted)
     write_predictions(job.folder / PREDICTIONS_FILE, rows, about={**about, "config": model.config.to_json()})
     draw_loss_curves(trained.epochs, job.row.name, job.folder / CURVES_FILE)
-    result = {**about, **_training_facts(job, model, trained), "seconds": round(wall, 3), "cpu_seconds": round(cpu, 3)}
+    facts = _training_facts(job, model, trained)
+    validation = validation_scores(predict(model, material.examples(VALIDATION, spec)), material.tables(VALIDATION))
+    result = {**about, **facts, "validation": validation, "seconds": round(wall, 3), "cpu_seconds": round(cpu, 3)}
     write_atomically(kept, json.dumps(result, indent=1) + "\n")
     steps = trained.points * len(trained.epochs)
     _describe(job, model, material, steps=steps, seconds=round(wall, 3))
@@ -157,13 +166,9 @@ def _run_policy(job: Experiment, about: dict[str, object]) -> dict[str, object]:
 
     kept = job.folder / RESULT_FILE
     if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
-        done = _read_result(kept)
-        if done.get("corpus") != about["corpus"]:
-            message = f"{kept}: was trained on another corpus; choose another folder or delete it"
-            raise CheckpointError(message)
-        return done
+        return _earlier_result(kept, about)
     started = time.perf_counter()
-    predicted, facts = run_policy(job.corpus, job.row.kind, job.seed, job.folder, job.row.name)
+    predicted, facts = run_policy(job.corpus, job.row.kind, job.seed, job.folder, job.row.name, strict=job.strict)
     write_predictions(job.folder / PREDICTIONS_FILE, predicted, about=about)
     seconds = round(time.perf_counter() - started, 3)
     of = {"command": job.model, "size": job.size, "seed": job.seed, "folder": str(job.folder)}
@@ -172,34 +177,91 @@ def _run_policy(job: Experiment, about: dict[str, object]) -> dict[str, object]:
     return result
 
 
+def _run_shallow(job: Experiment, material: Dataset, about: dict[str, object]) -> dict[str, object]:
+    """Fits and tests the shallow models of all tasks, or reads an earlier result."""
+    kept = job.folder / RESULT_FILE
+    if (job.folder / PREDICTIONS_FILE).is_file() and kept.is_file():
+        return _earlier_result(kept, about)
+    job.folder.mkdir(parents=True, exist_ok=True)
+    started, columns = time.perf_counter(), material.columns
+    tables = [material.tables(fold) for fold in (TRAIN, VALIDATION, TEST)]
+    found: list[TaskPredictions] = []
+    validation: dict[str, float | None] = {}
+    for learned, checked, tested in zip(*tables, strict=True):
+        model = SHALLOW[job.row.command](job.seed, strict=job.strict)
+        model.fit(columns, learned, checked)
+        validation |= _scores(checked, model.predict(columns, checked))
+        found.append(_predictions_of(job, columns, tested, model.predict(columns, tested)))
+    write_predictions(job.folder / PREDICTIONS_FILE, found, about=about)
+    seconds = round(time.perf_counter() - started, 3)
+    of = {"command": job.model, "size": job.size, "seed": job.seed, "folder": str(job.folder)}
+    result = {**about, **of, "validation": validation, "seconds": seconds}
+    write_atomically(kept, json.dumps(result, indent=1) + "\n")
+    return result
+
+
+def _earlier_result(path: Path, about: dict[str, object]) -> dict[str, object]:
+    """Reads the result of an earlier run; raises `CheckpointError` if it is of another corpus."""
+    done = _read_result(path)
+    if done.get("corpus") != about["corpus"]:
+        raise CheckpointError(f"{path}: was trained on another corpus; choose another folder or delete it")
+    return done
+
+
 def task_predictions(
     job: Experiment, columns: Columns, tables: tuple[PointTable, ...], predicted: Predicted
 ) -> tuple[TaskPredictions, ...]:
     """Returns the predictions by task, in the form in which they are scored."""
-    found = []
+    return tuple(
+        _predictions_of(job, columns, table, answers)
+        for table, answers in zip(tables, _answers(tables, predicted), strict=True)
+    )
+
+
+def _answers(tables: Sequence[PointTable], predicted: Predicted) -> Iterator[Predictions]:
+    """Yields the predictions of each task's points, which follow each other in `predicted`."""
     start = 0
     for task, table in zip(TASKS, tables, strict=True):
         rows = slice(start, start + len(table))
         start += len(table)
-        names = np.array(columns.sessions.names)[table.session]
-        answers: ActionPredictions | ActPredictions
         if task is Task.NFD:
             angles = predicted.angle[rows].double().numpy()
-            answers = ActionPredictions(actions=predicted.action[rows].numpy(), angles=angles)
+            yield ActionPredictions(actions=predicted.action[rows].numpy(), angles=angles)
         else:
-            answers = ActPredictions(moves=predicted.move[rows].numpy(), slots=predicted.slots[rows].numpy())
-        found.append(
-            TaskPredictions(
-                model=job.row.name,
-                seed=job.seed,
-                task=task,
-                sessions=names,
-                events=table.event.astype(np.int64),
-                predicted=answers,
-                source=job.row.name,
-            )
+            yield ActPredictions(moves=predicted.move[rows].numpy(), slots=predicted.slots[rows].numpy())
+
+
+def _predictions_of(job: Experiment, columns: Columns, table: PointTable, answers: Predictions) -> TaskPredictions:
+    return TaskPredictions(
+        model=job.row.name,
+        seed=job.seed,
+        task=table.task,
+        sessions=np.array(columns.sessions.names)[table.session],
+        events=table.event.astype(np.int64),
+        predicted=answers,
+        source=job.row.name,
+    )
+
+
+def validation_scores(predicted: Predicted, tables: Sequence[PointTable]) -> dict[str, float | None]:
+    """Returns the metrics on the validation points by key; models are chosen by them, never by those of the test."""
+    scores: dict[str, float | None] = {}
+    for table, answers in zip(tables, _answers(tables, predicted), strict=True):
+        scores |= _scores(table, answers)
+    return scores
+
+
+def _scores(table: PointTable, answers: Predictions) -> dict[str, float | None]:
+    """Returns every metric of a task by its key; None if undefined."""
+    labels: Predictions
+    if table.task is Task.NFD:
+        labels = ActionPredictions(
+            actions=table.label_action.astype(np.int64), angles=table.label_angle.astype(np.float64)
         )
-    return tuple(found)
+    else:
+        labels = ActPredictions(moves=table.label_move.astype(np.int64), slots=table.label_slots)
+    found = score_task(table.task, answers, labels)
+    return {key: None if np.isnan(value) else round(float(value), 6) for key, value in found.items()}
 
 
 def _training_facts(job: Experiment, model: torch.nn.Module, trained: TrainingSummary) -> dict[str, object]:
@@ -294,10 +356,11 @@ def table_experiments(
     size: str = "small",
     seeds: int = 5,
     rows: Sequence[ModelEntry] = ROWS,
+    strict: bool = False,
 ) -> list[Experiment]:
     """Returns the trainings of a table, seed by seed: the first complete table exists after one seed."""
     return [
-        Experiment(corpus=corpus, encoder=encoder, model=row.command, size=size, seed=seed, out=out)
+        Experiment(corpus=corpus, encoder=encoder, model=row.command, size=size, seed=seed, out=out, strict=strict)
         for seed in range(seeds)
         for row in rows
         if not row.missing

@@ -27,7 +27,7 @@ from dorothie_gym.baselines.toto import (
 )
 from dorothie_gym.errors import did_you_mean
 
-Kind = Literal["toto", "reader", "ppo", "cloning"]
+Kind = Literal["toto", "reader", "ppo", "cloning", "shallow"]
 
 Change: TypeAlias = Callable[[TOTOConfig], TOTOConfig]
 
@@ -48,7 +48,8 @@ class ModelEntry:
         command: name on the command line and in paths.
         change: function from TOTO's config to the model's; None for a policy, and if it cannot be run.
         missing: reason why it cannot be run, or empty.
-        kind: "toto" (with ablations and rivals), "reader" (Junction Reader), or a policy by "ppo" or "cloning".
+        kind: "toto" (with ablations and rivals), "reader" (Junction Reader), a policy by "ppo" or "cloning", or
+            "shallow" (scikit-learn, see `dorothie_gym.benchmark.shallow_models`).
     """
 
     name: str
@@ -64,6 +65,10 @@ def _bert(config: TOTOConfig) -> TOTOConfig:
 
 def _without(name: str) -> Change:
     return lambda config: config.without(*ABLATIONS[name])
+
+
+def _without_utterance(config: TOTOConfig) -> TOTOConfig:
+    return replace(config.without(Channel.SPEECH), current_text=False)
 
 
 def _only(*channels: Channel) -> Change:
@@ -83,6 +88,8 @@ ROWS: Final[tuple[ModelEntry, ...]] = (
         ModelEntry(name=f"TOTO (- {name})", command=f"toto-no-{name.lower().replace(' ', '-')}", change=_without(name))
         for name in ABLATIONS
     ),
+    ModelEntry(name="TOTO (- Current Speech)", command="toto-no-current-speech", missing=NO_AUDIO),
+    ModelEntry(name="TOTO (- Current Utterance)", command="toto-no-current-utterance", change=_without_utterance),
     ModelEntry(
         name="Fine-tuned BERT Only",
         command="bert-trained",
@@ -99,11 +106,14 @@ ROWS: Final[tuple[ModelEntry, ...]] = (
         command="toto-point-clock",
         change=lambda config: replace(config, clock="point"),
     ),
+    ModelEntry(name="Boosted Trees (no words)", command="trees", kind="shallow"),
+    ModelEntry(name="TF-IDF Logistic Regression (words only)", command="tfidf", kind="shallow"),
     ModelEntry(name="Behaviour Cloning", command="cloning", kind="cloning"),
     ModelEntry(name="PPO", command="ppo", kind="ppo"),
     ModelEntry(name="Junction Reader (ours)", command="reader", change=reader_config, kind="reader"),
 )
-"""Models of the paper's table, in its order; then TOTO with another clock, policies, and the Junction Reader."""
+"""Models of the paper's table, in its order; then TOTO with another clock, shallow models, policies, and the Junction
+Reader. TOTO without the current utterance stands beside the paper's row without its sound."""
 
 
 class EpisodicTransformer(TOTO):
@@ -119,8 +129,8 @@ def find_row(name: str) -> ModelEntry:
     raise ValueError(f"there is no model {name!r}; {did_you_mean(name, commands)}choose from {', '.join(commands)}")
 
 
-def make_model(row: ModelEntry, size: str, material: Dataset, seed: int) -> TOTO:
-    """Returns a model with weights drawn from a seed.
+def make_model(row: ModelEntry, size: str, material: Dataset, seed: int, *, strict: bool = False) -> TOTO:
+    """Returns a model with weights drawn from a seed; `strict` as of `TOTOConfig`.
 
     Raises:
         ValueError: the size is unknown, or the model cannot be run.
@@ -128,9 +138,9 @@ def make_model(row: ModelEntry, size: str, material: Dataset, seed: int) -> TOTO
     if size not in SIZES:
         raise ValueError(f"there is no config {size!r}; choose from {', '.join(SIZES)}")
     if row.change is None:
-        raise ValueError(f"{row.name} is no model of its own: {row.missing or 'it is a policy'}")
+        raise ValueError(f"{row.name} is no torch model: {row.missing or f'its kind is {row.kind}'}")
     torch.manual_seed(seed)
-    return build_model(row, row.change(SIZES[size]()), material)
+    return build_model(row, replace(row.change(SIZES[size]()), strict=strict), material)
 
 
 def build_model(row: ModelEntry, config: TOTOConfig, material: Dataset, spread: float | None = None) -> TOTO:

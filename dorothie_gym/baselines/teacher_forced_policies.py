@@ -77,9 +77,9 @@ class TaskDemonstrations:
     events: NDArray[np.int64]
 
 
-def make_task(corpus: Path, task: Task, split: str) -> FlatTask:
+def make_task(corpus: Path, task: Task, split: str, *, strict: bool = False) -> FlatTask:
     """Returns the environment of a task over a fold of a corpus; raises `SessionError` if the fold has no point."""
-    return FlatTask(ENVS[task](corpus, split=split))
+    return FlatTask(ENVS[task](corpus, split=split, strict=strict))
 
 
 def demonstrate(env: FlatTask, sessions: int) -> TaskDemonstrations:
@@ -107,7 +107,7 @@ def demonstrate(env: FlatTask, sessions: int) -> TaskDemonstrations:
 
 
 def run_policy(
-    corpus: Path, kind: str, seed: int, folder: Path, name: str
+    corpus: Path, kind: str, seed: int, folder: Path, name: str, *, strict: bool = False
 ) -> tuple[tuple[TaskPredictions, ...], dict[str, Any]]:
     """Trains a policy for each task, and returns their predictions for the test sessions, and facts about the training.
 
@@ -117,6 +117,7 @@ def run_policy(
         seed: of weights and order.
         folder: gets the policies.
         name: of the row.
+        strict: whether RfN points hide the earlier acts of the Co-Wizard's own utterance.
 
     Raises:
         SessionError: the corpus cannot be read, or lacks a fold.
@@ -124,8 +125,8 @@ def run_policy(
     counts = {fold: len(Corpus.load(corpus).filter(fold=fold)) for fold in (TRAIN, VALIDATION, TEST)}
     found, facts = [], {}
     for task in ENVS:
-        env = make_task(corpus, task, TRAIN)
-        test = demonstrate(make_task(corpus, task, TEST), counts[TEST])
+        env = make_task(corpus, task, TRAIN, strict=strict)
+        test = demonstrate(make_task(corpus, task, TEST, strict=strict), counts[TEST])
         learner = PPO(
             "MlpPolicy", env, seed=seed, gamma=0.0, gae_lambda=0.0, n_steps=_ROLLOUT_STEPS,
             batch_size=_BATCH_SIZE, n_epochs=4, ent_coef=0.01, device="cpu",
@@ -136,7 +137,7 @@ def run_policy(
             learner.learn(PASSES * len(shown.labels))
             facts[task.value] = {"steps": int(learner.num_timesteps)}
         else:
-            validation = demonstrate(make_task(corpus, task, VALIDATION), counts[VALIDATION])
+            validation = demonstrate(make_task(corpus, task, VALIDATION, strict=strict), counts[VALIDATION])
             facts[task.value] = {"epochs": _clone(learner.policy, shown, validation, seed)}
         checkpoints.save(folder / f"{task.value}.safetensors", learner.policy, {"model": name, "seed": seed})
         found.append(_predictions(learner.policy, env, test, task, seed, name))

@@ -16,11 +16,11 @@ from dorothie_gym.benchmark.metrics import COLUMNS
 
 FULL: Final = "TOTO"
 NO_HISTORY: Final = "TOTO (- Action History)"
-NO_SPEECH: Final = "TOTO (- Current Speech)"
+NO_UTTERANCE: Final = "TOTO (- Current Utterance)"
 NO_MAP: Final = "TOTO (- Map Knowledge)"
 TUNED: Final = "Fine-tuned BERT Only"
 OTHER_ABLATIONS: Final = (
-    "TOTO (- GT Transcript)", "TOTO (- Object Detection)", "TOTO (- Vision History)", NO_SPEECH, NO_MAP,
+    "TOTO (- GT Transcript)", "TOTO (- Object Detection)", "TOTO (- Vision History)", NO_UTTERANCE, NO_MAP,
 )  # fmt: skip
 """The other ablations of TOTO."""
 
@@ -153,7 +153,8 @@ def findings(estimate: Estimates, part: str) -> tuple[ModelFinding, ...]:
         ModelFinding(
             statement="The current utterance matters for UfN",
             part=part,
-            claims=(claim("ufn_move_accuracy", FULL, NO_SPEECH),),
+            claims=(claim("ufn_move_accuracy", FULL, NO_UTTERANCE),),
+            note="The paper removes the sound of the utterance and keeps its words; here both are removed.",
         ),
         ModelFinding(
             statement="Fine-tuned BERT leads on moves and trails on NfD joint",

@@ -44,6 +44,9 @@ Encoder = Annotated[
 Out = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder of the trainings; a started training is resumed.")
 ]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Hide the earlier acts of the Co-Wizard's own utterance at RfN points.")
+]
 Workers = Annotated[
     int | None, typer.Option(min=1, max=256, help="Number of worker processes; default one per processor.")
 ]
@@ -62,6 +65,7 @@ def train(
     encoder: Encoder = "auto",
     out: Out = None,
     workers: Workers = None,
+    strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
     """Train a model with several seeds, test it, and print its scores.
@@ -76,7 +80,7 @@ def train(
         if row.missing:
             fail(f"{row.name} cannot be trained: {row.missing}")
         folder, where = _places(corpus, out)
-        jobs = table_experiments(folder, where, encoder=encoder, size=size, seeds=seeds, rows=[row])
+        jobs = table_experiments(folder, where, encoder=encoder, size=size, seeds=seeds, rows=[row], strict=strict)
         results = _run(jobs, workers, quiet=as_json)
         table, _ = gather_table(jobs, floors=False)
     if as_json:
@@ -101,6 +105,7 @@ def table(
     encoder: Encoder = "auto",
     out: Out = None,
     workers: Workers = None,
+    strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
     """Train all models that are not trained yet, and write the paper's results table with its figures beside ours.
@@ -117,7 +122,7 @@ def table(
 
         rows = ROWS if models == "all" else [find_row(name.strip()) for name in models.split(",")]
         folder, where = _places(corpus, out)
-        jobs = table_experiments(folder, where, encoder=encoder, size=size, seeds=seeds, rows=rows)
+        jobs = table_experiments(folder, where, encoder=encoder, size=size, seeds=seeds, rows=rows, strict=strict)
         results = _run(jobs, workers, quiet=as_json)
         made, predictions = gather_table(jobs)
         write_predictions(where / PREDICTIONS, predictions)

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from dorothie_gym.baselines.model_io import NFD, Outputs, allowed_angle, decode
-from dorothie_gym.baselines.model_zoo import ROWS
+from dorothie_gym.baselines.model_zoo import ROWS, find_row
 from dorothie_gym.baselines.toto import (
     ABLATIONS,
     ALL_CHANNELS,
@@ -146,11 +146,20 @@ def test_a_channel_that_is_taken_away_is_not_looked_at_and_one_that_is_given_is(
         assert same is not looks
 
 
-def test_without_speech_the_words_of_the_current_utterance_go_too():
-    model = make(TINY.without(*ABLATIONS["Current Speech"])).eval()
+def test_the_row_without_the_current_utterance_reads_it_in_no_form():
+    change = find_row("toto-no-current-utterance").change
+    assert change is not None
+    model = make(change(TINY)).eval()
+    given = samples.inputs()
+    changed = {name: (given[name] + 7) % samples.TEXTS for name in ("current_text", "current_recognised")}
+    torch.testing.assert_close(values(model({**given, **changed})), values(model(given)))
+
+
+def test_without_speech_the_words_of_the_current_utterance_stay():
+    model = make(TINY.without(Channel.SPEECH)).eval()
     given = samples.inputs()
     other = {**given, "current_text": (given["current_text"] + 7) % samples.TEXTS}
-    torch.testing.assert_close(values(model(other)), values(model(given)))
+    assert not torch.allclose(values(model(other)), values(model(given)))
 
 
 def test_without_vision_history_there_are_neither_images_nor_objects():

@@ -43,12 +43,10 @@ ABLATIONS: Final[Mapping[str, tuple[Channel, ...]]] = MappingProxyType(
         "GT Transcript": (Channel.TRANSCRIPT,),
         "Object Detection": (Channel.OBJECTS,),
         "Vision History": (Channel.VISION, Channel.OBJECTS),
-        "Current Speech": (Channel.SPEECH,),
         "Map Knowledge": (Channel.MAP, Channel.TRAJECTORY),
     }
 )
-"""Ablations of TOTO, by their names in the paper's table. Without Current Speech the words of the
-current utterance are left out as well if there is no sound (`TOTOConfig.current_text`)."""
+"""Inputs that ablations of TOTO remove, by their names in the paper's table."""
 
 TextTraining = Literal["frozen", "trained"]
 
@@ -221,13 +219,8 @@ class TOTOConfig(HistorySizes):
         return BatchSpec(**{name: getattr(self, name) for name in HISTORY}, strict=self.strict)
 
     def without(self, *channels: Channel) -> Self:
-        """Returns the config of an ablation: without some inputs.
-
-        Speech takes the current utterance's words along where there is no sound: they are the same utterance.
-        """
-        kept = tuple(channel for channel in self.channels if channel not in channels)
-        current = self.current_text and (Channel.SPEECH not in channels or self.sound_width > 0)
-        return replace(self, channels=kept, current_text=current)
+        """Returns the config without some inputs."""
+        return replace(self, channels=tuple(channel for channel in self.channels if channel not in channels))
 
     def only(self, channels: Iterable[Channel]) -> Self:
         """Returns the config with these inputs and no others."""

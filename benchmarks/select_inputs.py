@@ -1,0 +1,103 @@
+"""Trains the Junction Reader and TOTO without one input at a time, and scores them on the validation folds.
+
+Inputs and clocks are chosen by these figures. No test session is read. The models are those of `dorothie-gym train`.
+"""
+
+import json
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from statistics import fmean
+from typing import Annotated, Any
+
+import torch
+import typer
+
+from dorothie_gym.baselines.dataset import TRAIN, VALIDATION, Dataset
+from dorothie_gym.baselines.experiment import validation_scores
+from dorothie_gym.baselines.model_zoo import SIZES, build_model, find_row
+from dorothie_gym.baselines.toto import TOTOConfig
+from dorothie_gym.baselines.trainer import predict, train
+from dorothie_gym.benchmark import COLUMNS
+
+
+def _silent(name: str) -> Callable[[Any], None]:
+    """Returns a change of a model: the part of the readout that a layer adds is 0."""
+
+    def change(model: Any) -> None:
+        layer = getattr(model, name)
+        for weights in layer.parameters():
+            torch.nn.init.zeros_(weights)
+            weights.requires_grad_(False)
+
+    return change
+
+
+def _without_exits(model: Any) -> None:
+    exits = model._exits
+    model._exits = lambda inputs: (lambda tokens, there, *rest: (tokens, there & False, *rest))(*exits(inputs))
+
+
+def _without_words(model: Any) -> None:
+    model._words = lambda inputs: []
+
+
+def _without_mentions(model: Any) -> None:
+    named = model._named
+    model._named = lambda inputs: named(inputs) * 0.0
+
+
+VARIANTS: Mapping[str, tuple[str, Callable[[TOTOConfig], TOTOConfig], Callable[[Any], None]]] = {
+    "reader": ("reader", lambda config: config, lambda model: None),
+    "reader, session clock": ("reader", lambda config: replace(config, clock="session"), lambda model: None),
+    "reader - exits": ("reader", lambda config: config, _without_exits),
+    "reader - subwords": ("reader", lambda config: config, _without_words),
+    "reader - mentions of slot values": ("reader", lambda config: config, _without_mentions),
+    "reader - recent events": ("reader", lambda config: config, _silent("recent")),
+    "reader - state of the car": ("reader", lambda config: config, _silent("state")),
+    "reader - earlier spans": ("reader", lambda config: config, _silent("spans")),
+    "TOTO": ("toto", lambda config: config, lambda model: None),
+    "TOTO, point clock": ("toto", lambda config: replace(config, clock="point"), lambda model: None),
+}
+"""Row of the table, change of its config and change of the model, by name."""
+
+
+def main(
+    corpus: Annotated[Path, typer.Argument(help="folder of the corpus")],
+    seeds: Annotated[int, typer.Option(help="number of seeds")] = 2,
+    variants: Annotated[str, typer.Option(help="comma-separated names; by default all")] = "",
+    encoder: Annotated[str, typer.Option(help="text encoder")] = "auto",
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
+) -> None:
+    """Prints the validation metrics of each variant, mean over seeds [%]."""
+    torch.set_num_threads(1)
+    chosen = [name.strip() for name in variants.split(",")] if variants else list(VARIANTS)
+    material, found = Dataset.load(corpus, encoder), {}
+    if not as_json:
+        print(f"{'variant':36}", *(f"{column:>22}" for column in COLUMNS))
+    for name in chosen:
+        scores = [_score(name, material, seed) for seed in range(seeds)]
+        found[name] = {key: fmean(score[key] for score in scores) for key in COLUMNS}
+        if not as_json:
+            print(f"{name:36}", *(f"{100.0 * found[name][key]:22.1f}" for key in COLUMNS), flush=True)
+    if as_json:
+        print(json.dumps({"corpus": material.columns.content, "seeds": seeds, "validation": found}, indent=1))
+
+
+def _score(name: str, material: Dataset, seed: int) -> dict[str, float]:
+    command, reconfigured, changed = VARIANTS[name]
+    row = find_row(command)
+    assert row.change is not None
+    torch.manual_seed(seed)
+    model = build_model(row, reconfigured(row.change(SIZES["small"]())), material)
+    changed(model)
+    learned, checked = (material.examples(fold, model.spec) for fold in (TRAIN, VALIDATION))
+    with tempfile.TemporaryDirectory() as folder:
+        train(model, learned, checked, folder=Path(folder), seed=seed, about={"variant": name})
+    scores = validation_scores(predict(model, checked), material.tables(VALIDATION))
+    return {key: scores[key] or 0.0 for key in COLUMNS}
+
+
+if __name__ == "__main__":
+    typer.run(main)
