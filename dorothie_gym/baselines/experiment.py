@@ -118,9 +118,14 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
     rows = task_predictions(job, material.columns, material.tables(TEST), predicted)
     write_predictions(job.folder / PREDICTIONS_FILE, rows, about={**about, "config": model.config.to_json()})
     draw_loss_curves(trained.epochs, job.row.name, job.folder / CURVES_FILE)
-    facts = _training_facts(job, model, trained)
     validation = validation_scores(predict(model, material.examples(VALIDATION, spec)), material.tables(VALIDATION))
-    result = {**about, **facts, "validation": validation, "seconds": round(wall, 3), "cpu_seconds": round(cpu, 3)}
+    result = {
+        **about,
+        **_training_facts(job, model, trained),
+        "validation": validation,
+        "seconds": round(wall, 3),
+        "cpu_seconds": round(cpu, 3),
+    }
     write_atomically(kept, json.dumps(result, indent=1) + "\n")
     steps = trained.points * len(trained.epochs)
     _describe(job, model, material, steps=steps, seconds=round(wall, 3))
@@ -187,10 +192,10 @@ def _run_shallow(job: Experiment, material: Dataset, about: dict[str, object]) -
     tables = [material.tables(fold) for fold in (TRAIN, VALIDATION, TEST)]
     found: list[TaskPredictions] = []
     validation: dict[str, float | None] = {}
-    for learned, checked, tested in zip(*tables, strict=True):
+    for learned, tuned, tested in zip(*tables, strict=True):
         model = SHALLOW[job.row.command](job.seed, strict=job.strict)
-        model.fit(columns, learned, checked)
-        validation |= _scores(checked, model.predict(columns, checked))
+        model.fit(columns, learned, tuned)
+        validation |= _scores(tuned, model.predict(columns, tuned))
         found.append(_predictions_of(job, columns, tested, model.predict(columns, tested)))
     write_predictions(job.folder / PREDICTIONS_FILE, found, about=about)
     seconds = round(time.perf_counter() - started, 3)
