@@ -11,11 +11,8 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.ontology import Role
-from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.spaces import noop
+from dorothie_gym.compilation import compiled_folder
+from dorothie_gym.engine.warm_up import is_warm, warm_up
 from dorothie_gym.user_cache import CACHE_VARIABLE
 
 SIMULATED = frozenset(
@@ -51,6 +48,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """Points the package's cache at a folder of this run, which the parallel workers share."""
     if not hasattr(config, "workerinput"):
         config.stash[_FOLDER] = tempfile.TemporaryDirectory(prefix="dorothie_gym-")
+        folder = compiled_folder()
+        if folder is not None:
+            os.environ["NUMBA_CACHE_DIR"] = str(folder)  # machine code is named by its content: later runs reuse it
         os.environ[CACHE_VARIABLE] = config.stash[_FOLDER].name
 
 
@@ -65,7 +65,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 def compiled_simulation(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> None:
     """Compiles the simulation before the first test, one worker at a time.
 
-    With a cold numba cache this takes a minute or two. Time limits hold for the body of a test only
+    With a cold cache this takes a minute or two. Time limits hold for the body of a test only
     (`timeout_func_only`), so that no test fails because it happens to be the first. Workers take turns: the later ones
     find the machine code of the first in the cache.
     """
@@ -75,10 +75,8 @@ def compiled_simulation(tmp_path_factory: pytest.TempPathFactory, request: pytes
     shared = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
     with (shared / "compiling.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        env = DuoWizardEnv("brookside", config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)), max_cycles=4)
-        env.reset(seed=0)
-        while env.agents:
-            env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
+        if not is_warm():
+            warm_up()
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import pytest
 
-from dorothie_gym.compilation import allocating, compiled, inlined
+from dorothie_gym.compilation import allocating, cache, compiled, inlined
 
 
 @pytest.mark.parametrize("kind", [allocating, compiled, inlined])
@@ -33,33 +33,88 @@ def test_function_that_makes_arrays_needs_counts():
 
 
 @pytest.mark.parametrize("kind", [allocating, compiled, inlined])
-def test_unwritable_cache_falls_back_with_one_warning(monkeypatch, kind):
-    njit = numba.njit
+def test_unwritable_cache_costs_time_and_one_warning_but_no_result(monkeypatch, tmp_path, kind):
+    file = tmp_path / "file"
+    file.touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(file / "folder"))
+    monkeypatch.setattr(cache, "_warned", False)
 
-    def refusing(*args, cache=False, **options):
-        if cache:
-            return lambda function: (_ for _ in ()).throw(RuntimeError("cannot cache: no locator available for file"))
-        return njit(*args, **options)
+    @kind
+    def half(x):
+        return x / 2
 
-    monkeypatch.setattr(numba, "njit", refusing)
-    monkeypatch.setattr(sys.modules[compiled.__module__], "_warned", False)
-    with pytest.warns(RuntimeWarning, match="NUMBA_CACHE_DIR") as caught:
-        half = kind(lambda x: x / 2)
-    assert len(caught) == 1
-    assert half(3.0) == 1.5
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        compiled(lambda x: x)
-        allocating(lambda x: x)
+    @kind
+    def third(x):
+        return x / 3
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assert half(3.0) == 1.5
+        assert third(3.0) == 1.0
+    if not numba.config.DISABLE_JIT:
+        assert [warning.category for warning in caught] == [RuntimeWarning]
+        assert "NUMBA_CACHE_DIR" in str(caught[0].message)
 
 
-def test_other_errors_of_numba_are_not_hidden(monkeypatch):
-    def failing(**options):
-        raise RuntimeError("something else")
+CALLEE = """
+from dorothie_gym.compilation import compiled
 
-    monkeypatch.setattr(numba, "njit", failing)
-    with pytest.raises(RuntimeError, match="something else"):
-        compiled(lambda x: x)
+@compiled
+def factor(x):
+    {doc}
+    return {factor} * x
+"""
+
+CALLER = """
+import callee
+from dorothie_gym.compilation import compiled
+from callee import factor
+
+@compiled
+def square(x):
+    return factor(x) * x
+
+print(square(3), sum(square.stats.cache_hits.values()))
+"""
+
+
+def square(folder, *, factor, doc="'One.'", seconds):
+    """Writes the two files as of a moment [s], runs them, and returns the square and the loads from the cache."""
+    for name, text in {"callee": CALLEE.format(factor=factor, doc=doc), "caller": CALLER}.items():
+        (folder / f"{name}.py").write_text(text)
+        os.utime(folder / f"{name}.py", (seconds, seconds))
+    path = os.pathsep.join([str(folder), *filter(None, sys.path)])
+    environment = {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_DISABLE_JIT": "0"}
+    environment["PYTHONDONTWRITEBYTECODE"] = "1"
+    run = subprocess.run([sys.executable, "caller.py"], cwd=folder, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    result, loads = run.stdout.split()
+    return int(result), int(loads)
+
+
+def test_caller_of_a_changed_function_is_compiled_again(tmp_path):
+    assert square(tmp_path, factor=2, seconds=1000) == (18, 0)
+    assert square(tmp_path, factor=2, seconds=1000) == (18, 1)
+    assert square(tmp_path, factor=5, seconds=1000) == (45, 0)
+
+
+def test_only_content_decides_whether_a_function_is_compiled_again(tmp_path):
+    assert square(tmp_path, factor=2, seconds=1000) == (18, 0)
+    assert square(tmp_path, factor=2, seconds=2000) == (18, 1)
+    assert square(tmp_path, factor=2, doc="'Another docstring.'", seconds=3000) == (18, 1)
+
+
+def test_damaged_machine_code_is_compiled_again(tmp_path):
+    assert square(tmp_path, factor=2, seconds=1000) == (18, 0)
+    for file in (tmp_path / "cache").iterdir():
+        file.write_bytes(file.read_bytes()[:100])
+    assert square(tmp_path, factor=2, seconds=1000) == (18, 0)
+    assert square(tmp_path, factor=2, seconds=1000) == (18, 1)
+
+
+def test_folder_of_machine_code_is_private(tmp_path):
+    square(tmp_path, factor=2, seconds=1000)
+    assert (tmp_path / "cache").stat().st_mode & 0o077 == 0
 
 
 def test_network_answers_the_same_without_compilation():

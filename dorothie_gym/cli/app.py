@@ -21,6 +21,7 @@ from dorothie_gym.cli.sessions import compare, replay, show
 from dorothie_gym.cli.stats import stats
 from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl
+from dorothie_gym.cli.warm_up import warm_up
 
 app = typer.Typer(
     help="Simulation of situated dialogue between a passenger and a car that drives through a town, with an adversary.",
@@ -46,6 +47,7 @@ app.command()(show)
 app.command("train-rl")(train_rl)
 app.command()(train)
 app.command()(table)
+app.command("warm-up")(warm_up)
 
 
 def _print_version(wanted: bool) -> None:

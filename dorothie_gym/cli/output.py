@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -75,25 +74,6 @@ def reporting_errors() -> Iterator[None]:
         fail(str(error))
     except OSError as error:
         fail(f"{error.filename}: {error.strerror}; check the path" if error.filename else str(error))
-
-
-@contextmanager
-def compiling(after: float = 2.0) -> Iterator[None]:
-    """Prints a message on a terminal if the simulation has to be compiled first.
-
-    Args:
-        after: delay of the message [s].
-    """
-    console = stderr()
-    message = "compiling the simulation for this machine: once after an installation, about a minute ..."
-    timer = threading.Timer(after, lambda: console.print(message, style="dim"))
-    timer.daemon = True
-    if console.is_terminal:
-        timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
 
 
 def check_picture(path: Path) -> None:

@@ -18,13 +18,13 @@ from dorothie_gym.cli.output import (
     Facts,
     check_picture,
     check_video,
-    compiling,
     fail,
     print_json,
     reporting_errors,
     stderr,
     stdout,
 )
+from dorothie_gym.cli.warm_up import compile_first
 
 if TYPE_CHECKING:
     from dorothie_gym.cli.film import Film
@@ -136,15 +136,12 @@ def _check_outputs(plan: _Plan) -> None:
 def _play(plan: _Plan, *, quiet: bool) -> Facts:
     """Plays the session and returns what --json writes."""
     from dorothie_gym.engine.session_engine import SessionEngine
-    from dorothie_gym.ontology import AGENT_ROLES
     from dorothie_gym.rollout import play_session
-    from dorothie_gym.spaces import noop
 
     cast = find_cast(*plan.players)
-    with compiling():
-        engine = SessionEngine(plan.town, plan.storyboard, config=env_config(plan.max_seconds, plan.word_errors))
-        engine.reset(seed=plan.seed)
-        engine.step({str(role): noop(role, engine.limits) for role in AGENT_ROLES})
+    compile_first()
+    engine = SessionEngine(plan.town, plan.storyboard, config=env_config(plan.max_seconds, plan.word_errors))
+    engine.reset(seed=plan.seed)
     try:
         policies = {role: player.make(role, engine.limits) for role, player in cast.items()}
     except ValueError as error:

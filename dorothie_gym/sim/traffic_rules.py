@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.grid import CELL_REACH, SLACK
@@ -63,6 +64,7 @@ class FindingKind(enum.IntEnum):
     WRONG_WAY = 3
 
 
+@by_reference
 class WatchArrays(NamedTuple):
     """Arrays for watching a car.
 

@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
@@ -49,6 +50,7 @@ CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
 """Share of the signal left by a fault of the view: blur halves the sight."""
 
 
+@by_reference
 class SensorArrays(NamedTuple):
     """Arrays of a world that `seeing.see` takes; see `WorldArrays`."""
 

@@ -11,6 +11,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, concurrent, inlined
+from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.batch.threads import take
 from dorothie_gym.sim.batch.worlds import world_of
@@ -178,6 +179,7 @@ OBSERVED_BEHIND = 2.0 * CAR_LENGTH
 """Range of the observation behind without `see_behind` [m], `Road.close_objects_to`."""
 
 
+@by_reference
 class View(NamedTuple):
     """Settings of the observation.
 
@@ -314,6 +316,7 @@ class OutcomeRecord:
     crashed: Flag
 
 
+@by_reference
 class Egos(NamedTuple):
     """The egos of a batch of worlds; all but `beside`, `speeds` and `rows` have a row for each world.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 from numba import types
@@ -12,6 +12,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import WITHOUT_COUNTS, concurrent
+from dorothie_gym.compilation.by_reference import row_of
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.processors import available_processors
@@ -51,38 +52,17 @@ def put(batch: WorldArrays, number: int, world: WorldArrays) -> None:
 
 def world_of(batch: WorldArrays, number: int) -> WorldArrays:
     """Returns a world of a batch: views of its arrays, of the same types as those of a single world."""
-    return WorldArrays._make(_rows(batch, number))
-
-
-class _Stack(Protocol):
-    """Arrays of one name, one above the other along the axis of worlds."""
-
-    def __getitem__(self, number: int, /) -> object: ...
-
-
-def _rows(arrays: tuple[_Stack, ...], number: int) -> tuple[object, ...]:
-    return tuple(array[number] for array in arrays)
+    return WorldArrays._make(array[number] for array in batch)
 
 
 @overload(world_of, jit_options=INLINED)
 def _compiled_world_of(batch: types.Type, number: types.Type) -> Callable[..., WorldArrays]:
     # numba requires the same annotations as above
     def one(batch: types.Type, number: types.Type) -> WorldArrays:
-        return WorldArrays(*_rows(batch, number))  # type: ignore[arg-type]  # numba compiles no `_make`
+        world: WorldArrays = row_of(batch, number)
+        return world
 
     return one
-
-
-@overload(_rows, jit_options=INLINED)
-def _compiled_rows(arrays: types.BaseTuple, number: types.Type) -> Callable[..., tuple[object, ...]]:
-    # the items of a tuple are of several types: numba takes them one by one when it compiles
-    def last(arrays: types.BaseTuple, number: types.Type) -> tuple[object, ...]:
-        return (arrays[0][number],)
-
-    def first_and_others(arrays: types.BaseTuple, number: types.Type) -> tuple[object, ...]:
-        return (arrays[0][number], *_rows(arrays[1:], number))
-
-    return last if len(arrays) == 1 else first_and_others
 
 
 @concurrent

@@ -313,7 +313,18 @@ def _is_out_of_question(entry: CellEntryRecord, x: float, y: float, cos: float, 
 def _closest_of_all(
     town: TownArrays, x: float, y: float, heading: float, height: float
 ) -> tuple[int, float, float, int]:
-    """As `closest_lane`, by looking at every lane whose bounding box is near enough."""
+    """As `closest_lane`, of all lanes; at any height if no lane of the town is at this one."""
+    place = _closest_at(town, x, y, heading, height)
+    if place[0] == NOBODY:
+        place = _closest_at(town, x, y, heading, math.nan)
+    if place[0] == NOBODY:
+        raise ValueError("a body is nowhere: its position or heading is not a number")
+    return place
+
+
+@compiled
+def _closest_at(town: TownArrays, x: float, y: float, heading: float, height: float) -> tuple[int, float, float, int]:
+    """As `closest_lane`, by looking at every lane whose bounding box is near enough; NOBODY if none is that high."""
     found, best, rank = NOBODY, math.inf, 0
     station, lateral, segment = 0.0, 0.0, 0
     for number in range(len(town.lanes)):
@@ -327,8 +338,4 @@ def _closest_of_all(
         c = cost(town.points, lane, at, s, r, heading)
         if (c < best or (c == best and lane.rank < rank)) and is_level(town, lane, at, s, height):
             found, best, rank, station, lateral, segment = number, c, lane.rank, s, r, at
-    if found == NOBODY:
-        if math.isnan(height):
-            raise ValueError("a body is nowhere: its position or heading is not a number")
-        return _closest_of_all(town, x, y, heading, math.nan)  # no lane at this height in the whole town
     return found, station, lateral, segment

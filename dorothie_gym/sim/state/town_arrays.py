@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
 from dorothie_gym.maps.polyline import LaneTable
@@ -49,6 +50,7 @@ _CONTROLS = {
 }  # fmt: skip
 
 
+@by_reference
 @shared
 class TownArrays(NamedTuple):
     """A town in arrays; lanes have the town's own ids.
@@ -110,6 +112,30 @@ def town_arrays(network: TownNetwork) -> TownArrays:
     if found is None:
         found = _built[network] = _build(network)
     return found
+
+
+def empty_town() -> TownArrays:
+    """Returns the arrays of a town without lanes: examples of the types of all others."""
+    return TownArrays(
+        points=np.zeros((0, 6)),
+        lanes=empty_records(LaneRecord, 0),
+        neighbours=np.zeros(0, dtype=np.int32),
+        relations=np.zeros(0, dtype=np.uint8),
+        siblings=empty_records(SiblingRecord, 0),
+        programmes=empty_records(ProgrammeRecord, 0),
+        phase_ends=np.zeros(0),
+        colours=np.zeros(0, dtype=np.uint8),
+        origin=np.zeros(2),
+        cells=np.zeros((0, 0, 2), dtype=np.int32),
+        entries=empty_records(CellEntryRecord, 0),
+        walk_points=np.zeros((0, 6)),
+        walks=empty_records(WalkwayRecord, 0),
+        mouths=empty_records(MouthRecord, 0),
+        crossings=empty_records(CrossingRecord, 0),
+        passages=empty_records(PassageRecord, 0),
+        junctions=np.zeros((0, 3)),
+        flat=True,
+    )
 
 
 def _build(network: TownNetwork) -> TownArrays:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.state.codes import NOBODY, U_TURN
 from dorothie_gym.sim.state.records import (
@@ -44,6 +45,7 @@ STACK = 32
 """Size of the stack of searches along lanes."""
 
 
+@by_reference
 class WorldArrays(NamedTuple):
     """A world in arrays; copying the arrays copies the world.
 

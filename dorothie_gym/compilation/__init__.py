@@ -1,27 +1,27 @@
 """Compilation of the world's inner loops with numba.
 
-With ``NUMBA_DISABLE_JIT=1`` all functions stay plain Python. Compiled ones keep IEEE arithmetic (no fastmath), and
-their machine code is cached on disk. Where numba finds no folder to cache in, every process compiles them again,
-and one ``RuntimeWarning`` explains how to avoid it.
-
-numba recompiles a function when its own file changes, not when a compiled function that it calls does: after an edit of
-one delete the ``*.nbi`` files beside its callers (an installation renews all files at once).
+With ``NUMBA_DISABLE_JIT=1`` all functions stay plain Python. Compiled ones keep IEEE arithmetic (no fastmath). What
+Python calls is compiled as a whole (`dispatcher`), with large tuples of arrays passed by address (`by_reference`), and
+its machine code is kept in the user's cache folder under a hash of its content (`cache`). Where the folder cannot be
+written, every process compiles again, and one ``RuntimeWarning`` explains how to avoid it.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import TypeVar
 
-import numba
+from numba.core import config
+
+from dorothie_gym.compilation.cache import compiled_folder
+from dorothie_gym.compilation.dispatcher import CompiledFunction
+
+__all__ = ["WITHOUT_COUNTS", "CompiledFunction", "allocating", "compiled", "compiled_folder", "concurrent", "inlined"]
 
 F = TypeVar("F", bound=Callable[..., object])
 
 WITHOUT_COUNTS: dict[str, bool] = {"_nrt": False}
 """numba's option that turns reference counting off."""
-
-_warned = False
 
 
 def allocating(function: F) -> F:
@@ -53,25 +53,8 @@ def inlined(function: F) -> F:
 
 
 def _compile(function: F, **options: bool) -> F:
-    # numba's stubs know only some of the options
-    try:
-        cached: F = numba.njit(cache=True, fastmath=False, **options)(function)  # pyright: ignore[reportCallIssue, reportArgumentType]
-        return cached
-    except RuntimeError as error:
-        if "no locator available" not in str(error):
-            raise
-    _warn_once()
-    uncached: F = numba.njit(cache=False, fastmath=False, **options)(function)  # pyright: ignore[reportCallIssue, reportArgumentType]
-    return uncached
-
-
-def _warn_once() -> None:
-    global _warned
-    if not _warned:
-        _warned = True
-        warnings.warn(
-            "numba can write its cache neither beside the installed package nor in the home folder: the world is "
-            "compiled again in every process. Set NUMBA_CACHE_DIR to a writable folder.",
-            RuntimeWarning,
-            stacklevel=4,
-        )
+    if config.DISABLE_JIT:
+        return function
+    dispatcher = CompiledFunction(function, targetoptions={"nopython": True, "fastmath": False, **options})
+    dispatcher.enable_caching()
+    return dispatcher

@@ -1,0 +1,65 @@
+"""`dorothie-gym warm-up`: compilation of the simulation, for container images and continuous integration."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated
+
+import typer
+
+from dorothie_gym.cli.output import fail, print_json, stderr, stdout
+
+
+def warm_up(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+) -> None:
+    """Compile the simulation for this machine; later commands start at once."""
+    from dorothie_gym.compilation import compiled_folder
+
+    folder = compiled_folder()
+    if folder is None:
+        fail("caching is turned off (DOROTHIE_GYM_CACHE is empty): compiled functions would be lost; unset it")
+    begun = time.perf_counter()
+    compiled = compile_with_progress(everything=True)
+    seconds = round(time.perf_counter() - begun, 1)
+    if as_json:
+        print_json({"functions": compiled, "seconds": seconds, "folder": str(folder)})
+    elif compiled:
+        stdout().print(
+            f"Compiled {compiled} functions in {seconds:.0f} s; kept in {folder}", soft_wrap=True, markup=False
+        )
+    else:
+        stdout().print(f"Nothing to compile; all is in {folder}", soft_wrap=True, markup=False)
+
+
+def compile_first() -> None:
+    """Compiles what sessions need if it is not in the cache, with a progress bar on a terminal."""
+    from dorothie_gym.engine.warm_up import is_warm
+
+    if not is_warm():
+        compile_with_progress(everything=False)
+
+
+def compile_with_progress(*, everything: bool) -> int:
+    """Compiles with a progress bar on a terminal, see `engine.warm_up.warm_up`; returns the number of functions."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from dorothie_gym.engine.warm_up import warm_up
+
+    console, begun = stderr(), 0
+    columns = (
+        TextColumn("Compiling, once per machine"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("", total=None)
+
+        def show(name: str, done: int, planned: int) -> None:
+            nonlocal begun
+            begun = done
+            progress.update(bar, completed=done, total=planned, description=name)
+
+        warm_up(show, everything=everything)
+    return begun

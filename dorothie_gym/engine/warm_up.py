@@ -1,0 +1,184 @@
+"""Compilation of the simulation ahead of its use, in two processes where there are two processors.
+
+Half of the work is the loop over substeps (`sim.step.step`), which a second process compiles meanwhile; it leaves the
+machine code in the cache, where the first one finds it.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Final, TypeAlias
+
+import numpy as np
+from numba.core import event
+
+from dorothie_gym.compilation.dispatcher import CompiledFunction
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.maps import load_town
+from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.processors import available_processors
+from dorothie_gym.sim.batch.town_vector_env import TownVectorEnv
+from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
+from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.pedestrians.footways import closest_walk
+from dorothie_gym.sim.sensing.perception import look_around
+from dorothie_gym.sim.state.codes import Footway
+from dorothie_gym.sim.state.town_arrays import TownArrays, empty_town
+from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
+from dorothie_gym.sim.step import step
+from dorothie_gym.sim.town_env import TownEnv
+from dorothie_gym.spaces import noop
+
+TOWN: Final = "brookside"
+"""Town of the short session that is played; machine code is the same for all towns."""
+
+Progress: TypeAlias = Callable[[str, int, int], None]
+"""Called with the name of the function that is being compiled, and how many functions are begun of how many in all."""
+
+_HELPER: Final = """
+import signal
+signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
+import sys
+from dorothie_gym.engine.warm_up import compile_loops
+compile_loops(lambda name, *_: print(name, flush=True), everything=sys.argv[1:] == ["everything"])
+"""
+
+
+def is_warm() -> bool:
+    """Returns whether the loop over substeps needs no compilation."""
+    return not isinstance(step, CompiledFunction) or step.is_cached()
+
+
+def warm_up(progress: Progress | None = None, *, everything: bool = False) -> None:
+    """Compiles what sessions need and is not yet in the cache.
+
+    Args:
+        progress: called when the compilation of a function begins, perhaps in another thread.
+        everything: whether to compile what `Town-v0` and its vectorised form need, too.
+    """
+    with _reporting(progress) as report, _helper(report, everything) as wait:
+        engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
+        engine.reset(seed=0)
+        _compile_rare()
+        if everything:
+            _play(TownEnv())
+        wait()
+        engine.step({str(role): noop(role, engine.limits) for role in AGENT_ROLES})
+        if everything:
+            _play(TownVectorEnv(num_envs=2))
+
+
+def compile_loops(progress: Progress | None = None, *, everything: bool) -> None:
+    """Compiles the loop over substeps, and with `everything` the one of vectorised environments."""
+    with _reporting(progress):
+        town, world = _examples()
+        if isinstance(step, CompiledFunction):
+            step.compile_for(town, world, 1, 1.0 / FRAME_RATE)
+        if everything:
+            _play(TownVectorEnv(num_envs=2))
+
+
+def _examples() -> tuple[TownArrays, WorldArrays]:
+    town = empty_town()
+    return town, empty_world(town, vehicles=0, pedestrians=0)
+
+
+def _compile_rare() -> None:
+    """Compiles functions that the first seconds of a session may not call."""
+    town, world = _examples()
+    if isinstance(look_around, CompiledFunction) and isinstance(closest_walk, CompiledFunction):
+        look_around.compile_for(world, 0, np.zeros((0, 2)))
+        closest_walk.compile_for(town, Footway.STREET, 0.0, 0.0, 0.0)
+    TownNetwork(load_town(TOWN)).lane_of(0).local_coordinates(np.zeros(2))
+
+
+def _play(env: TownEnv | TownVectorEnv) -> None:
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    env.close()
+
+
+# --- Progress ---------------------------------------------------------------------------------------------------------
+
+
+class _Reports(event.Listener):
+    """Reports functions whose compilation begins, here or in the second process."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._planned = len(_compiled_functions())
+        self._begun: set[str] = set()
+        self._lock = threading.Lock()
+
+    def on_start(self, event: event.Event) -> None:
+        function = event.data["dispatcher"].py_func
+        self(f"{function.__module__}.{function.__qualname__}")
+
+    def on_end(self, event: event.Event) -> None:
+        """Ignores ends: functions are nested, and the name on display stays that of the last one begun."""
+
+    def __call__(self, name: str) -> None:
+        with self._lock:
+            self._begun.add(name)
+            done = len(self._begun)
+        self._progress(name.removeprefix("dorothie_gym."), done, max(self._planned, done))
+
+
+def _compiled_functions() -> set[str]:
+    """Returns the names of all compiled functions of the package that are imported."""
+    modules = [module for name, module in sys.modules.items() if name.startswith("dorothie_gym.")]
+    values = [value for module in modules for value in vars(module).values()]
+    return {
+        f"{value.py_func.__module__}.{value.py_func.__qualname__}"
+        for value in values
+        if isinstance(value, CompiledFunction)
+    }
+
+
+@contextmanager
+def _reporting(progress: Progress | None) -> Iterator[Callable[[str], None]]:
+    if progress is None:
+        yield lambda name: None
+        return
+    reports = _Reports(progress)
+    with event.install_listener("numba:compile", reports):
+        yield reports
+
+
+@contextmanager
+def _helper(report: Callable[[str], None], everything: bool) -> Iterator[Callable[[], None]]:
+    """Compiles the loops in a second process; yields a function that waits for its end."""
+    if is_warm() or available_processors() < 2:
+        yield lambda: None
+        return
+    arguments: Sequence[str] = ["everything"] if everything else []
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the package may lie anywhere on it
+    process = subprocess.Popen(
+        [sys.executable, "-c", _HELPER, *arguments],
+        env={**os.environ, "PYTHONPATH": path},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    reader = threading.Thread(target=_forward, args=(process, report), daemon=True)
+    reader.start()
+    try:
+        yield reader.join  # if the process failed, this one compiles itself what is missing
+    finally:
+        process.kill()
+        process.wait()
+
+
+def _forward(process: subprocess.Popen[str], report: Callable[[str], None]) -> None:
+    """Reports the names that the second process prints, until it ends."""
+    assert process.stdout is not None
+    with process.stdout:
+        for line in process.stdout:
+            report(f"dorothie_gym.{line.strip()}")
