@@ -16,7 +16,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from stable_baselines3.common.vec_env import VecEnv
 
-from dorothie_gym.baselines.rl.environments import make_env
+from dorothie_gym.baselines.rl.environments import make_env_of_model
 from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, ON_POLICY, Page, RunSettings, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import AnyEnv
 from dorothie_gym.errors import InputFileError, ModelFileError, SettingsError, one_line
@@ -184,7 +184,7 @@ def load_model(folder: str | Path) -> tuple[Model, TrainingSettings]:
     folder = Path(folder)
     folder = folder.parent if folder.is_file() else folder
     settings = read_settings(read_description(folder), TrainingSettings, folder)
-    env = make_env(settings.env, settings.env_settings)
+    env = make_env_of_model(settings.env, settings.env_settings, folder)
     model = make_model(for_playing(settings), env)
     restore(model, folder)
     return model, settings

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from typing import Final
 
 import gymnasium as gym
 import numpy as np
@@ -13,9 +15,15 @@ from stable_baselines3.common.vec_env import VecMonitor
 import dorothie_gym
 from dorothie_gym.baselines.rl.settings import Arguments, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import AnyEnv, make_vector_env
-from dorothie_gym.errors import SettingsError
+from dorothie_gym.errors import ModelFileError, SettingsError, short_repr
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.spaces.limits import UNBOUNDED
+
+ENVIRONMENTS_OF_MODELS: Final = frozenset(
+    f"dorothie_gym/{name}-v0"
+    for name in ("Participant", "CoWizard", "AdWizard", "Navigation", "Navigation-continuous", "UfN", "RfN", "NfD")
+)
+"""Ids of environments that the folder of a model may name."""
 
 _PLAIN = (spaces.Discrete, spaces.MultiDiscrete, spaces.Box)
 
@@ -32,6 +40,8 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
     Raises:
         SettingsError: there is no such environment, or it does not accept these arguments.
     """
+    if ":" in name:
+        raise SettingsError(f"env is {short_repr(name)}; it must be a registered id, without a module to import")
     try:
         env: AnyEnv = gym.make(name, disable_env_checker=True, **(settings or {}))
     except (gym.error.Error, TypeError, ValueError) as error:
@@ -40,6 +50,27 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
     if isinstance(observed, spaces.Box) and len(observed.shape) == 1 and isinstance(acted, _PLAIN):
         return env
     return SquashedObservation(dorothie_gym.flatten(env))
+
+
+def make_env_of_model(name: str, settings: Arguments | None, folder: Path) -> AnyEnv:
+    """Makes the environment that the description of a model names; the file may come from a stranger.
+
+    Args:
+        name: id of the environment.
+        settings: its arguments.
+        folder: folder of the model.
+
+    Raises:
+        ModelFileError: it is not an environment of this package that vectors can play. `Town-v0` is none of them:
+            highway-env imports the classes that its settings name.
+        SettingsError: it does not accept these arguments.
+    """
+    if name not in ENVIRONMENTS_OF_MODELS:
+        raise ModelFileError(
+            f"{folder}: the model is one of the environment {short_repr(name)}; models of "
+            f"{', '.join(sorted(ENVIRONMENTS_OF_MODELS))} can be opened"
+        )
+    return make_env(name, settings)
 
 
 class SquashedObservation(gym.ObservationWrapper[Vector, object, dict[str, NDArray[np.generic]]]):

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import re
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,9 +16,13 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 from dorothie_gym.baselines.rl import ALGORITHMS, Training, TrainingSettings, load_model, tuned_settings
 from dorothie_gym.baselines.rl import training as training_module
 from dorothie_gym.baselines.rl.environments import make_training_env
-from dorothie_gym.errors import ModelFileError, SettingsError
+from dorothie_gym.errors import ModelFileError, PolicyLoadError, SettingsError
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.policy_loader import find_player
+from dorothie_gym.spaces import SpaceLimits
 
 DISCRETE = "dorothie_gym/Navigation-v0"
+CONTINUOUS = "dorothie_gym/Navigation-continuous-v0"
 SMALL: dict[str, dict[str, Any]] = {
     "ppo": {"n_steps": 16, "batch_size": 32, "n_epochs": 1},
     "maskable_ppo": {"n_steps": 16, "batch_size": 32, "n_epochs": 1},
@@ -27,8 +33,8 @@ SMALL: dict[str, dict[str, Any]] = {
 
 
 def settings_for(algorithm: str, **changes: Any) -> TrainingSettings:
-    env = "Pendulum-v1" if algorithm == "sac" else DISCRETE
-    more = {} if algorithm == "sac" else {"env_settings": {"max_seconds": 10.0, "traffic": "none"}}
+    env = CONTINUOUS if algorithm == "sac" else DISCRETE
+    more = {"env_settings": {"max_seconds": 10.0, "traffic": "none"}}
     return TrainingSettings(
         **{
             "algorithm": algorithm, "env": env, "steps": 64, "environments": 2, "evaluate_every": 64, "episodes": 1,
@@ -172,6 +178,32 @@ def test_damaged_models_are_reported(tmp_path: Path) -> None:
     (tmp_path / "model.json").write_text("{", encoding="utf-8")
     with pytest.raises(ModelFileError, match=r"model\.json, line 1"):
         load_model(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("env", "stranger_probe:Navigation-v0"),
+        ("env", "CartPole-v1"),
+        ("env", "dorothie_gym/Town-v0"),
+        ("algorithm", "stranger_probe.PPO"),
+        ("algorithm", "os"),
+    ],
+)
+def test_model_of_a_stranger_imports_nothing_and_is_refused(
+    field: str, value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Training(settings_for("ppo"), tmp_path / "model").run()
+    page = json.loads((tmp_path / "model" / "model.json").read_text(encoding="utf-8"))
+    page["settings"][field] = value
+    (tmp_path / "model" / "model.json").write_text(json.dumps(page), encoding="utf-8")
+    (tmp_path / "stranger_probe.py").write_text("raise SystemExit('the code of a stranger runs')", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises((ModelFileError, SettingsError), match=re.escape(value)):
+        load_model(tmp_path / "model")
+    with pytest.raises((ModelFileError, SettingsError, PolicyLoadError), match=re.escape(value)):
+        find_player(str(tmp_path / "model"), Role.CO_WIZARD).make(Role.CO_WIZARD, SpaceLimits())
+    assert "stranger_probe" not in sys.modules
 
 
 @pytest.mark.parametrize("name", ["CoWizard", "Participant"])
