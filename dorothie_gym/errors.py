@@ -171,10 +171,14 @@ class _ShortRepr(Repr):
         super().__init__()
         self.maxstring = self.maxother = self.maxlong = MAX_SHOWN
 
+    def repr_int(self, value: int, level: int) -> str:
+        # Python writes no number of more than 4300 digits
+        return super().repr_int(value, level) if value.bit_length() < 4096 else f"<number of {value.bit_length()} bits>"
+
 
 def short_repr(value: object) -> str:
-    """Returns the `repr` of an offending value, cut to `MAX_SHOWN` characters."""
-    text = _ShortRepr().repr(value)
+    """Returns the `repr` of an offending value on one line, cut to `MAX_SHOWN` characters."""
+    text = " ".join(_ShortRepr().repr(value).split())
     return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
 
 

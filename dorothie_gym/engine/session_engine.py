@@ -375,6 +375,8 @@ class SessionEngine(Restorable):
         if session.over:
             raise RuntimeError("the session is over: call reset() first")
         decoded = {}
+        if type(actions) is not dict and not isinstance(actions, Mapping):
+            raise ValueError(f"actions is a {type(actions).__name__}; it must be a dict with an action for each agent")
         for agent, (role, decoder) in self._decoders.items():
             if agent not in actions:
                 raise ValueError(f"the action of {agent} is missing; it is needed from {', '.join(self._decoders)}")

@@ -9,6 +9,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.action_values import as_array
+from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import (
     LABELS,
@@ -202,15 +204,19 @@ def check_action(action: object, space: spaces.Dict) -> ActionMapping:
     if not isinstance(action, Mapping):
         raise ValueError(f"action: a dict with the fields {', '.join(space)} is expected, not {type(action).__name__}")
     if extra := [name for name in action if name not in space.spaces]:
-        raise ValueError(f"action: there is no field {extra[0]!r}; the fields are {', '.join(space)}")
+        raise ValueError(f"action: there is no field {short_repr(extra[0])}; the fields are {', '.join(space)}")
     for name, part in space.items():
         if name not in action:
             raise ValueError(f"action: field {name!r} is missing")
         value = action[name]
         if isinstance(part, spaces.MultiBinary):
-            value = np.asarray(value)
-        if not part.contains(value):
-            raise ValueError(f"action: field {name!r} is {action[name]!r}; it must be in {part}")
+            value = as_array(f"action: field {name!r}", value)
+            allowed = value.dtype.kind in "iubf" and part.contains(value)
+        else:
+            number = value if isinstance(value, int | np.integer) else as_array(f"action: field {name!r}", value)
+            allowed = part.contains(number)
+        if not allowed:
+            raise ValueError(f"action: field {name!r} is {short_repr(action[name])}; it must be in {part}")
     return action
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.action_values import real_numbers
 from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.driving_session import DrivingEnv, DrivingSession, NavigationMask
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
@@ -250,9 +251,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
             ValueError: the action does not consist of three finite numbers.
             gymnasium.error.ResetNeeded: no session is in progress, or it is over.
         """
-        values = np.asarray(action, dtype=np.float64)
-        if values.shape != (3,) or not np.isfinite(values).all():
-            raise ValueError(f"action is {action}; it must be three numbers: throttle, steer, brake")
+        values = real_numbers("action", action, (3,), "three finite numbers: throttle, steer, brake")
         throttle, steer, brake = np.clip(values, (0.0, -1.0, 0.0), 1.0).tolist()
         drive = self.drive
         drive.session.world.ego.manual = VehicleControl(throttle=throttle, steer=steer, brake=brake)

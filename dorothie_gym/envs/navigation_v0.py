@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.action_values import whole_number
 from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.driving_session import DrivingEnv, NavigationMask
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
@@ -116,9 +117,8 @@ class NavigationEnv(DrivingEnv[np.int64]):
             gymnasium.error.ResetNeeded: no session is in progress, or it is over.
         """
         drive = self.drive
-        if not 0 <= int(action) < len(ACTIONS):
-            raise ValueError(f"action is {action}; it must be in 0..{len(ACTIONS) - 1}, see NavigationAction")
-        physical = physical_of(NavigationAction(int(action)), drive.seen[Role.CO_WIZARD], drive.exits)
+        number = whole_number("action", action, 0, len(ACTIONS) - 1)
+        physical = physical_of(NavigationAction(number), drive.seen[Role.CO_WIZARD], drive.exits)
         drive.play(CoWizardAction(physical=physical))
         self.show()
         return self._observe(), drive.reward, drive.terminated, drive.truncated, self._info()

@@ -25,6 +25,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
+from dorothie_gym.action_values import real_numbers, whole_number
 from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import load_town
@@ -399,6 +400,17 @@ class TownEnv(Restorable, AbstractEnv):
         populate_around(network, arrays, self.np_random, vehicles=vehicles, pedestrians=pedestrians)
         self.road.show()
 
+    def step(self, action: object) -> tuple[object, float, bool, bool, dict[str, object]]:
+        """Plays one decision, as highway-env does.
+
+        Raises:
+            ValueError: the action is malformed.
+        """
+        if not self.config["manual_control"]:
+            check_action("action", action, self.action_space)
+        outcome: tuple[object, float, bool, bool, dict[str, object]] = super().step(action)
+        return outcome
+
     # --- Copies -------------------------------------------------------------------------------------------------------
 
     def changing(self) -> dict[str, object]:
@@ -445,6 +457,19 @@ _CONSTANT = frozenset({
     "_network_of", "spec", "_spec",
 })  # fmt: skip
 """Attributes of `TownEnv` that do not change between resets, or belong to pictures."""
+
+
+def check_action(name: str, action: object, space: spaces.Space[object]) -> None:
+    """Raises `ValueError` for an action of another form than those of a space; numbers of a `Box` are to be finite."""
+    if isinstance(space, spaces.Discrete):
+        whole_number(name, action, int(space.start), int(space.start + space.n) - 1)
+    elif isinstance(space, spaces.Box):
+        real_numbers(name, action, space.shape, f"finite numbers of the shape {space.shape}")
+    elif isinstance(space, spaces.Tuple):
+        if not isinstance(action, tuple | list) or len(action) != len(space):
+            raise ValueError(f"{name} is {short_repr(action)}; it must be {len(space)} actions, one for each vehicle")
+        for number, (part, own) in enumerate(zip(action, space, strict=True)):
+            check_action(f"{name}[{number}]", part, own)
 
 
 def finite(space: spaces.Space[object]) -> spaces.Space[object]:

@@ -12,6 +12,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from gymnasium import spaces
 
+from dorothie_gym.action_values import as_array, whole_number
+from dorothie_gym.errors import short_repr
+
 _ONE_BYTE = "bB?"
 """Codes of the one-byte dtypes, whose raw bytes are the values."""
 
@@ -61,8 +64,8 @@ class ActionReader:
             missing = [name for name in table.names if name not in action]
             if missing:
                 raise ValueError(f"field {missing[0]!r} is missing; the fields are {fields}")
-            unknown = [str(name) for name in action if name not in table.known]
-            raise ValueError(f"field {unknown[0]!r} is unknown; the fields are {fields}")
+            unknown = [name for name in action if name not in table.known]
+            raise ValueError(f"field {short_repr(unknown[0])} is unknown; the fields are {fields}")
 
     def integer(self, name: str) -> int:
         """Returns an integer field; raises `ValueError` if it is no integer or out of range."""
@@ -70,11 +73,9 @@ class ActionReader:
         value = self._action[name]
         if type(value) is int and low <= value <= high:
             return value
-        if not isinstance(value, int | np.integer | np.ndarray) or isinstance(value, bool) or np.ndim(value) != 0:
-            raise ValueError(f"field {name!r} is {value!r}; it must be a whole number in {low}..{high}")
-        if np.asarray(value).dtype.kind not in "iu" or not low <= int(value) <= high:
-            raise ValueError(f"field {name!r} is {value!r}; it must be a whole number in {low}..{high}")
-        return int(value)
+        if isinstance(value, np.ndarray) and value.ndim != 0:
+            raise ValueError(f"field {name!r} is {short_repr(value)}; it must be a whole number in {low}..{high}")
+        return whole_number(f"field {name!r}", value, low, high)
 
     def integers(self, names: Sequence[str]) -> list[int]:
         """Returns several integer fields; errors as in `integer`."""
@@ -89,10 +90,10 @@ class ActionReader:
     def numbers(self, name: str) -> list[int]:
         """Returns the flattened entries of an integer array; raises `ValueError` for a wrong shape, dtype or value."""
         shape, tops = self._table.shapes[name], self._table.tops[name]
-        value = np.asarray(self._action[name])
+        value = as_array(f"field {name!r}", self._action[name])
         if value.shape != shape or value.dtype.kind not in "iub":
             raise ValueError(
-                f"field {name!r} has shape {value.shape} and type {value.dtype}; "
+                f"field {name!r} has shape {value.shape} and type {short_repr(value.dtype)}; "
                 f"it must hold whole numbers in shape {shape}"
             )
         found: list[int] = value.ravel().tolist()
@@ -116,10 +117,10 @@ class ActionReader:
         if type(value) is str and not value:
             return value
         if not isinstance(value, str):
-            raise ValueError(f"field {name!r} is a {type(value).__name__}; it must be a text")
+            raise ValueError(f"field {name!r} is a {short_repr(type(value).__name__)}; it must be a text")
         if len(value) > length:
             raise ValueError(f"field {name!r} has {len(value)} characters; at most {length} are taken")
         if not characters.issuperset(value):
             wrong = "".join(sorted(set(value) - characters))
-            raise ValueError(f"field {name!r} has characters that the space does not: {wrong!r}")
+            raise ValueError(f"field {name!r} has characters that the space does not: {short_repr(wrong)}")
         return value

@@ -12,6 +12,7 @@ from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
+from dorothie_gym.action_values import whole_numbers
 from dorothie_gym.spaces import AnySpace, Observation, StepInfo
 from dorothie_gym.spaces.limits import UNBOUNDED
 
@@ -206,11 +207,8 @@ class FlattenAction(gym.Wrapper[ObsType, Flat, ObsType, Any], RecordConstructorA
         return observation, reward, terminated, truncated, info
 
     def unflatten(self, action: Flat) -> Any:
-        """Returns the action of the environment for a flat one; raises `ValueError` for a wrong shape."""
-        values = np.asarray(action, dtype=np.int64)
-        if values.shape != self.action_space.shape:
-            raise ValueError(f"the action has shape {values.shape}; it must be {self.action_space.shape}")
-        return self._flat.action(values)
+        """Returns the action of the environment for a flat one; raises `ValueError` if it is not in the space."""
+        return self._flat.action(whole_numbers("action", action, self._flat.nvec))
 
     def action_masks(self) -> FlatMask:
         """Returns the permitted values of all entries, one bool per value (sum(nvec),).

@@ -18,7 +18,9 @@ from highway_env.utils import lmap
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
+from dorothie_gym.action_values import as_array
 from dorothie_gym.copying import Restorable
+from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import load_town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.batch.egos import (
@@ -104,9 +106,13 @@ class Actions:
             raise ValueError(f"actions must have the shape {space.shape}, not {actions.shape}")
         if self._discrete:
             if not np.issubdtype(actions.dtype, np.integer) or actions.min() < 0 or actions.max() >= len(self._codes):
-                raise ValueError(f"actions must be integers from 0 to {len(self._codes) - 1}, not {actions}")
+                raise ValueError(
+                    f"actions must be integers from 0 to {len(self._codes) - 1}, not {short_repr(actions)}"
+                )
             codes: NDArray[np.int32] = self._codes[actions]
             return codes
+        if actions.dtype.kind not in "iuf" or not np.isfinite(actions).all():
+            raise ValueError(f"actions must be finite numbers, not {short_repr(actions)}")
         stock: ContinuousAction = self._stock
         wanted = np.clip(actions, -1, 1) if stock.clip else actions
         helms["acceleration"] = lmap(wanted[:, 0], [-1, 1], stock.acceleration_range) if stock.longitudinal else 0.0
@@ -321,7 +327,7 @@ class TownVectorEnv(Restorable, VectorEnv[NDArray[np.float32], ActionArray, NDAr
             ValueError: actions that are not of the action space, or environments that were never reset (or are over,
                 where the autoreset mode leaves resets to the caller).
         """
-        actions = cast(ActionArray, np.asarray(actions))
+        actions = cast(ActionArray, as_array("actions", actions))
         mode = self.metadata["autoreset_mode"]
         if not self._begun.all():
             raise ValueError("reset the environments before the first step")
