@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from dorothie_gym.errors import short_repr
 
 
-def as_array(name: str, value: object) -> NDArray[np.generic]:
+def as_array(name: str, value: object) -> NDArray[Any]:
     """Returns a value as a plain array.
 
     Raises:
@@ -56,10 +57,10 @@ def whole_numbers(name: str, value: object, counts: NDArray[np.int64]) -> NDArra
         ValueError: the shape, the type or a value is wrong; the message names the field.
     """
     array = as_array(name, value)
-    if array.shape != counts.shape or array.dtype.kind not in "iubf":
-        raise ValueError(
-            f"{name} has shape {array.shape} and is {short_repr(value)}; it must be {counts.shape} integers"
-        )
+    if array.shape != counts.shape:
+        raise ValueError(f"{name} has shape {array.shape}; it must be {counts.shape}")
+    if array.dtype.kind not in "iubf":
+        raise ValueError(f"{name} is {short_repr(value)}; it must hold whole numbers")
     if not np.all((array >= 0) & (array < counts)) or (
         array.dtype.kind == "f" and not np.all(array == np.floor(array))
     ):
