@@ -345,9 +345,10 @@ class _Parser(ElementReader):
 
     def _lane(self, lane: Element) -> LaneRecord:
         width = self.cubics(lane, "width", "sOffset")
+        number = self.integer(lane, "id")
         record = LaneRecord(
-            id=self.integer(lane, "id"),
-            type=lane.get("type", "none"),
+            id=number,
+            type=lane.get("type", "none") if number != 0 else "none",  # lane 0 is the centre line, without a width
             width=width,
             border=self._border(lane) if len(width.rows) == 0 else None,
             predecessor=self._lane_link(lane, "predecessor"),

@@ -49,7 +49,7 @@ class LaneRecord:
     @property
     def drives(self) -> bool:
         """Whether it is a lane for cars."""
-        return self.id != 0 and self.type in DRIVING_TYPES  # lane 0 is the centre line, without a width
+        return self.type in DRIVING_TYPES
 
     @property
     def is_closed(self) -> bool:
