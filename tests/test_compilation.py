@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.compilation import allocating, cache, compiled, inlined
+from dorothie_gym.compilation.cache import compiled_folder
 
 
 @pytest.mark.parametrize("kind", [allocating, compiled, inlined])
@@ -110,6 +111,16 @@ def test_damaged_machine_code_is_compiled_again(tmp_path):
         file.write_bytes(file.read_bytes()[:100])
     assert square(tmp_path, factor=2, seconds=1000) == (18, 0)
     assert square(tmp_path, factor=2, seconds=1000) == (18, 1)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has other permissions")
+def test_machine_code_is_not_read_from_a_folder_that_others_can_write(tmp_path, monkeypatch):
+    folder = tmp_path / "machine-code"
+    folder.mkdir()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+    assert compiled_folder() == folder
+    folder.chmod(0o777)
+    assert compiled_folder() is None
 
 
 def test_folder_of_machine_code_is_private(tmp_path):

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 
 from dorothie_gym.compilation.fingerprint import Compilable, fingerprint
-from dorothie_gym.user_cache import cache_folder
+from dorothie_gym.user_cache import cache_folder, is_private
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,12 +33,15 @@ _warned = False
 
 
 def compiled_folder() -> Path | None:
-    """Returns the folder of the machine code, which need not exist; None if caching is turned off."""
-    chosen = os.environ.get(NUMBA_VARIABLE)
+    """Returns the folder of the machine code, which need not exist; None if caching is off or it is not private."""
+    chosen, cache = os.environ.get(NUMBA_VARIABLE), cache_folder()
     if chosen:
-        return Path(chosen).expanduser()
-    folder = cache_folder()
-    return None if folder is None else folder / "compiled"
+        folder = Path(chosen).expanduser()
+    elif cache is not None:
+        folder = cache / "compiled"
+    else:
+        return None
+    return folder if is_private(folder) else None
 
 
 class _Files(CompileResultCacheImpl):  # type: ignore[misc]  # numba has no type information
@@ -95,7 +98,7 @@ class ContentCache(FunctionCache):  # type: ignore[misc]  # numba has no type in
     def save_overload(self, sig: object, data: Any) -> None:
         """Writes the machine code for a signature, and deletes old versions of the function."""
         if not self._is_open():
-            _warn_once("caching is turned off")
+            _warn_once("caching is turned off, or other users can write to the folder")
             return
         try:
             super().save_overload(sig, data)

@@ -57,7 +57,7 @@ class TeacherForcedEnv(PointEnv):
     predictions do not affect them (teacher forcing).
 
     ## Observation Space
-    A `Dict` with the history recorded before the point, see `dorothie_gym.recording.points` for its extent and
+    A `Dict` with the history recorded before the point, see `dorothie_gym.recording.visibility` for its extent and
     `history_fields` for the fields. Moves and actions are sorted newest first.
 
     ## Rewards

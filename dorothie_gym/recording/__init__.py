@@ -36,7 +36,6 @@ from dorothie_gym.recording.points import (
     InferencePoint,
     Point,
     PointView,
-    Task,
     angle_error,
     corpus_points,
     final_view,
@@ -69,6 +68,7 @@ from dorothie_gym.recording.trajectory import (
     trajectory_of,
 )
 from dorothie_gym.recording.validation import ReadReport
+from dorothie_gym.recording.visibility import Task
 from dorothie_gym.recording.writer import SessionWriter
 from dorothie_gym.sim.config import FRAME_RATE
 

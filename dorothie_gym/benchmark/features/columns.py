@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.recording.points import Moments, RecordTimes
+from dorothie_gym.recording.visibility import Moments, RecordTimes
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -14,14 +14,14 @@ from dorothie_gym.benchmark.labels import NO_ANGLE, Unscored
 from dorothie_gym.ontology import LABELS
 from dorothie_gym.recording import Fold, Task
 from dorothie_gym.recording.corpus import check_fold
-from dorothie_gym.recording.points import Moments, RowRange, earlier_spans, visible_rows
+from dorothie_gym.recording.visibility import Moments, RowRange, earlier_spans, visible_rows
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PointTable:
     """Points of a task (n,), by session and event.
 
-    Rows `*_start:*_stop` of the columns are visible at a point, by the rule of `dorothie_gym.recording.points`.
+    Rows `*_start:*_stop` of the columns are visible at a point, by the rule of `dorothie_gym.recording.visibility`.
 
     Attributes:
         task: the task.
