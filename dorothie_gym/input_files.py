@@ -170,7 +170,8 @@ def parse_json(text: str, where: object, *, unique: bool = True, line_breaks: bo
             object_pairs_hook=_unique_fields if unique else None,
         )
     except json.JSONDecodeError as error:
-        place = f"line {error.lineno}, column {error.colno}"
+        line = f"line {error.lineno}, " if "\n" in text else ""
+        place = f"{line}column {error.colno}"
         raise InputFileError(where, f"not JSON ({error.msg}); is the file cut off?", place) from None
     except InputFileError as error:
         raise InputFileError(where, error.reason, error.place) from None

@@ -18,6 +18,7 @@ from dorothie_gym.benchmark.paper_comparison import (
     ACTION_METRICS,
     FULL,
     MOVE_METRICS,
+    NO_UTTERANCE,
     ModelFinding,
     above,
     findings,
@@ -116,12 +117,12 @@ class ResultsTable:
     def findings(self) -> tuple[ModelFinding, ...]:
         """Returns how the paper's findings come out here, and whether TOTO is above the floors and below others.
 
-        Others are the models that are neither the paper's nor floors.
+        Others are the models that are neither the paper's nor floors nor ablations of TOTO.
         """
-        names = {paper_name(model): model for model in self.models}
+        names = {model.casefold(): model for model in self.models}
 
         def estimate(model: str, part: str, key: str) -> Estimate:
-            return self.estimate(names.get(model, model), part, key)
+            return self.estimate(names.get(model.casefold(), model), part, key)
 
         found: list[ModelFinding] = []
         for part in self.parts:
@@ -131,7 +132,8 @@ class ResultsTable:
                 for floor in FLOORS
                 if floor in self.models
             ]
-            own = [model for model in self.models if paper_name(model) is None and model not in FLOORS]
+            known = {*FLOORS, NO_UTTERANCE.casefold()}
+            own = [model for model in self.models if paper_name(model) is None and model.casefold() not in known]
             found += [above(estimate, part, model, FULL) for model in own]
         return tuple(found)
 

@@ -62,10 +62,10 @@ def test_sessions_without_folds_are_divided_by_name(tmp_path: Path) -> None:
 
 
 def test_error_of_empty_split_lists_the_splits_with_sessions(tmp_path: Path) -> None:
-    with pytest.raises(SessionError, match="no session for the split 'val'; choose from test, train, all"):
+    with pytest.raises(SessionError, match="has no session of the split 'val', only of test, train, all"):
         labels_of(corpus(tmp_path / "c", ("train", "test/seen")), "val")
     write(tmp_path / "one", talk())
-    with pytest.raises(SessionError, match="two sessions at least are divided"):
+    with pytest.raises(SessionError, match="two sessions or more are divided"):
         labels_of(tmp_path / "one")
 
 

@@ -120,9 +120,9 @@ def test_a_task_without_anything_to_learn_from_is_left_out_with_the_reason(tmp_p
 
 
 def test_findings_know_models_in_any_case(labels: CorpusLabels) -> None:
-    runs = [wrong_moves(labels, name, seed, 0.5) for seed in (0, 1) for name in ("toto", "toto (- current speech)")]
-    speech = evaluate_predictions(runs, labels).findings()[1]
-    assert speech.claims[0].difference.values == {0: 0.0, 1: 0.0}
+    runs = [wrong_moves(labels, name, seed, 0.5) for seed in (0, 1) for name in ("toto", "toto (- current utterance)")]
+    utterance = evaluate_predictions(runs, labels).findings()[1]
+    assert utterance.claims[0].difference.values == {0: 0.0, 1: 0.0}
 
 
 def test_toto_is_held_against_the_floors_and_others_against_toto(labels: CorpusLabels) -> None:

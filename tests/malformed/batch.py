@@ -16,6 +16,8 @@ import warnings
 from pathlib import Path
 from random import Random
 
+from tests.malformed.memory import peak_memory
+
 MEMORY = 1_500 * 2**20
 """Largest resident memory of the process [bytes]."""
 
@@ -51,7 +53,7 @@ def one(kind: str, seed: int, number: int, originals: Path) -> str | None:
                 return traceback.format_exc()
         except BaseException:
             return traceback.format_exc()
-    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    used = peak_memory()
     return f"the process takes {used >> 20} MiB" if used > MEMORY else None
 
 

@@ -73,7 +73,7 @@ def test_folder_without_description_and_damaged_json_raise_error(tmp_path: Path)
     with pytest.raises(PolicyLoadError, match=r"folder without model.json"):
         find_player(str(tmp_path), Role.CO_WIZARD)
     (tmp_path / "model.json").write_text('{"kind": ')
-    with pytest.raises(PolicyLoadError, match=r"model.json, line 1, column 10: not JSON"):
+    with pytest.raises(PolicyLoadError, match=r"model.json, column 10: not JSON"):
         find_player(str(tmp_path), Role.CO_WIZARD)
 
 

@@ -62,7 +62,7 @@ def test_torn_line_is_left_out_and_the_session_is_incomplete(tmp_path: Path) -> 
         ('{"frame":45,"participant":[1]}', "line 3: field 'participant' is .* an object"),
         ('{"frame":-1}', "line 3: field 'frame' is -1"),
         ('{"frame":30}', "line 3: frame 30 after 30"),
-        ('{"frame":45', "line 3: not JSON"),
+        ('{"frame":45', "line 3, column 12: not JSON"),
     ],
 )
 def test_damaged_line_is_refused_and_named(tmp_path: Path, line: str, message: str) -> None:

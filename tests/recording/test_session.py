@@ -90,7 +90,7 @@ def test_folder_without_a_session_is_an_error(tmp_path: Path) -> None:
         ("events.jsonl", b'"frame":45', b'"frame":true', r"line 3: field 'frame' is True"),
         ("events.jsonl", b'"source":"co_wizard"', b'"source":"cat"', r"line 3: field 'source' is 'cat'; .*participant"),
         ("events.jsonl", b'"type":"End"', b'"kind":"End"', r"line \d+: field 'type' is missing"),
-        ("events.jsonl", b'{"frame":45', b"{frame:45", r"events.jsonl, line 3, line 1, column 2: not JSON"),
+        ("events.jsonl", b'{"frame":45', b"{frame:45", r"events.jsonl, line 3, column 2: not JSON"),
         ("events.jsonl", b'"angle":88.0', b'"angle":NaN', r"line 6: not JSON"),
         ("events.jsonl", b"KFC please", b"KF\xff please", r"line 2: not UTF-8"),
         ("events.jsonl", b'["KFC"]', b'"KFC"', r"line 2, data: field 'slots.Landmark'"),

@@ -39,7 +39,7 @@ def test_strict_json_is_parsed_unchanged(value):
 
 @pytest.mark.parametrize("text", ["[,]", "{,}", "[1,,]", '{"a":,}', "", "{", '{"a": "'])
 def test_malformed_json_raises_error(text):
-    with pytest.raises(StoryboardError, match="line 1, column"):
+    with pytest.raises(StoryboardError, match="column"):
         read_json(text, "t")
 
 
