@@ -4,6 +4,9 @@ Importing the package registers its environments. The public names are listed on
 a name is imported when the name is first used, so that `import dorothie_gym` loads neither highway-env nor torch.
 """
 
+from dorothie_gym import _startup as _startup  # first: it handles Ctrl-C during the other imports
+
+# isort: split
 import lazy_loader
 
 from dorothie_gym._registration import register_environments

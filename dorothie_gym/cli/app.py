@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
+from dorothie_gym._startup import exit_on_signals
 from dorothie_gym._version import __version__
 from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.convert import convert
@@ -15,6 +17,7 @@ from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.listings import envs, storyboards, towns
 from dorothie_gym.cli.options import PictureCommand
+from dorothie_gym.cli.output import exit_interrupted
 from dorothie_gym.cli.rollout import leaderboard, rollout
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.sessions import compare, replay, show
@@ -22,8 +25,23 @@ from dorothie_gym.cli.stats import stats
 from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl
 from dorothie_gym.cli.warm_up import warm_up
+from dorothie_gym.interruption import message, raising_interrupts
+
+
+class _Commands(TyperGroup):
+    """Commands, of which each ends at Ctrl-C and SIGTERM with one line."""
+
+    def invoke(self, ctx: Any) -> Any:  # the context of click, or of the copy of click in newer releases of typer
+        """Runs a command and returns its result."""
+        try:
+            with raising_interrupts():
+                return super().invoke(ctx)
+        except KeyboardInterrupt:
+            exit_interrupted(message())
+
 
 app = typer.Typer(
+    cls=_Commands,
     help="Simulation of situated dialogue between a passenger and a car that drives through a town, with an adversary.",
     no_args_is_help=True,
     rich_markup_mode="rich",
@@ -67,6 +85,7 @@ def _options(
 
 def main() -> None:
     """Runs the command line."""
+    exit_on_signals()
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # keep its greeting out of the output of --json
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):

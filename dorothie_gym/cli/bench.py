@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from dorothie_gym.cli.options import OWN_NAME, AsJson, CommandContext, PictureCommand
-from dorothie_gym.cli.output import INTERRUPTED, check_picture, fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.cli.output import check_picture, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -209,8 +209,7 @@ def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> 
         with reporting_errors(), _progress() as progress:
             figures = measure(progress)
     except KeyboardInterrupt:
-        stderr().print("Interrupted; there are no results.", soft_wrap=True)
-        raise typer.Exit(INTERRUPTED) from None
+        exit_interrupted("Interrupted; there are no results.")
     if as_json:
         print_json(figures)
     if as_json and picture is None:

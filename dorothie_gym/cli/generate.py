@@ -11,13 +11,12 @@ import typer
 from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray, WordErrors, env_config
 from dorothie_gym.cli.output import (
     FAILED,
-    INTERRUPTED,
     Facts,
+    exit_interrupted,
     fail,
     print_json,
     reporting_errors,
     session_progress,
-    stderr,
     stdout,
 )
 from dorothie_gym.processors import available_processors
@@ -83,10 +82,7 @@ def _exit_interrupted(out: Path, sessions: int, seed: int, max_seconds: float | 
         command += f" --max-seconds {max_seconds:g}"
     if word_errors:
         command += f" --word-errors {word_errors:g}"
-    stderr().print(
-        f"Interrupted with {done} of {sessions} sessions finished; resume with: {command}", markup=False, soft_wrap=True
-    )
-    raise typer.Exit(INTERRUPTED)
+    exit_interrupted(f"Interrupted with {done} of {sessions} sessions finished; resume with: {command}")
 
 
 def _facts(made: Generated, seed: int, wall: float) -> Facts:

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeAlias
 import typer
 from rich.console import Console
 
+from dorothie_gym.interruption import exit_code
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -24,9 +26,6 @@ FAILED = 1
 
 BAD_INPUT = 2
 """Exit code for invalid input."""
-
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, by the convention of shells (128 + SIGINT)."""
 
 WIDTH = 130
 """Width of the output into a file or a pipe [columns]."""
@@ -56,6 +55,12 @@ def fail(message: str, code: int = BAD_INPUT) -> NoReturn:
     console.print("Error: ", style="bold red", end="")
     console.print(message, markup=False, soft_wrap=True)
     raise typer.Exit(code)
+
+
+def exit_interrupted(text: str) -> NoReturn:
+    """Prints a line on standard error and exits with the code of the signal: 130 for Ctrl-C, 143 for SIGTERM."""
+    stderr().print(text, markup=False, soft_wrap=True)
+    raise typer.Exit(exit_code()) from None
 
 
 def print_json(value: Mapping[str, object] | Sequence[object]) -> None:

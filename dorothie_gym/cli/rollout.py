@@ -25,13 +25,12 @@ from dorothie_gym.cli.options import (
 )
 from dorothie_gym.cli.output import (
     FAILED,
-    INTERRUPTED,
     check_file,
+    exit_interrupted,
     fail,
     print_json,
     reporting_errors,
     session_progress,
-    stderr,
     stdout,
     wide_stdout,
 )
@@ -112,13 +111,10 @@ def _exit_interrupted(folder: Path, settings: RolloutSettings) -> None:
     from dorothie_gym.rollout.closed_loop.running import command_of
 
     done = len(read_result(folder).rows) if (folder / RESULT_FILE).is_file() else 0
-    stderr().print(
+    exit_interrupted(
         f"Interrupted with {done} of {settings.sessions} sessions finished; their results are in "
-        f"{folder / RESULT_FILE}; resume with: {command_of(settings.to_json())} --out {shlex.quote(str(folder))}",
-        markup=False,
-        soft_wrap=True,
+        f"{folder / RESULT_FILE}; resume with: {command_of(settings.to_json())} --out {shlex.quote(str(folder))}"
     )
-    raise typer.Exit(INTERRUPTED)
 
 
 # --- Leaderboard ------------------------------------------------------------------------------------------------------

@@ -14,14 +14,13 @@ import typer
 from dorothie_gym.cli.completion import complete_storyboard, complete_town
 from dorothie_gym.cli.options import AdWizard, AsJson, CoWizard, Participant, WordErrors, env_config, find_cast, needs
 from dorothie_gym.cli.output import (
-    INTERRUPTED,
     Facts,
     check_picture,
     check_video,
+    exit_interrupted,
     fail,
     print_json,
     reporting_errors,
-    stderr,
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
@@ -195,10 +194,7 @@ def _exit_interrupted(engine: SessionEngine, plan: _Plan) -> None:
         kept = "nothing was recorded (--out DIR records)"
     else:
         kept = f"the recording until then is in {plan.out}"
-    stderr().print(
-        f"Interrupted after {engine.session.world.time:.1f} simulated seconds; {kept}.", markup=False, soft_wrap=True
-    )
-    raise typer.Exit(INTERRUPTED)
+    exit_interrupted(f"Interrupted after {engine.session.world.time:.1f} simulated seconds; {kept}.")
 
 
 def draw_session(engine: SessionEngine, path: Path) -> None:

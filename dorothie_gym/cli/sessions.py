@@ -11,7 +11,6 @@ import typer
 from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import AsJson, Maps, Players, needs
 from dorothie_gym.cli.output import (
-    INTERRUPTED,
     check_video,
     fail,
     print_json,
@@ -73,15 +72,11 @@ def replay(
     from dorothie_gym.rollout.replay import ReplaySources
 
     sources = ReplaySources(town=town, maps=maps, storyboard=storyboard)
-    try:
-        with reporting_errors():
-            if check:
-                _check(path, sources, workers, as_json=as_json)
-            else:
-                _play_back(path, sources, fps, video, as_json=as_json)
-    except KeyboardInterrupt:
-        stderr().print("Interrupted.")
-        raise typer.Exit(INTERRUPTED) from None
+    with reporting_errors():
+        if check:
+            _check(path, sources, workers, as_json=as_json)
+        else:
+            _play_back(path, sources, fps, video, as_json=as_json)
 
 
 def _check(path: Path, sources: ReplaySources, workers: int | None, *, as_json: bool) -> None:

@@ -14,8 +14,8 @@ from dorothie_gym.cli.completion import complete_model
 from dorothie_gym.cli.options import AsJson
 from dorothie_gym.cli.output import (
     FAILED,
-    INTERRUPTED,
     Facts,
+    exit_interrupted,
     fail,
     print_json,
     reporting_errors,
@@ -149,9 +149,9 @@ def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> lis
                 found[job.folder] = result
                 on_job(job)
     except KeyboardInterrupt:
-        message = f"Interrupted with {len(found)} of {len(jobs)} trainings finished; resume with the same command."
-        stderr().print(message, markup=False, soft_wrap=True)
-        raise typer.Exit(INTERRUPTED) from None
+        exit_interrupted(
+            f"Interrupted with {len(found)} of {len(jobs)} trainings finished; resume with the same command."
+        )
     return [found[job.folder] for job in jobs]
 
 

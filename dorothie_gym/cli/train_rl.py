@@ -13,7 +13,7 @@ import typer
 
 from dorothie_gym.cli.completion import complete_algorithm, complete_env
 from dorothie_gym.cli.options import AsJson, Ray
-from dorothie_gym.cli.output import FAILED, INTERRUPTED, fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.cli.output import FAILED, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.processors import available_processors
 
@@ -292,9 +292,7 @@ def _progress(
             yield on_progress, on_stage
         except KeyboardInterrupt:  # a running training catches it and saves
             progress.stop()
-            message = f"Interrupted before the first step; {out} is unchanged. The same command starts again."
-            console.print(message, markup=False, soft_wrap=True)
-            raise typer.Exit(INTERRUPTED) from None
+            exit_interrupted(f"Interrupted before the first step; {out} is unchanged. The same command starts again.")
 
 
 def _facts(result: TrainingResult[Evaluation], settings: RunSettings) -> dict[str, object]:
@@ -328,8 +326,6 @@ def _command(arguments: list[str], given: Given, settings: RunSettings, ray: str
 
 def _exit_interrupted(steps: int, settings: RunSettings, out: Path, command: str) -> NoReturn:
     """Prints after Ctrl-C the folder of the run and the command that resumes it, and exits."""
-    stderr().print(
-        f"Interrupted after {steps:,} of {settings.steps:,} steps; the run is saved in {out}. Resume with: {command}",
-        markup=False, soft_wrap=True,
-    )  # fmt: skip
-    raise typer.Exit(INTERRUPTED)
+    exit_interrupted(
+        f"Interrupted after {steps:,} of {settings.steps:,} steps; the run is saved in {out}. Resume with: {command}"
+    )

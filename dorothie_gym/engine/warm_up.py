@@ -20,6 +20,7 @@ from numba.core import event
 from dorothie_gym.compilation.dispatcher import CompiledFunction
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.interruption import starting_process
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.processors import available_processors
@@ -42,9 +43,8 @@ Progress: TypeAlias = Callable[[str, int, int], None]
 """Called with the name of the function that is being compiled, and how many functions are begun of how many in all."""
 
 _HELPER: Final = """
-import signal
-signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
-import sys
+import os, sys, threading
+threading.Thread(target=lambda: os._exit(len(os.read(0, 1))), daemon=True).start()  # the parent's end closes stdin
 from dorothie_gym.engine.warm_up import compile_loops
 compile_loops(lambda name, *_: print(name, flush=True), everything=sys.argv[1:] == ["everything"])
 """
@@ -159,20 +159,23 @@ def _helper(report: Callable[[str], None], everything: bool) -> Iterator[Callabl
         return
     arguments: Sequence[str] = ["everything"] if everything else []
     path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the package may lie anywhere on it
-    process = subprocess.Popen(
-        [sys.executable, "-c", _HELPER, *arguments],
-        env={**os.environ, "PYTHONPATH": path},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
+    with starting_process():
+        process = subprocess.Popen(
+            [sys.executable, "-c", _HELPER, *arguments],
+            env={**os.environ, "PYTHONPATH": path},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
     reader = threading.Thread(target=_forward, args=(process, report), daemon=True)
     reader.start()
     try:
         yield reader.join  # if the process failed, this one compiles itself what is missing
     finally:
+        assert process.stdin is not None
         process.kill()
+        process.stdin.close()
         process.wait()
 
 

@@ -13,12 +13,13 @@ import signal
 import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Generic, TypeVar
 
 from dorothie_gym.errors import ProcessError
+from dorothie_gym.interruption import starting_process
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -45,8 +46,10 @@ def run_tasks(
         while waiting:
             yield work(waiting.pop())
         return
-    pool = [_Worker(prepare) for _ in range(min(workers, len(waiting)))]
+    pool: list[_Worker[Task, Result]] = []
     try:
+        for _ in range(min(workers, len(waiting))):
+            pool.append(_Worker(prepare))
         for worker in pool:
             worker.submit(waiting.pop())
         busy = {worker.connection: worker for worker in pool}
@@ -75,7 +78,7 @@ class _Worker(Generic[Task, Result]):
         context = get_context("spawn")  # a fork would copy the threads and locks of the caller
         self.connection, theirs = context.Pipe()
         self._process: BaseProcess = context.Process(target=_serve, args=(theirs, prepare), daemon=True)
-        self._process.start()
+        start_process(self._process)
         theirs.close()
         self._task: Task | None = None
 
@@ -108,13 +111,12 @@ class _Worker(Generic[Task, Result]):
 
 def _serve(connection: Connection, prepare: Callable[[], Callable[[Task], Result]]) -> None:
     """Runs the tasks of a connection until it is closed; the main function of a worker process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the caller handles it
-    threading.Thread(target=_exit_with_parent, daemon=True).start()
+    exit_with_parent()
     work: Callable[[Task], Result] | None = None
     while True:
         try:
             task = connection.recv()
-        except EOFError:
+        except (EOFError, ConnectionResetError):
             return
         answer: tuple[bool, Result | str]
         try:
@@ -126,7 +128,24 @@ def _serve(connection: Connection, prepare: Callable[[], Callable[[Task], Result
         connection.send(answer)
 
 
-def _exit_with_parent() -> None:
+# --- One process ------------------------------------------------------------------------------------------------------
+
+
+def start_process(process: BaseProcess) -> None:
+    """Starts a worker process, which Ctrl-C does not reach; its function must begin with `exit_with_parent`."""
+    if os.name == "posix":
+        resource_tracker.ensure_running()  # its start would unblock the signals
+    with starting_process():
+        process.start()
+
+
+def exit_with_parent() -> None:
+    """Ends this worker process when its parent ends, and ignores Ctrl-C, which the parent handles."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_wait_for_parent, daemon=True).start()
+
+
+def _wait_for_parent() -> None:
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import signal
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from multiprocessing import get_context
@@ -16,6 +15,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from dorothie_gym.rollout.on_ray import RETRIES, connect, reason
+from dorothie_gym.rollout.processes import exit_with_parent, start_process
 
 AnyEnv: TypeAlias = gym.Env[Any, Any]
 """Environment with vectors as observations; its actions are numbers or vectors, and `gym.Env` is invariant in both."""
@@ -217,7 +217,7 @@ class ProcessVecEnv(WorkerVecEnv):
         for share in shares(environments, workers):
             ours, theirs = context.Pipe()
             process = context.Process(target=_serve, args=(theirs, make, len(share)), daemon=True)
-            process.start()
+            start_process(process)
             theirs.close()
             self._connections.append(ours)
             self._processes.append(process)
@@ -245,7 +245,7 @@ class ProcessVecEnv(WorkerVecEnv):
 
 def _serve(connection: Connection, make: MakeEnv, count: int) -> None:
     """Executes commands in a worker process until the connection closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the caller handles it
+    exit_with_parent()
     vector = DummyVecEnv([make] * count)
     try:
         while True:
