@@ -109,7 +109,7 @@ class CompiledFunction(CPUDispatcher):  # type: ignore[misc]  # numba has no typ
 
     def __init__(self, py_func: Callable[..., object], locals: Any = None, targetoptions: Any = None) -> None:
         options = {**(targetoptions or {}), "no_cfunc_wrapper": True}
-        super().__init__(py_func, locals, options, pipeline_class=_WholeCompiler)
+        super().__init__(py_func, locals or {}, options, pipeline_class=_WholeCompiler)
         parts = {**options, "no_cpython_wrapper": True}
         self._part_compiler = _FunctionCompiler(py_func, self.targetdescr, parts, self.locals, _PartCompiler)
         self._parts: dict[tuple[types.Type, ...], CompileResult] = {}
