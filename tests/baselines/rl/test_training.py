@@ -176,7 +176,7 @@ def test_damaged_models_are_reported(tmp_path: Path) -> None:
     with pytest.raises(ModelFileError, match="model.safetensors"):
         load_model(tmp_path)
     (tmp_path / "model.json").write_text("{", encoding="utf-8")
-    with pytest.raises(ModelFileError, match=r"model\.json, line 1"):
+    with pytest.raises(ModelFileError, match=r"model\.json, column 2"):
         load_model(tmp_path)
 
 
