@@ -71,7 +71,7 @@ def whole_numbers(name: str, value: object, counts: NDArray[np.int64]) -> NDArra
 
 
 def real_numbers(name: str, value: object, shape: Sequence[int], meaning: str) -> NDArray[np.float64]:
-    """Returns finite numbers as float64 of a shape; `meaning` tells what they are.
+    """Returns finite numbers as float64 of a shape; `meaning` names them in messages.
 
     Raises:
         ValueError: the shape, the type or a value is wrong; the message names the field.

@@ -5,7 +5,7 @@
 - An instance that never changes (a town, a path, an utterance) is `shared` by all copies.
 - What was only looked up (a view on the arrays of a world) is dropped from a copy, which looks it up again (`Lookups`).
 
-A `State` holds what changes in one object. It is cheaper than a copy, and any number of sessions can go on from it.
+A `State` holds what changes in one object. It is cheaper than a copy, and any number of sessions can continue from it.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class State:
         Args:
             owner: object that the values belong to; references to it lead to the one that takes them up again.
             values: what is kept.
-            fits: name and value of what has to be equal in the object that takes up the values.
+            fits: name and value of each property that must be equal in the object that restores the values.
         """
         self._fits = dict(fits)
         self._values, self._shared = _pack(owner, values)
@@ -123,7 +123,7 @@ class Restorable:
 
         Generators' states are part of it; what the spaces draw for `sample()` and what was rendered are not.
         """
-        return State(self, self.changing(), self.fits())
+        return State(self, self.mutable_values(), self.compatibility())
 
     def restore_state(self, state: State) -> None:
         """Goes back to a state, any number of times; the state stays as it is.
@@ -136,19 +136,19 @@ class Restorable:
         """
         if not isinstance(state, State):
             raise StateError(f"state is {short_repr(state)}; it must be a value that clone_state() has returned")
-        values = state.values(self, self.fits())
-        assert isinstance(values, dict)  # made by `changing`
-        self.go_on(values)
+        values = state.values(self, self.compatibility())
+        assert isinstance(values, dict)  # made by `mutable_values`
+        self.apply_values(values)
 
-    def changing(self) -> dict[str, object]:
+    def mutable_values(self) -> dict[str, object]:
         """Returns what changes, by name."""
         return {name: getattr(self, name) for name in self.CHANGES}
 
-    def go_on(self, values: dict[str, object]) -> None:
-        """Takes up what `changing` has returned."""
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies the values that `mutable_values` has returned."""
         self.__dict__.update(values)
 
-    def fits(self) -> dict[str, object]:
+    def compatibility(self) -> dict[str, object]:
         """Returns name and value of what has to be equal where a state is restored."""
         return {"a": type(self).__name__}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -174,12 +174,7 @@ def _run_policy(job: Experiment, about: dict[str, object]) -> dict[str, object]:
         return _earlier_result(kept, about)
     started = time.perf_counter()
     predicted, facts = run_policy(job.corpus, job.row.kind, job.seed, job.folder, job.row.name, strict=job.strict)
-    write_predictions(job.folder / PREDICTIONS_FILE, predicted, about=about)
-    seconds = round(time.perf_counter() - started, 3)
-    of = {"command": job.model, "size": job.size, "seed": job.seed, "folder": str(job.folder)}
-    result = {**about, **of, "tasks": facts, "seconds": seconds}
-    write_atomically(kept, json.dumps(result, indent=1) + "\n")
-    return result
+    return _keep_result(job, about, predicted, {"tasks": facts}, started)
 
 
 def _run_shallow(job: Experiment, material: Dataset, about: dict[str, object]) -> dict[str, object]:
@@ -197,11 +192,22 @@ def _run_shallow(job: Experiment, material: Dataset, about: dict[str, object]) -
         model.fit(columns, learned, tuned)
         validation |= _scores(tuned, model.predict(columns, tuned))
         found.append(_predictions_of(job, columns, tested, model.predict(columns, tested)))
-    write_predictions(job.folder / PREDICTIONS_FILE, found, about=about)
+    return _keep_result(job, about, found, {"validation": validation}, started)
+
+
+def _keep_result(
+    job: Experiment,
+    about: dict[str, object],
+    predicted: Sequence[TaskPredictions],
+    facts: Mapping[str, object],
+    started: float,
+) -> dict[str, object]:
+    """Writes predictions and result of a training that began at a time of `time.perf_counter`; returns the result."""
+    write_predictions(job.folder / PREDICTIONS_FILE, predicted, about=about)
     seconds = round(time.perf_counter() - started, 3)
     of = {"command": job.model, "size": job.size, "seed": job.seed, "folder": str(job.folder)}
-    result = {**about, **of, "validation": validation, "seconds": seconds}
-    write_atomically(kept, json.dumps(result, indent=1) + "\n")
+    result = {**about, **of, **facts, "seconds": seconds}
+    write_atomically(job.folder / RESULT_FILE, json.dumps(result, indent=1) + "\n")
     return result
 
 

@@ -27,7 +27,7 @@ NUMBA_VARIABLE: Final = "NUMBA_CACHE_DIR"
 """numba's own environment variable for the folder of machine code; it goes before the user's cache folder."""
 
 KEPT: Final = 14 * 24 * 3600.0
-"""Time after which files of other versions of a function are deleted, if nobody has read them [s]."""
+"""Time without a read after which files of other versions of a function are deleted [s]."""
 
 _warned = False
 

@@ -328,14 +328,14 @@ class SessionEngine(Restorable):
         self._session: LiveSession | None = None
         self._observations: LazyObservations | None = None
 
-    def go_on(self, values: dict[str, object]) -> None:
-        """Takes up a session and the series of seeds; the observations are built when they are read."""
-        super().go_on(values)
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies a session and the series of seeds; the observations are built when they are read."""
+        super().apply_values(values)
         self._observations = None
 
-    def fits(self) -> dict[str, object]:
+    def compatibility(self) -> dict[str, object]:
         """Returns the town and the settings."""
-        return {**super().fits(), "the town": self.town, "the settings": self.config}
+        return {**super().compatibility(), "the town": self.town, "the settings": self.config}
 
     @property
     def engine(self) -> SessionEngine:

@@ -280,20 +280,20 @@ class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
         self._drive: DrivingSession | None = None
         self._controls: NavigationMask | None = None
 
-    def changing(self) -> dict[str, object]:
+    def mutable_values(self) -> dict[str, object]:
         """Returns what changes in the environment, and what was noted for its pictures."""
-        return {**super().changing(), "view": self._view.notes}
+        return {**super().mutable_values(), "view": self._view.notes}
 
-    def go_on(self, values: dict[str, object]) -> None:
-        """Takes up what changes in the environment, and what was noted for its pictures."""
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies the values of the environment and the notes for its pictures."""
         notes = values.pop("view")
-        super().go_on(values)
+        super().apply_values(values)
         if self._drive is not None:
-            self._view.go_on(notes, self._drive.session)
+            self._view.apply_values(notes, self._drive.session)
 
-    def fits(self) -> dict[str, object]:
+    def compatibility(self) -> dict[str, object]:
         """Returns the kind of environment, the town and the settings."""
-        return {**super().fits(), "the town": self.town, "the settings": self.config}
+        return {**super().compatibility(), "the town": self.town, "the settings": self.config}
 
     @property
     def decision_limit(self) -> int:

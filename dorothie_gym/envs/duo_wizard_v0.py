@@ -185,20 +185,20 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         car = session.world.car
         return np.concatenate(([session.world.time, *car.position, car.heading, car.speed], padded))
 
-    def changing(self) -> dict[str, object]:
+    def mutable_values(self) -> dict[str, object]:
         """Returns what changes in the environment and in its engine."""
-        return {**super().changing(), "engine": self.engine.changing()}
+        return {**super().mutable_values(), "engine": self.engine.mutable_values()}
 
-    def go_on(self, values: dict[str, object]) -> None:
-        """Takes up what changes in the environment and in its engine."""
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies the values of the environment and of its engine."""
         engine = values.pop("engine")
         assert isinstance(engine, dict)
-        super().go_on(values)
-        self.engine.go_on(engine)
+        super().apply_values(values)
+        self.engine.apply_values(engine)
 
-    def fits(self) -> dict[str, object]:
+    def compatibility(self) -> dict[str, object]:
         """Returns the kind of environment, and what has to be equal in the engine."""
-        return {**self.engine.fits(), **super().fits()}
+        return {**self.engine.compatibility(), **super().compatibility()}
 
     # --- the engine inside ------------------------------------------------------------------------------------------
 

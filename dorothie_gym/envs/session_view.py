@@ -79,8 +79,8 @@ class SessionView(Lookups):
         """What was noted of the session, for a state of the environment."""
         return self._seen, self._heard
 
-    def go_on(self, notes: object, session: LiveSession) -> None:
-        """Takes up the notes of a state; a view that draws begins anew if they were not taken for pictures."""
+    def apply_values(self, notes: object, session: LiveSession) -> None:
+        """Applies the notes of a state; a view that draws starts empty if the state has no notes for pictures."""
         self.begin(session)
         assert isinstance(notes, tuple)  # of `notes`
         seen, heard = notes

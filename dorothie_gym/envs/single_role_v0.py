@@ -160,25 +160,35 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         """Closes the window, if there is one."""
         self._view.close()
 
-    def changing(self) -> dict[str, object]:
+    def mutable_values(self) -> dict[str, object]:
         """Returns what changes in the environment, its engine and its partners."""
         states = {role: Unchanged(state) for role, state in self._states.items()}
-        return {**super().changing(), "engine": self.engine.changing(), "partners": states, "view": self._view.notes}
+        return {
+            **super().mutable_values(),
+            "engine": self.engine.mutable_values(),
+            "partners": states,
+            "view": self._view.notes,
+        }
 
-    def go_on(self, values: dict[str, object]) -> None:
-        """Takes up what changes in the environment, its engine and its partners."""
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies the values of the environment, its engine and its partners."""
         engine, states, notes = values.pop("engine"), values.pop("partners"), values.pop("view")
         assert isinstance(engine, dict) and isinstance(states, dict)
-        super().go_on(values)
-        self.engine.go_on(engine)
+        super().apply_values(values)
+        self.engine.apply_values(engine)
         self._states = {role: state.value for role, state in states.items()}
         if self._states:
-            self._view.go_on(notes, self.engine.session)
+            self._view.apply_values(notes, self.engine.session)
 
-    def fits(self) -> dict[str, object]:
+    def compatibility(self) -> dict[str, object]:
         """Returns role and partners, and what has to be equal in the engine."""
         partners = {str(role): type(policy).__name__ for role, policy in self.partners.items()}
-        return {**self.engine.fits(), **super().fits(), "the role": self.role, "the partners": partners}
+        return {
+            **self.engine.compatibility(),
+            **super().compatibility(),
+            "the role": self.role,
+            "the partners": partners,
+        }
 
     def _cast(self, wanted: Mapping[str, str | AnyPolicy]) -> dict[Role, AnyPolicy]:
         others = [role for role in AGENT_ROLES if role is not self.role]

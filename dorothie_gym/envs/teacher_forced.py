@@ -105,9 +105,9 @@ class TeacherForcedEnv(PointEnv):
         self._town: Town | None = None
         self._done: list[tuple[ActionMapping, Point]] = []
 
-    def fits(self) -> dict[str, object]:
+    def compatibility(self) -> dict[str, object]:
         """Returns the kind of environment, the names of the sessions and the sizes of the tables."""
-        return {**super().fits(), "the sessions": self._library.names, "the limits": self.limits}
+        return {**super().compatibility(), "the sessions": self._library.names, "the limits": self.limits}
 
     def _begin(self, seed: int | None, options: ResetOptions) -> Iterator[Point]:
         check_options(options, "session")

@@ -366,7 +366,7 @@ class TownEnv(Restorable, AbstractEnv):
         use_faster_observations(self.observation_type)
         self.observation_space = finite(self.observation_space)
         # highway-env makes new spaces in each reset, and draws the action of the first info from them: they follow from
-        # the environment's seed, whose own generator goes on as if nothing had been drawn.
+        # the environment's seed, whose own generator stays as it was.
         self.action_space.seed(int(copy.deepcopy(self.np_random).integers(SEEDS)))
         for kind in parts_of(self.observation_type):
             viewer = getattr(kind, "viewer", None)
@@ -413,13 +413,13 @@ class TownEnv(Restorable, AbstractEnv):
 
     # --- Copies -------------------------------------------------------------------------------------------------------
 
-    def changing(self) -> dict[str, object]:
+    def mutable_values(self) -> dict[str, object]:
         """Returns the attributes of highway-env that change."""
         return {name: value for name, value in self.__dict__.items() if name not in _CONSTANT}
 
-    def fits(self) -> dict[str, object]:
+    def compatibility(self) -> dict[str, object]:
         """Returns the kind of environment and the settings."""
-        return {**super().fits(), "the settings": self.config}
+        return {**super().compatibility(), "the settings": self.config}
 
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "viewer": None, "_record_video_wrapper": None}

@@ -134,17 +134,17 @@ class World(Lookups, Restorable):
 
     # --- Copies -------------------------------------------------------------------------------------------------------
 
-    def changing(self) -> dict[str, object]:
+    def mutable_values(self) -> dict[str, object]:
         """Returns all attributes but the views, which are looked up again."""
         return self.__getstate__()
 
-    def go_on(self, values: dict[str, object]) -> None:
-        """Takes up these attributes."""
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies these attributes."""
         self.__dict__ = values
 
-    def fits(self) -> dict[str, object]:
+    def compatibility(self) -> dict[str, object]:
         """Returns the town and the settings."""
-        return {**super().fits(), "the town": self.town, "the settings": self.config}
+        return {**super().compatibility(), "the town": self.town, "the settings": self.config}
 
     # --- Time ---------------------------------------------------------------------------------------------------------
 

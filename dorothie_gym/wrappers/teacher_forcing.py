@@ -96,7 +96,7 @@ class TeacherForcing(PointEnv):
             "the session and use UfN-v0, RfN-v0 or NfD-v0"
         )
 
-    def changing(self) -> dict[str, object]:
+    def mutable_values(self) -> dict[str, object]:
         """Raises `StateError`: the policies that play the session are in the middle of their steps."""
         return self.__getstate__()
 

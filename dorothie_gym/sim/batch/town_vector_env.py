@@ -269,18 +269,18 @@ class TownVectorEnv(Restorable, VectorEnv[NDArray[np.float32], ActionArray, NDAr
             empty_records(OutcomeRecord, self.num_envs),
         )
 
-    def changing(self) -> dict[str, object]:
+    def mutable_values(self) -> dict[str, object]:
         """Returns what changes in the environments and in their worlds."""
-        return {**super().changing(), "arrays": self._worlds.arrays}
+        return {**super().mutable_values(), "arrays": self._worlds.arrays}
 
-    def go_on(self, values: dict[str, object]) -> None:
-        """Takes up what changes in the environments and in their worlds."""
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies the values of the environments and of their worlds."""
         self._worlds.arrays = cast(WorldArrays, values.pop("arrays"))
-        super().go_on(values)
+        super().apply_values(values)
 
-    def fits(self) -> dict[str, object]:
+    def compatibility(self) -> dict[str, object]:
         """Returns the kind of environment, their number and the settings."""
-        return {**super().fits(), "num_envs": self.num_envs, "the settings": self.config}
+        return {**super().compatibility(), "num_envs": self.num_envs, "the settings": self.config}
 
     # --- Gymnasium's interface ----------------------------------------------------------------------------------------
 
