@@ -108,6 +108,10 @@ class SessionError(DorothieGymError, ValueError):
     """A session cannot be written or read; the message names the file, the line and the field."""
 
 
+class OutputFolderError(DorothieGymError, RuntimeError):
+    """An output folder was deleted or replaced while it was being written; the message names the folder."""
+
+
 class PolicyLoadError(DorothieGymError, ValueError):
     """A policy name or file cannot be resolved; the message gives the reason and the accepted values."""
 

@@ -70,11 +70,13 @@ def print_json(value: Mapping[str, object] | Sequence[object]) -> None:
 
 @contextmanager
 def reporting_errors() -> Iterator[None]:
-    """Turns errors of the input into one message and exit code 2."""
-    from dorothie_gym.errors import DorothieGymError
+    """Turns errors into one message and exit code 2, or 1 if the output was deleted during the command."""
+    from dorothie_gym.errors import DorothieGymError, OutputFolderError
 
     try:
         yield
+    except OutputFolderError as error:
+        fail(str(error), FAILED)
     except DorothieGymError as error:
         fail(str(error))
     except OSError as error:

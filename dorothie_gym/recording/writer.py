@@ -11,7 +11,7 @@ from typing import IO, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import OutputFolderError, SessionError
 from dorothie_gym.files import PART, write_atomically
 from dorothie_gym.maps import LightColour
 from dorothie_gym.ontology import Role, WeatherParameter
@@ -42,19 +42,22 @@ class SessionWriter:
     the header was written, none (`session_state`). Actors, lights and weather are optional, at each frame.
 
     Args:
-        folder: folder of the session, created if it is missing.
+        folder: folder of the session.
         header: header of the session.
         overwrite: whether an existing session in the folder is deleted.
+        create: whether the folder is created if it is missing.
 
     Raises:
         SessionError: the folder holds a session and `overwrite` is False.
         OSError: the folder cannot be written.
     """
 
-    def __init__(self, folder: Path | str, header: SessionHeader, *, overwrite: bool = False) -> None:
+    def __init__(
+        self, folder: Path | str, header: SessionHeader, *, overwrite: bool = False, create: bool = True
+    ) -> None:
         self.folder = Path(folder)
         self.header = header
-        self._prepare(overwrite)
+        self._prepare(overwrite, create)
         SessionFile(header=header).write(self.folder)
         self._events = (self.folder / EVENTS_FILE).open("xb")
         self._journal = (self.folder / JOURNAL_FILE).open("xb")
@@ -154,10 +157,13 @@ class SessionWriter:
 
         Raises:
             SessionError: the outcome holds other types than JSON's, or the session is closed.
+            OutputFolderError: the folder was deleted since the session began.
         """
         self._check_open("it cannot be finished")
         outcome = canonical_object(outcome, "outcome")
         self.close()
+        if not (self.folder / JOURNAL_FILE).is_file():
+            raise OutputFolderError(f"{self.folder}: the folder was deleted or emptied while it was being written")
         trajectory, scene = read_journal(self.folder / JOURNAL_FILE)
         write_frames(self.folder / FRAMES_FILE, trajectory, scene)
         (self.folder / JOURNAL_FILE).unlink()
@@ -179,8 +185,9 @@ class SessionWriter:
     ) -> None:
         self.close()
 
-    def _prepare(self, overwrite: bool) -> None:
-        self.folder.mkdir(parents=True, exist_ok=True)
+    def _prepare(self, overwrite: bool, create: bool) -> None:
+        if create:
+            self.folder.mkdir(parents=True, exist_ok=True)
         names = (*SESSION_FILES, *(name + PART for name in SESSION_FILES))
         present = [name for name in names if _stands(self.folder / name)]
         if present and not overwrite and present != [HEADER_FILE + PART]:  # that one died before there was a session

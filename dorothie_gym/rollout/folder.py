@@ -13,7 +13,7 @@ from typing import Final, Protocol
 
 from dorothie_gym._version import __version__
 from dorothie_gym.errors import SessionError, short_repr
-from dorothie_gym.files import PART, write_atomically
+from dorothie_gym.files import PART, noticing_deletion, write_atomically
 from dorothie_gym.input_files import MAX_SMALL_JSON, raising, read_json
 from dorothie_gym.recording import FORMAT_VERSION
 
@@ -54,9 +54,10 @@ def locked_folder(root: Path, file: str, settings: Mapping[str, object]) -> Iter
 
     Raises:
         SessionError: the folder holds something else, or another process holds its lock.
+        OutputFolderError: the folder was deleted or replaced inside the block.
         OSError: the folder cannot be written.
     """
-    with _lock(root):
+    with _lock(root), noticing_deletion(root):
         _check_settings(root / file, settings)
         shutil.rmtree(root / PARTS_FOLDER, ignore_errors=True)
         (root / PARTS_FOLDER).mkdir()

@@ -10,6 +10,7 @@ from typing import Protocol
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_log import SessionSummary
+from dorothie_gym.files import noticing_deletion
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.recording import SessionWriter
@@ -37,6 +38,7 @@ def play_session(
     *,
     seed: int,
     folder: Path | str | None = None,
+    create: bool = True,
     on_step: Callable[[SessionEngine], None] | None = None,
 ) -> SessionSummary:
     """Plays a session from reset to end.
@@ -47,6 +49,7 @@ def play_session(
         seed: seed of the session; session and policies follow from it.
         folder: folder in which the session is recorded decision by decision; None records nothing. An interrupted
             session stays in its folder and can be loaded.
+        create: whether the folder is created if it is missing.
         on_step: called with the engine after the reset and after each decision.
 
     Returns:
@@ -55,6 +58,7 @@ def play_session(
     Raises:
         ValueError: a role has no policy.
         SessionError: the folder holds a session already.
+        OutputFolderError: the folder was deleted meanwhile.
         OSError: the folder cannot be written.
     """
     missing = [role for role in AGENT_ROLES if role not in policies]
@@ -64,7 +68,10 @@ def play_session(
     host.reset(seed=seed)
     states = {role: policies[role].initial_state(policy_seed(seed, role), engine.town) for role in AGENT_ROLES}
     with ExitStack() as stack:
-        writer = None if folder is None else stack.enter_context(SessionWriter(folder, engine.session_header()))
+        writer = None
+        if folder is not None:
+            writer = stack.enter_context(SessionWriter(folder, engine.session_header(), create=create))
+            stack.enter_context(noticing_deletion(writer.folder))
         recorder = None if writer is None else SessionRecorder(engine, writer)
         if on_step is not None:
             on_step(engine)

@@ -17,7 +17,7 @@ from typing import Final, Generic, TypeVar
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.errors import InputFileError, SessionError
+from dorothie_gym.errors import InputFileError, OutputFolderError, SessionError
 from dorothie_gym.files import write_atomically
 from dorothie_gym.input_files import MAX_SMALL_JSON, checked, read_json
 from dorothie_gym.maps import Town
@@ -59,6 +59,7 @@ class SessionMaker:
 
         Raises:
             SessionError: the folder holds something else.
+            OSError: the folder cannot be written, or was deleted.
             ValueError: a policy cannot be made, or its action is malformed; policies may raise other errors.
         """
         folder = self.root / plan.path
@@ -74,9 +75,11 @@ class SessionMaker:
         part = self.root / PARTS_FOLDER / folder.name
         engine = self.engine(plan.town)
         policies = {role: self.cast[role].make(role, engine.limits) for role in AGENT_ROLES}
-        play_session(engine, policies, seed=plan.seed, folder=part)
+        part.mkdir(exist_ok=True)  # without its parents: a series that was deleted meanwhile is not made again
+        play_session(engine, policies, seed=plan.seed, folder=part, create=False)
         session = Session.load(part)
-        folder.parent.mkdir(parents=True, exist_ok=True)
+        for parent in reversed(Path(plan.path).parents[:-1]):
+            (self.root / parent).mkdir(exist_ok=True)
         part.rename(folder)
         return session, folder, True
 
@@ -181,6 +184,7 @@ def run_sessions(
         ValueError: there are no workers.
         SessionError: the folder holds something else, or another process holds its lock.
         ProcessError: a session failed in another process, a process died, or the cluster cannot be reached.
+        OutputFolderError: the folder was deleted or replaced meanwhile.
         OSError: the folder cannot be written.
     """
     if workers < 1:
@@ -221,7 +225,7 @@ class _SessionTask(Generic[Result]):
         begun = time.process_time()
         try:
             session, folder, played = self._maker(plan)
-        except (SessionError, OSError):
+        except (SessionError, OutputFolderError, OSError):
             raise  # errors of the folder, not of the session
         except Exception as error:
             if not self._job.keep_errors:

@@ -176,6 +176,7 @@ def roll_out(
         ValueError: there are no workers.
         SessionError: the folder holds something else, or another process holds its lock.
         ProcessError: a process died, or there is no such cluster.
+        OutputFolderError: the folder was deleted or replaced meanwhile.
         OSError: the folder cannot be written.
     """
     root, rows = Path(folder), list[RolloutRow]()
