@@ -4,6 +4,7 @@ python docs/pages.py environments         # `environments/*.md`, from the spaces
 python docs/pages.py frames               # their pictures
 python docs/pages.py transcripts          # simulates sessions until three fit; a few seconds each
 python docs/pages.py figures CORPUS       # statistics of a corpus made by `dorothie-gym generate`
+python docs/pages.py models               # the shipped models in `models.md`, from their cards
 python docs/pages.py curves ppo=DIR,DIR maskable_ppo=DIR,DIR   # one run of `dorothie-gym train-rl` per seed
 """
 
@@ -35,7 +36,8 @@ from dorothie_gym.analysis.exception_attribution import kind_of
 from dorothie_gym.analysis.transcript import markdown
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import make_policy
+from dorothie_gym.policies import make_policy, pretrained_card, pretrained_names
+from dorothie_gym.policies.pretrained import CardFigure, pretrained_size
 from dorothie_gym.recording import Corpus, EventType, Session
 from dorothie_gym.rendering.charts import SHEET, SOFT, empty_figure, hexadecimal
 from dorothie_gym.rendering.palette import CAR, INK_SOFT, LIGHT_GREEN, NOTE, PROP
@@ -43,6 +45,7 @@ from dorothie_gym.rollout import play_session
 
 DOCS = Path(__file__).parent
 TRANSCRIPTS, DATA_SHEET, CURVES = DOCS / "transcripts.md", DOCS / "data-sheet.md", DOCS / "navigation_curve.png"
+MODELS = DOCS / "models.md"
 BEGIN, END = "<!-- figures: written by docs/pages.py -->", "<!-- end of the figures -->"
 
 LONGEST = 420.0
@@ -195,6 +198,37 @@ def _phenomena(corpus: Corpus) -> Iterator[tuple[str, ...]]:
         yield str(row["number"]), row["title"], str(row["sessions"]), share
 
 
+# --- Shipped models ---------------------------------------------------------------------------------------------------
+
+
+def models() -> str:
+    """Returns the cards of the shipped models as Markdown."""
+    cards = {name: pretrained_card(name) for name in pretrained_names()}
+    rows = (
+        (
+            f"`{name}`", card.description, f"{pretrained_size(name) / 1e6:.2f} MB", _percent(card.figures["success"]),
+            _percent(card.figures["driving_score"]), f"{card.steps:,}",
+        )
+        for name, card in cards.items()
+    )  # fmt: skip
+    commands = (command for card in cards.values() for command in (*card.commands, card.rollout))
+    return "\n".join(
+        [
+            *_table(rows, "name", "model", "size", "success", "driving score", "training steps"),
+            "",
+            "The models were trained and measured by:",
+            "",
+            "```bash",
+            *dict.fromkeys(commands),
+            "```",
+        ]
+    )
+
+
+def _percent(figure: CardFigure) -> str:
+    return f"{100 * figure.mean:.0f} % [{100 * figure.low:.0f}, {100 * figure.high:.0f}]"
+
+
 def curves(runs: dict[str, list[Path]]) -> str:
     """Draws success over steps, with a thin line per run and a thick line for their mean; returns a table."""
     colours = [hexadecimal(colour) for colour in (CAR, PROP, NOTE, INK_SOFT, LIGHT_GREEN)]
@@ -230,6 +264,7 @@ def main(arguments: list[str]) -> None:
     commands.add_parser("frames")
     commands.add_parser("transcripts").add_argument("--first-seed", type=int, default=1)
     commands.add_parser("figures").add_argument("corpus", type=Path)
+    commands.add_parser("models")
     commands.add_parser("curves").add_argument("runs", nargs="+", metavar="NAME=DIR,DIR,...")
     given = parser.parse_args(arguments)
     if given.command == "environments":
@@ -246,10 +281,10 @@ def main(arguments: list[str]) -> None:
     if given.command == "transcripts":
         TRANSCRIPTS.write_text(transcripts(given.first_seed), encoding="utf-8", newline="\n")
         return
-    page = DATA_SHEET.read_text(encoding="utf-8")
-    before, after = page.split(BEGIN)[0], page.split(END)[1]
-    text = f"{before}{BEGIN}\n\n{figures(given.corpus)}\n\n{END}{after}"
-    DATA_SHEET.write_text(text, encoding="utf-8", newline="\n")
+    page, text = (MODELS, models()) if given.command == "models" else (DATA_SHEET, figures(given.corpus))
+    written = page.read_text(encoding="utf-8")
+    before, after = written.split(BEGIN)[0], written.split(END)[1]
+    page.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

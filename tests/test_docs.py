@@ -182,6 +182,18 @@ def test_the_diagram_of_the_architecture_has_the_order_of_the_import_contract() 
     assert None not in lines and lines == sorted(lines)
 
 
+def test_the_models_page_has_the_cards_of_the_shipped_models(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (DOCS / "models.md").read_text(encoding="utf-8")
+    assert pages(monkeypatch).models() in text, "it is out of date: run python docs/pages.py models"
+    pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+    section = text.split("## Shipped models")[1].split("\n## ")[0]
+    for code in re.findall(r"```python\n(.*?)```", section, flags=re.DOTALL):
+        exec(compile(code, "models.md", "exec"), {})
+    assert "CardFigure(mean=0." in capsys.readouterr().out
+
+
 def test_every_page_is_in_the_navigation() -> None:
     navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
     assert [path.name for path in DOCS.glob("*.md") if f": {path.name}" not in navigation] == []

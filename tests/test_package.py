@@ -5,6 +5,8 @@ import importlib
 import json
 import subprocess
 import sys
+import tarfile
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -85,3 +87,26 @@ def test_pettingzoo_makes_both_forms() -> None:
 def test_gymnasium_makes_a_role_without_importing_the_package_first() -> None:
     env = gym.make("dorothie_gym:dorothie_gym/CoWizard-v0", town="brookside")
     assert env.unwrapped.role is dorothie_gym.Role.CO_WIZARD  # type: ignore[attr-defined]  # `gym.make` returns an `Env`
+
+
+@pytest.mark.parametrize("target", ["wheel", "sdist"])
+def test_distributions_contain_the_shipped_models(target: str, tmp_path: Path) -> None:
+    pytest.importorskip("hatchling", reason="needs the backend of the build")
+    pytest.importorskip("hatch_fancy_pypi_readme", reason="needs the plugin of the build")
+    root = Path(__file__).parents[1]
+    command = [sys.executable, "-m", "hatchling", "build", "--target", target, "--directory", str(tmp_path)]
+    subprocess.run(command, cwd=root, check=True, capture_output=True, timeout=120)
+    (built,) = tmp_path.iterdir()
+    if target == "wheel":
+        with zipfile.ZipFile(built) as archive:
+            contents = {name: archive.read(name) for name in archive.namelist() if "/data/pretrained/" in name}
+    else:
+        with tarfile.open(built) as archive:
+            members = [member for member in archive.getmembers() if "/data/pretrained/" in member.name]
+            contents = {member.name: archive.extractfile(member).read() for member in members}  # type: ignore[union-attr]  # files
+    shipped = root / "dorothie_gym" / "policies" / "data" / "pretrained"
+    files = [path for path in shipped.rglob("*") if path.is_file()]
+    assert len(files) == len(contents) >= 3
+    for path in files:
+        (found,) = (name for name in contents if name.endswith(path.relative_to(shipped.parent).as_posix()))
+        assert contents[found] == path.read_bytes()

@@ -15,7 +15,7 @@ from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.generate import generate
-from dorothie_gym.cli.listings import envs, storyboards, towns
+from dorothie_gym.cli.listings import envs, policies, storyboards, towns
 from dorothie_gym.cli.options import PictureCommand
 from dorothie_gym.cli.output import exit_interrupted
 from dorothie_gym.cli.rollout import leaderboard, rollout
@@ -52,6 +52,7 @@ app.command()(run)
 app.command(cls=PictureCommand)(towns)
 app.command()(storyboards)
 app.command()(envs)
+app.command()(policies)
 app.command()(evaluate)
 app.add_typer(bench, name="bench")
 app.command()(convert)

@@ -1,11 +1,12 @@
-"""`dorothie-gym towns`, `storyboards` and `envs`: lists of towns, storyboards and environments."""
+"""`dorothie-gym towns`, `storyboards`, `envs` and `policies`: lists of what can be named on the command line."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 from rich.table import Table
@@ -13,6 +14,7 @@ from rich.table import Table
 from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import OWN_NAME
 from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.ontology import AGENT_ROLES
 
 if TYPE_CHECKING:
     from dorothie_gym.maps.lint import Fault
@@ -119,6 +121,75 @@ def envs(
     console = stdout()
     console.print(table)
     console.print(f"Make one with {rows[0]['make']}, after import dorothie_gym.", style="dim")
+
+
+_DESCRIPTIONS: Final = {
+    "scripted": "Rules; speaks by grammar",
+    "silent": "Does nothing",
+    "random": "Samples the action space",
+    "lane-follow": "Drives on, never talks",
+}
+
+
+def policies(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+) -> None:
+    """List the policies by name, with size, validation figures and training of the models that are shipped."""
+    with reporting_errors():
+        rows = _policy_rows()
+    if as_json:
+        print_json(rows)
+        return
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("Policy", style="bold", no_wrap=True)
+    table.add_column("Roles")
+    table.add_column("Size", justify="right", no_wrap=True)
+    table.add_column("Success")
+    table.add_column("Description")
+    for row in rows:
+        size = "" if row["bytes"] is None else f"{row['bytes'] / 1e6:.2f} MB"
+        roles = "all" if len(row["roles"]) == len(AGENT_ROLES) else ", ".join(row["roles"])
+        table.add_row(row["name"], roles, size, _success(row["validation"]), row["description"])
+    console = stdout()
+    console.print(table)
+    console.print(
+        "Success, with its 95 % interval, is that of validation sessions. Shipped models need dorothie-gym[baselines]. "
+        "Other models are given by the path of their folder. Training of the shipped ones:",
+        style="dim",
+    )
+    for row in rows:
+        for command in row["training"]:
+            console.print(f"  {row['name']}: {command}", style="dim", soft_wrap=True)
+
+
+def _policy_rows() -> list[Facts]:
+    """Returns the policies with their roles; shipped models with their cards."""
+    from dorothie_gym.policies import policy_names, pretrained_card, pretrained_names
+    from dorothie_gym.policies.pretrained import pretrained_size
+
+    roles: dict[str, list[str]] = {}
+    for role in AGENT_ROLES:
+        for name in policy_names(role):
+            roles.setdefault(name, []).append(str(role))
+    rows = []
+    for name, played in roles.items():
+        row: Facts = {"name": name, "roles": played, "description": _DESCRIPTIONS.get(name, "")}
+        row |= {"bytes": None, "training": [], "validation": None}
+        if name in pretrained_names():
+            card = pretrained_card(name)
+            validation = {"command": card.rollout, "sessions": card.sessions}
+            validation |= {key: asdict(figure) for key, figure in card.figures.items()}
+            row |= {"description": card.description, "bytes": pretrained_size(name)}
+            row |= {"training": list(card.commands), "validation": validation}
+        rows.append(row)
+    return rows
+
+
+def _success(validation: Facts | None) -> str:
+    if validation is None:
+        return ""
+    mean, low, high = (100 * validation["success"][key] for key in ("mean", "low", "high"))
+    return f"{mean:.0f} % [{low:.0f}, {high:.0f}]"
 
 
 def _show_towns(rows: Sequence[Facts]) -> None:

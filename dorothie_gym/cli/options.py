@@ -42,8 +42,9 @@ Participant = Annotated[
 CoWizard = Annotated[
     str,
     typer.Option(
-        metavar="scripted|silent|random|lane-follow|FILE",
-        help="Policy of the Co-Wizard; a file holds a learned policy.",
+        metavar="NAME|FILE",
+        help="Policy of the Co-Wizard: scripted, silent, random, lane-follow, pretrained:maskable-ppo (see "
+        "`policies`), or the folder of a learned policy.",
         autocompletion=complete_policy("co_wizard"),
     ),
 ]
@@ -114,7 +115,7 @@ def find_cast(participant: str, co_wizard: str, ad_wizard: str) -> dict[Role, Pl
     except PolicyLoadError as error:
         fail(str(error))
     for role, player in cast.items():
-        if player.path is not None:
+        if player.trained:
             _check_loads(player, role)
     return cast
 
@@ -125,8 +126,6 @@ def _check_loads(player: Player, role: Role) -> None:
 
     try:
         player.make(role, SpaceLimits())
-    except ImportError as error:
-        fail(f"{role}: {player.name} needs {error.name}; run: pip install 'dorothie-gym[baselines]'")
     except ValueError as error:
         fail(f"{role}: {error}")
 

@@ -1,10 +1,11 @@
-"""Policies by name, and trained policies from files."""
+"""Policies by name, shipped trained policies among them, and trained policies from files."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -17,6 +18,7 @@ from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard
 from dorothie_gym.policies.participant import ScriptedParticipant
 from dorothie_gym.policies.policy import AnyPolicy
+from dorothie_gym.policies.pretrained import check_fits, is_pretrained, names_for, pretrained_folder
 from dorothie_gym.policies.trivial import LaneFollowPolicy, RandomPolicy, SilentPolicy
 from dorothie_gym.spaces import SpaceLimits
 
@@ -29,7 +31,8 @@ LANE_FOLLOW = "lane-follow"
 
 def policy_names(role: Role) -> tuple[str, ...]:
     """Returns the names that `make_policy` accepts for a role."""
-    return (*POLICY_NAMES, LANE_FOLLOW) if role is Role.CO_WIZARD else POLICY_NAMES
+    own = (LANE_FOLLOW,) if role is Role.CO_WIZARD else ()
+    return (*POLICY_NAMES, *own, *names_for(role))
 
 
 def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> AnyPolicy:
@@ -37,12 +40,13 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
 
     Args:
         name: "scripted", "silent" (does nothing) or "random" (samples the action space); for the Co-Wizard also
-            "lane-follow" (drives on, never talks).
+            "lane-follow" (drives on, never talks), or a shipped model such as "pretrained:maskable-ppo".
         role: role of the policy.
         limits: sizes of the spaces.
 
     Raises:
-        ValueError: if there is no policy of that name, or the role takes no actions.
+        ValueError: if there is no policy of that name, the role takes no actions, or a shipped model needs the extra
+            `baselines`, which is not installed.
     """
     if role not in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD):
         raise ValueError(f"role is {role}; policies act for participant, co_wizard and ad_wizard")
@@ -53,6 +57,9 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     if name not in policy_names(role):
         hint = did_you_mean(name, policy_names(role))
         raise ValueError(f"there is no policy {name!r}; {hint}the policies are {', '.join(policy_names(role))}")
+    if is_pretrained(name):
+        check_fits(name)
+        return _trained_player(name, pretrained_folder(name), role).make(role, limits or SpaceLimits())
     if name == LANE_FOLLOW:
         return LaneFollowPolicy(limits)
     if role is Role.PARTICIPANT:
@@ -117,7 +124,8 @@ class Player:
 
     Attributes:
         name: name of the policy, or the path that was given.
-        path: file or folder of a trained policy; None for a policy by name.
+        path: file or folder of a trained policy; None for a policy by name, also for that of a shipped model, whose
+            place differs between machines.
         loader: function that reads it.
         sha256: hash of the file, or of the model files ("model.*") of the folder; identifies the policy of a rollout.
         training: cost of the training in `steps` and `seconds`, where the JSON of the file has them.
@@ -129,15 +137,21 @@ class Player:
     sha256: str | None = None
     training: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def trained(self) -> bool:
+        """Whether the policy is read from a file."""
+        return self.sha256 is not None
+
     def make(self, role: Role, limits: SpaceLimits) -> AnyPolicy:
         """Returns the policy.
 
         Raises:
-            ValueError: the role has no policy of this name, or the file cannot be read.
+            ValueError: the role has no policy of this name, the file cannot be read, or a library is not installed.
         """
         if self.path is None or self.loader is None:
             return make_policy(self.name, role, limits)
-        return self.loader(self.path, role, limits)
+        with _reporting_missing_library(self.name):
+            return self.loader(self.path, role, limits)
 
 
 SCRIPTED: Final = Player(name="scripted")
@@ -158,13 +172,23 @@ def find_player(given: str, role: Role) -> Player:
         PolicyLoadError: there is no such policy for the role, no such file, or none that can be played.
     """
     if given in policy_names(role):
-        return Player(name=given)
+        return _shipped_player(given, role) if is_pretrained(given) else Player(name=given)
     path = Path(given)
     if not path.exists():
         raise PolicyLoadError(
             f"{role}: there is no policy {given!r}, nor a file of that name; "
             f"{did_you_mean(given, policy_names(role))}the policies are {', '.join(policy_names(role))}"
         )
+    return _trained_player(given, path, role)
+
+
+def _shipped_player(name: str, role: Role) -> Player:
+    """Returns the source of a shipped model."""
+    return replace(_trained_player(name, pretrained_folder(name), role), path=None, loader=None)
+
+
+def _trained_player(given: str, path: Path, role: Role) -> Player:
+    """Returns the source of a policy in a file or folder; raises `PolicyLoadError` if it cannot be played."""
     description = _description(path)
     kinds = _kinds_of(path, description)
     loader = next((found for kind in kinds if (found := _loader_of(kind))), None)
@@ -175,6 +199,21 @@ def find_player(given: str, role: Role) -> Player:
         )
     training = {name: value for name in _COSTS if (value := _cost(description.get(name))) is not None}
     return Player(name=given, path=path, loader=loader, sha256=_sha256(path), training=training)
+
+
+_BASELINES: Final = ("torch", "safetensors", "stable_baselines3", "sb3_contrib")
+"""Libraries of the extra `baselines`."""
+
+
+@contextmanager
+def _reporting_missing_library(name: str) -> Iterator[None]:
+    """Turns the failed import of a library into a `PolicyLoadError` that says how to install it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        library = (error.name or str(error)).partition(".")[0]
+        package = "'dorothie-gym[baselines]'" if library in _BASELINES else library
+        raise PolicyLoadError(f"{name} needs {library}, which is not installed; run: pip install {package}") from None
 
 
 def _cost(value: object) -> float | None:
