@@ -101,6 +101,7 @@ def main(
     if unknown:
         raise SystemExit(f"there is no model {unknown[0]!r}; choose from {', '.join(RECIPES)}")
     work.mkdir(parents=True, exist_ok=True)
+    work = work.resolve()  # rollouts keep the paths of their models
     _call(GENERATE, work)
     for name in chosen:
         recipe = RECIPES[name]
@@ -118,7 +119,9 @@ def _call(command: str, work: Path) -> None:
 
 def _choose(recipe: Recipe, work: Path) -> tuple[Path, RolloutResult]:
     """Plays the validation sessions with each result of a training; returns the best one, and its sessions."""
-    found = [(work / folder, _validate(work / folder, work / "validation")) for folder in recipe.folders]
+    players = [find_player(str(work / folder), Role.CO_WIZARD) for folder in recipe.folders]
+    different = {player.sha256: player for player in reversed(players)}  # the best evaluation can be the last step
+    found = [(Path(player.name), _validate(player, work / "validation")) for player in different.values()]
     for folder, result in found:
         print(
             f"{folder}: {', '.join(f'{key} {figure.mean:.3f}' for key, figure in _figures(result).items())}", flush=True
@@ -197,9 +200,8 @@ def _check_same_actions(trained: Path, shipped: Path, folder: Path) -> None:
         raise SystemExit(f"{shipped} acts otherwise than {trained}")
 
 
-def _validate(trained: Path, folder: Path) -> RolloutResult:
+def _validate(player: Player, folder: Path) -> RolloutResult:
     """Plays the validation sessions, or reads those that the same weights have played."""
-    player = find_player(str(trained), Role.CO_WIZARD)
     assert player.sha256 is not None
     return roll_out(_rollout_settings(player, VALIDATION_SESSIONS), folder / player.sha256[:12])
 

@@ -33,7 +33,7 @@ from dorothie_gym.spaces import SpaceLimits
 LIMIT = 5_000_000
 """Largest size of all shipped models [bytes]."""
 
-NAMES = ("pretrained:maskable-ppo",)
+NAMES = ("pretrained:maskable-ppo", "pretrained:ppo")
 
 
 def call(*arguments: str) -> Result:
