@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled
-from dorothie_gym.compilation.by_reference import by_reference, row_of
+from dorothie_gym.compilation.by_reference import by_reference, gives_row
 
 
 @by_reference
@@ -60,6 +60,11 @@ def test_array_that_is_not_contiguous_is_refused():
 @by_reference
 class Row(NamedTuple):
     values: NDArray[np.float64]
+
+
+@gives_row
+def row_of(rows: Row, number: int) -> Row:
+    return Row(rows.values[number])
 
 
 @compiled

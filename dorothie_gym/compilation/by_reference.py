@@ -5,23 +5,23 @@ that takes it, and most of the compiler's work. A class with the decorator `by_r
 table with the address and the shape of each array. Reading an item loads them from the table, which never changes
 during a call, so that LLVM may keep what it has loaded.
 
-The table lies on the stack of the call from Python (or of `row_of`), whose arguments keep the arrays alive. Compiled
+The table lies on the stack of the call from Python (or of `gives_row`), whose arguments keep the arrays alive. Compiled
 code reads items; it cannot create such tuples, unpack them, or return them or their arrays to Python.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import models
-from numba.core.imputils import lower_getattr_generic
+from numba.core.imputils import lower_builtin, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import NativeValue, intrinsic, register_model, typeof_impl, unbox
+from numba.extending import NativeValue, register_model, type_callable, typeof_impl, unbox
 from numba.np.numpy_support import as_dtype
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from numba.core.base import BaseContext
     from numba.core.typing.templates import Signature
 
+F = TypeVar("F", bound=Callable[..., object])
 T = TypeVar("T", bound=type)
 
 WORD = 8
@@ -187,16 +188,21 @@ def _unbox(kind: Reference, value: Value, c: Any) -> NativeValue:
     return NativeValue(_finished(builder, table), is_error=builder.load(failed))
 
 
-@intrinsic  # type: ignore[untyped-decorator]  # numba has no type information
-def row_of(_context: object, batch: types.Type, number: types.Type) -> Any:
-    """Returns row `number` of each array of a tuple passed by address, as such a tuple; for compiled code."""
-    if not isinstance(batch, Reference):
-        return None
-    members = tuple((item, kind.copy(ndim=kind.ndim - 1)) for item, kind in batch.members)
-    row = Reference(batch.name.split(".")[0], members)
+def gives_row(function: F) -> F:
+    """Makes compiled functions compute a function (batch, number) on the spot: row `number` of each array of a tuple.
 
+    The row is a tuple passed by address, whose table lies on the stack of the function with the call: it is valid until
+    that function returns or gets there again.
+    """
+
+    @type_callable(function)  # type: ignore[untyped-decorator]  # numba has no type information
+    def typing(_context: object) -> Callable[[types.Type, types.Type], Reference | None]:
+        return lambda batch, number: _row_type(batch) if isinstance(batch, Reference) else None
+
+    @lower_builtin(function, Reference, types.Integer)  # type: ignore[untyped-decorator]  # numba has no type information
     def generate(context: BaseContext, builder: IRBuilder, signature: Signature, arguments: Sequence[Value]) -> Value:
-        stacked, at = arguments
+        batch, row = signature.args[0], signature.return_type
+        stacked, at = arguments[0], context.cast(builder, arguments[1], signature.args[1], types.intp)
         table = _new_table(builder, row)
         for item, kind in batch.members:
             array = context.make_array(kind)(context, builder, _read(context, builder, batch, stacked, item))
@@ -209,4 +215,9 @@ def row_of(_context: object, batch: types.Type, number: types.Type) -> Any:
                 builder.store(length, _place(builder, table, offset + WORD * (1 + axis), length.type))
         return _finished(builder, table)
 
-    return row(batch, types.intp), generate
+    return function
+
+
+def _row_type(batch: Reference) -> Reference:
+    members = tuple((item, kind.copy(ndim=kind.ndim - 1)) for item, kind in batch.members)
+    return Reference(batch.name.split(".")[0], members)

@@ -36,6 +36,11 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]  # numba has no type infor
         """Leaves all to the optimisation of the whole."""
         ll_module.data_layout = self._codegen._data_layout
 
+    def _optimize_final_module(self) -> None:
+        """Optimises once: numba's first, cheaper run prepares the removal of reference counts."""
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
     def finalize(self) -> None:
         """Links all parts, optimises, and makes machine code."""
         for part in _parts_of(self):

@@ -7,12 +7,10 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numba import types
-from numba.extending import overload
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import WITHOUT_COUNTS, concurrent
-from dorothie_gym.compilation.by_reference import row_of
+from dorothie_gym.compilation import concurrent
+from dorothie_gym.compilation.by_reference import gives_row
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.processors import available_processors
@@ -20,8 +18,6 @@ from dorothie_gym.sim.batch.threads import ThreadPool, take, turns_of
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.step import step
-
-INLINED = {**WITHOUT_COUNTS, "forceinline": True}
 
 
 def stacked(world: WorldArrays, count: int) -> WorldArrays:
@@ -50,19 +46,10 @@ def put(batch: WorldArrays, number: int, world: WorldArrays) -> None:
         np.copyto(row.view(np.uint8), array.view(np.uint8))
 
 
+@gives_row
 def world_of(batch: WorldArrays, number: int) -> WorldArrays:
     """Returns a world of a batch: views of its arrays, of the same types as those of a single world."""
     return WorldArrays._make(array[number] for array in batch)
-
-
-@overload(world_of, jit_options=INLINED)
-def _compiled_world_of(batch: types.Type, number: types.Type) -> Callable[..., WorldArrays]:
-    # numba requires the same annotations as above
-    def one(batch: types.Type, number: types.Type) -> WorldArrays:
-        world: WorldArrays = row_of(batch, number)
-        return world
-
-    return one
 
 
 @concurrent
