@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
 from dorothie_gym.cli.options import OWN_NAME, AsJson, CommandContext, PictureCommand
 from dorothie_gym.cli.output import check_picture, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.cli.warm_up import compile_first
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 Measure: TypeAlias = "Callable[[Progress], Figures]"
 """Measurement; takes a callback for its progress."""
+
+SIMULATING: Final = ("world", "env", "vector", "rl")
+"""Measurements of the simulation, which is compiled first."""
 
 
 _UsageError: Any = typer.BadParameter.__base__
@@ -206,8 +210,11 @@ def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> 
     if picture is not None:
         check_picture(picture)
     try:
-        with reporting_errors(), _progress() as progress:
-            figures = measure(progress)
+        with reporting_errors():
+            if name in SIMULATING:
+                compile_first(everything=name == "vector")
+            with _progress() as progress:
+                figures = measure(progress)
     except KeyboardInterrupt:
         exit_interrupted("Interrupted; there are no results.")
     if as_json:

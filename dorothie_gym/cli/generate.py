@@ -19,6 +19,7 @@ from dorothie_gym.cli.output import (
     session_progress,
     stdout,
 )
+from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
@@ -44,8 +45,9 @@ def generate(
         from dorothie_gym.rollout import generate_corpus
 
         config = env_config(max_seconds, word_errors)
-        begun = time.perf_counter()
         try:
+            compile_first()
+            begun = time.perf_counter()
             with session_progress(quiet=as_json) as on_session:
                 made = generate_corpus(
                     out,

@@ -34,6 +34,7 @@ from dorothie_gym.cli.output import (
     stdout,
     wide_stdout,
 )
+from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
@@ -95,6 +96,7 @@ def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | 
 
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out
     try:
+        compile_first()
         with session_progress(quiet=quiet) as on_session:
             result = roll_out(settings, folder, workers=workers, ray=ray, on_session=on_session)
     except KeyboardInterrupt:

@@ -32,12 +32,16 @@ def warm_up(
         stdout().print(f"Nothing to compile; all is in {folder}", soft_wrap=True, markup=False)
 
 
-def compile_first() -> None:
-    """Compiles what sessions need if it is not in the cache, with a progress bar on a terminal."""
+def compile_first(*, everything: bool = False) -> None:
+    """Compiles what is not in the cache, with a progress bar on a terminal.
+
+    Args:
+        everything: whether vectorised environments are needed, too, or sessions only.
+    """
     from dorothie_gym.engine.warm_up import is_warm
 
-    if not is_warm():
-        compile_with_progress(everything=False)
+    if not is_warm(everything=everything):
+        compile_with_progress(everything=everything)
 
 
 def compile_with_progress(*, everything: bool) -> int:

@@ -24,6 +24,7 @@ from dorothie_gym.interruption import starting_process
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.processors import available_processors
+from dorothie_gym.sim.batch.egos import play_share
 from dorothie_gym.sim.batch.town_vector_env import TownVectorEnv
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.network.network import TownNetwork
@@ -50,9 +51,10 @@ compile_loops(lambda name, *_: print(name, flush=True), everything=sys.argv[1:] 
 """
 
 
-def is_warm() -> bool:
-    """Returns whether the loop over substeps needs no compilation."""
-    return not isinstance(step, CompiledFunction) or step.is_cached()
+def is_warm(*, everything: bool = False) -> bool:
+    """Returns whether the loop over substeps needs no compilation; with `everything` that of batches neither."""
+    loops = (step, play_share) if everything else (step,)
+    return all(not isinstance(loop, CompiledFunction) or loop.is_cached() for loop in loops)
 
 
 def warm_up(progress: Progress | None = None, *, everything: bool = False) -> None:
@@ -154,7 +156,7 @@ def _reporting(progress: Progress | None) -> Iterator[Callable[[str], None]]:
 @contextmanager
 def _helper(report: Callable[[str], None], everything: bool) -> Iterator[Callable[[], None]]:
     """Compiles the loops in a second process; yields a function that waits for its end."""
-    if is_warm() or available_processors() < 2:
+    if is_warm(everything=everything) or available_processors() < 2:
         yield lambda: None
         return
     arguments: Sequence[str] = ["everything"] if everything else []
