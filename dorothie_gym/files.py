@@ -32,7 +32,7 @@ def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
             is `path` with the ending `PART`, so that a later write removes what a killed process left.
 
     Raises:
-        OSError: the file cannot be written.
+        OSError: the file cannot be written; the error names `path`.
     """
     if shared:
         part = path.with_name(f"{path.name[:80]}.{secrets.token_hex(8)}{PART}")
@@ -42,8 +42,10 @@ def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
     try:
         yield part
         os.replace(part, path)
-    except BaseException:
+    except BaseException as error:
         part.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (None, str(part)) and error.errno is not None:
+            raise OSError(error.errno, error.strerror, str(path)) from error  # errors of writing name no file
         raise
 
 

@@ -12,9 +12,9 @@ from typing import Any, Final, Self
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 
+from dorothie_gym.baselines.tensor_files import save_tensors
 from dorothie_gym.errors import CheckpointError, InputFileError, ModelFileError, one_line, short_repr
 from dorothie_gym.files import replacing, write_atomically
 from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, parse_json, read_json
@@ -45,7 +45,7 @@ def save(
             tensors |= {f"{_OPTIMISER}{row}.{name}": value.cpu().contiguous() for name, value in state.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path, shared=True) as part:
-        save_file(tensors, part, metadata={_ABOUT: json.dumps(about, sort_keys=True)})
+        save_tensors(tensors, part, {_ABOUT: json.dumps(about, sort_keys=True)})
 
 
 def about(path: Path) -> dict[str, Any]:

@@ -73,7 +73,8 @@ def sheet(path: Path) -> Iterator[Figure]:
     with empty_figure(*FIGURE_SIZE) as figure:
         figure.set_layout_engine("constrained")
         yield figure
-        figure.savefig(path, format="png", dpi=DOTS_PER_INCH)
+        with replacing(path) as part:
+            figure.savefig(part, format="png", dpi=DOTS_PER_INCH)
 
 
 def draw_reward_curve(rows: Sequence[Mapping[str, Any]], title: str, path: Path) -> None:

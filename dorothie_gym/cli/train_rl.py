@@ -292,7 +292,7 @@ def _progress(
             yield on_progress, on_stage
         except KeyboardInterrupt:  # a running training catches it and saves
             progress.stop()
-            exit_interrupted(f"Interrupted before the first step; {out} is unchanged. The same command starts again.")
+            exit_interrupted("Interrupted before the first step; the same command starts again.")
 
 
 def _facts(result: TrainingResult[Evaluation], settings: RunSettings) -> dict[str, object]:

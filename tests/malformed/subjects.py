@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from tests.maps import opendrive_text as xodr
 from tests.maps.yaml_text import MIDTOWN
 from tests.recording.builders import write
 from tests.recording.dialogues import talk
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.rl import Training
 
 
 @dataclass(frozen=True)
@@ -266,6 +270,32 @@ def _selfplay_model(folder: Path) -> None:
     save_model(make_network(settings.learner(), size + 8, actions + 2), settings, folder / "selfplay", 9.0, fields)
 
 
+def _unfinished_run(folder: Path) -> None:
+    from dorothie_gym.baselines.rl.resumption import CHECKPOINT
+
+    training = _training(folder / "run")
+    training.run()
+    for path in training.folder.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        elif path.name != CHECKPOINT:
+            path.unlink()
+
+
+def _resume_run(folder: Path) -> None:
+    _training(folder / "run")._vector.close()
+
+
+def _training(folder: Path) -> Training:
+    from dorothie_gym.baselines.rl import Training, TrainingSettings
+
+    settings = TrainingSettings(
+        algorithm="ppo", env="CartPole-v1", steps=64, environments=2, evaluate_every=32, episodes=1, network=(8,),
+        parameters={"n_steps": 16, "batch_size": 32, "n_epochs": 1},
+    )  # fmt: skip
+    return Training(settings, folder)
+
+
 def _benchmark_model(folder: Path) -> None:
     import torch
 
@@ -378,6 +408,7 @@ SUBJECTS: Final = MappingProxyType(
         "cache": Subject(_cache, _read_cache),
         "rl": Subject(_rl_model, _read_model, slow=True),
         "selfplay": Subject(_selfplay_model, _read_model, slow=True),
+        "run": Subject(_unfinished_run, _resume_run, slow=True),
         "benchmark": Subject(_benchmark_model, _read_model),
     }
 )

@@ -27,7 +27,7 @@ GROUPS = (
     ("native", "release", "sample", "hub"),
     ("corpus", "predictions", "storyboard", "rollout", "opendrive", "cache"),
     ("yaml",),
-    ("rl", "selfplay", "benchmark"),
+    ("rl", "selfplay", "run", "benchmark"),
 )
 """Kinds that share a process, by the time that they take."""
 

@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -13,12 +14,13 @@ from typing import Any, Final, TypeAlias, TypeVar
 
 import torch
 from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file
 from stable_baselines3.common.vec_env import VecEnv
 
 from dorothie_gym.baselines.rl.environments import make_env_of_model
 from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, ON_POLICY, Page, RunSettings, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import AnyEnv
+from dorothie_gym.baselines.tensor_files import save_tensors
 from dorothie_gym.errors import InputFileError, ModelFileError, SettingsError, one_line
 from dorothie_gym.files import replacing
 from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, raising, read_json
@@ -42,13 +44,12 @@ MODEL_FORMAT: Final = 1
 """Version of the two files."""
 
 
-def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv, *, log: Path | None = None) -> Model:
+def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv) -> Model:
     """Returns an untrained model.
 
     Args:
         settings: settings of the training.
         env: an environment, or a vector of them.
-        log: folder for TensorBoard, or None.
 
     Raises:
         SettingsError: the algorithm does not accept the environment's actions, or a parameter.
@@ -60,8 +61,8 @@ def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv, *, log: Path | 
         parameters["learning_rate"] = LinearSchedule(float(parameters["learning_rate"]), float(last))
     try:
         return getattr(import_module(package), name)(
-            "MlpPolicy", env, policy_kwargs={"net_arch": list(settings.network)}, seed=settings.seed,
-            tensorboard_log=None if log is None else str(log), device="cpu", **parameters,
+            "MlpPolicy", env, policy_kwargs={"net_arch": list(settings.network)}, seed=settings.seed, device="cpu",
+            **parameters,
         )  # fmt: skip
     except (AssertionError, TypeError, ValueError) as error:
         raise SettingsError(f"{settings.algorithm} on {settings.env}: {error}") from error
@@ -92,6 +93,23 @@ def save_model(
         seconds: duration of the training [s].
         fields: further fields of `model.json`; `kind` replaces `KIND`.
     """
+    parameters, tensors = parameters_of(model)
+    page: Page = {
+        "format": MODEL_FORMAT,
+        "kind": KIND,
+        **(fields or {}),
+        "settings": settings.as_json(),
+        "seconds": round(seconds, 2),
+        **parameters,
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    with replacing(folder / DESCRIPTION) as card, replacing(folder / TENSORS) as weights:
+        save_tensors({name: value.detach().contiguous().clone() for name, value in tensors.items()}, weights)
+        card.write_text(json.dumps(page, indent=1) + "\n", encoding="utf-8")
+
+
+def parameters_of(model: Model) -> tuple[Page, dict[str, torch.Tensor]]:
+    """Returns step counts and groups of the optimisers in JSON types, and all weights and optimiser states by name."""
     tensors: dict[str, torch.Tensor] = {}
     groups: dict[str, object] = {}
     for name, state in model.get_parameters().items():
@@ -103,20 +121,8 @@ def save_model(
         else:
             tensors |= {f"{name}/{key}": value for key, value in state.items()}
     tensors |= {f"variables/{name}": value for name, value in _variables(model)}
-    page: Page = {
-        "format": MODEL_FORMAT,
-        "kind": KIND,
-        **(fields or {}),
-        "settings": settings.as_json(),
-        "steps": int(model.num_timesteps),
-        "seconds": round(seconds, 2),
-        "updates": int(getattr(model, "_n_updates", 0)),
-        "optimisers": groups,
-    }
-    folder.mkdir(parents=True, exist_ok=True)
-    with replacing(folder / DESCRIPTION) as card, replacing(folder / TENSORS) as weights:
-        save_file({name: value.detach().contiguous().clone() for name, value in tensors.items()}, weights)
-        card.write_text(json.dumps(page, indent=1) + "\n", encoding="utf-8")
+    updates = int(getattr(model, "_n_updates", 0))
+    return {"steps": int(model.num_timesteps), "updates": updates, "optimisers": groups}, tensors
 
 
 def read_description(folder: Path) -> Page:
@@ -151,18 +157,28 @@ def restore(model: Model, folder: Path) -> None:
         raise ModelFileError(f"{path}: cannot be read ({one_line(error)})") from None
     if any(value.is_floating_point() and not bool(value.isfinite().all()) for value in tensors.values()):
         raise ModelFileError(f"{path}: has a weight that is no finite number")
+    with refusing_misfits(path):
+        set_parameters(model, page, tensors)
+
+
+@contextmanager
+def refusing_misfits(path: Path) -> Iterator[None]:
+    """Turns errors of restoring a model from a file into `ModelFileError`."""
     try:
-        _restore(model, page, tensors)
-    except (ValueError, RuntimeError, KeyError, TypeError, AttributeError, IndexError) as error:
+        yield
+    except ModelFileError:
+        raise
+    except (ValueError, RuntimeError, KeyError, TypeError, AttributeError, IndexError, OverflowError) as error:
         raise ModelFileError(f"{path}: does not fit the environment or the network ({one_line(error)})") from None
 
 
-def _restore(model: Model, page: Page, tensors: Mapping[str, torch.Tensor]) -> None:
+def set_parameters(model: Model, page: Page, tensors: Mapping[str, torch.Tensor]) -> None:
+    """Sets what `parameters_of` has returned; raises various errors if it does not fit (`refusing_misfits`)."""
     variables = {name.split("/", 1)[1]: value for name, value in tensors.items() if name.startswith("variables/")}
     parameters = {
         name: _optimiser(name, page["optimisers"], tensors)
         if name in page["optimisers"]
-        else _tensors_under(f"{name}/", tensors)
+        else tensors_under(f"{name}/", tensors)
         for name in model.get_parameters()
     }
     model.set_parameters(parameters, exact_match=True, device="cpu")
@@ -238,7 +254,8 @@ def _variables(model: Model) -> Iterator[tuple[str, torch.Tensor]]:
             yield name, value
 
 
-def _tensors_under(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+def tensors_under(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """Returns the tensors whose names begin with a prefix, without it."""
     return {name[len(prefix) :]: value for name, value in tensors.items() if name.startswith(prefix)}
 
 
@@ -247,7 +264,7 @@ def _optimiser(
 ) -> dict[str, object]:  # fmt: skip
     """Returns the state of an optimiser, as torch's `state_dict` has it."""
     state: dict[int, dict[str, torch.Tensor]] = {}
-    for key, value in _tensors_under(f"{name}/", tensors).items():
+    for key, value in tensors_under(f"{name}/", tensors).items():
         index, quantity = key.split("/")
         state.setdefault(int(index), {})[quantity] = value
     return {"state": state, "param_groups": groups[name]}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, SupportsFloat
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecMonitor
 
 import dorothie_gym
-from dorothie_gym.baselines.rl.settings import Arguments, TrainingSettings
+from dorothie_gym.baselines.rl.settings import Arguments, Page, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import AnyEnv, make_vector_env
 from dorothie_gym.errors import ModelFileError, SettingsError, short_repr
 from dorothie_gym.policies.navigation.observation_vector import Vector
@@ -116,9 +116,60 @@ class EnvFactory:
         return make_env(self._name, self._settings)
 
 
+class RepeatableEpisodes(gym.Wrapper[Vector, Any, Vector, Any]):
+    """Records how the present episode began and the actions since then, with which another process can repeat it.
+
+    The beginning is the seed of the reset; for a reset without a seed, the state of the environment's random generator
+    before it. That is exact if the environment depends on its seed and the actions only, as Gymnasium demands.
+    """
+
+    def __init__(self, env: AnyEnv) -> None:
+        super().__init__(env)
+        self._start: Page = {}
+        self._actions: list[NDArray[np.generic]] = []
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, object] | None = None
+    ) -> tuple[Vector, dict[str, object]]:
+        """Begins an episode."""
+        self._start = {"seed": seed} if seed is not None else self.unwrapped.np_random.bit_generator.state  # type: ignore[assignment]  # a mapping of its own type
+        self._actions = []
+        return self.env.reset(seed=seed, options=options)
+
+    def step(self, action: Any) -> tuple[Vector, SupportsFloat, bool, bool, dict[str, object]]:
+        """Takes a step."""
+        self._actions.append(np.array(action))  # a copy: the caller may use the array again
+        return self.env.step(action)
+
+    def recorded_episode(self) -> tuple[Page, NDArray[np.generic]]:
+        """Returns the beginning of the present episode in JSON types, and its actions (n, ...)."""
+        return self._start, np.array(self._actions)
+
+    def repeat_episode(self, start: Page, actions: NDArray[np.generic]) -> Vector:
+        """Plays a recorded episode, and returns its last observation; raises `ValueError` for another action."""
+        if not all(self.action_space.contains(action) for action in actions):
+            raise ValueError("a recorded action is none of the environment")
+        if "seed" in start:
+            observation, _ = self.reset(seed=start["seed"])
+        else:
+            self.unwrapped.np_random.bit_generator.state = start
+            observation, _ = self.reset()
+        for action in actions:
+            observation, *_ = self.step(action)
+        return observation
+
+
+class RepeatableEnvFactory(EnvFactory):
+    """Picklable factory of an environment whose episodes can be repeated."""
+
+    def __call__(self) -> RepeatableEpisodes:
+        """Returns a new environment."""
+        return RepeatableEpisodes(super().__call__())
+
+
 def make_training_env(settings: TrainingSettings, ray: str | None = None) -> VecMonitor:
     """Returns the vector environment of a training with stable-baselines3; see `make_vector_env`."""
-    make = EnvFactory(settings.env, settings.env_settings)
+    make = RepeatableEnvFactory(settings.env, settings.env_settings)
     make().close()  # reports invalid settings in this process
     vector = make_vector_env(make, settings.environments, settings.workers, ray)
     vector.seed(settings.seed * 10_000)

@@ -11,11 +11,14 @@ from pathlib import Path
 from typing import Final, Generic, Self, TypeAlias, TypeVar
 
 import torch
+from stable_baselines3.common.logger import Logger, configure
 
-from dorothie_gym.baselines.rl.settings import Page
+from dorothie_gym.baselines.rl.resumption import CHECKPOINT, Checkpoint, Tensors, read_checkpoint, write_checkpoint
+from dorothie_gym.baselines.rl.settings import Page, RunSettings
 from dorothie_gym.errors import ModelFileError, one_line
 from dorothie_gym.files import write_atomically
-from dorothie_gym.input_files import MAX_MODEL_JSON, parse_json, raising, read_text
+from dorothie_gym.input_files import checked, raising
+from dorothie_gym.policies.policy_loader import DESCRIPTION
 
 PROGRESS: Final = "progress.jsonl"
 """File of a run with a line for each evaluation."""
@@ -85,6 +88,7 @@ class Run(Generic[Evaluation]):
     Attributes:
         folder: folder of the run: models, `PROGRESS`, `CURVE`, TensorBoard logs.
         rows: evaluations so far.
+        steps: number of steps at the last checkpoint.
         seconds: duration of the training without evaluations [s].
     """
 
@@ -98,24 +102,59 @@ class Run(Generic[Evaluation]):
         """
         self.folder = folder
         self.rows: list[Evaluation] = []
-        self.seconds = 0.0
+        self.steps, self.seconds = 0, 0.0
         self._on_progress = on_progress or (lambda done, total, row: None)
         self._on_stage = on_stage
         torch.set_num_threads(1)  # small networks: more threads only wait for each other
 
-    def _log_folder(self) -> Path | None:
-        """Returns the folder for TensorBoard; None if TensorBoard is not installed."""
-        return self.folder / "tensorboard" if find_spec("tensorboard") is not None else None
+    def _read_checkpoint(
+        self, settings: RunSettings, kind: type[Evaluation], model: Path
+    ) -> Checkpoint | None:  # fmt: skip
+        """Returns the checkpoint in the folder after reading rows and time from it; None if there is no run yet.
 
-    def _read_rows(self, kind: type[Evaluation]) -> list[Evaluation]:
-        path = self.folder / PROGRESS
+        Args:
+            settings: settings of the run.
+            kind: class of the rows.
+            model: folder of a model of the run.
+
+        Raises:
+            SettingsError: the run there has other settings.
+            ModelFileError: the checkpoint is damaged, or there is a model without one.
+        """
+        found = read_checkpoint(self.folder)
+        if found is None:
+            if (model / DESCRIPTION).exists():
+                raise ModelFileError(
+                    f"{self.folder}: has no {CHECKPOINT}, from which the training of the model there could go on; "
+                    "choose another folder"
+                )
+            return None
         with raising(ModelFileError):
-            lines = read_text(path, MAX_MODEL_JSON).splitlines() if path.exists() else []
-            pages = [parse_json(line, f"{path}, line {number}") for number, line in enumerate(lines, start=1)]
+            settings.check_resumable(checked(found.page.get("settings"), type(settings), found.path), self.folder)
         try:
-            return [kind.from_json(page) for page in pages if isinstance(page, dict)]
+            self.rows = [kind.from_json(row) for row in found.page["rows"]]
+            self.seconds, self.steps = float(found.page["seconds"]), int(found.page["steps"])
         except (KeyError, TypeError, ValueError) as error:
-            raise ModelFileError(f"{path}: is no learning curve of this version ({one_line(repr(error))})") from None
+            raise ModelFileError(f"{found.path}: is no run of this version ({one_line(repr(error))})") from None
+        return found
+
+    def _write_checkpoint(self, settings: RunSettings, steps: int, page: Page, tensors: Tensors) -> None:
+        """Writes the checkpoint after a number of steps; a run that goes on there writes all later files again."""
+        rows = [row.as_json() for row in self.rows]
+        own: Page = {"settings": settings.as_json(), "steps": steps, "seconds": self.seconds, "rows": rows}
+        write_checkpoint(self.folder, {**own, **page}, tensors)
+        self.steps = steps
+
+    def _make_logger(self, name: str) -> Logger:
+        """Returns a logger for TensorBoard, if that is installed; it replaces records after the last checkpoint."""
+        if find_spec("tensorboard") is None:
+            return Logger(None, [])
+        from tensorboard.compat.proto.event_pb2 import Event, SessionLog
+
+        logger = configure(str(self.folder / "tensorboard" / name), ["tensorboard"])
+        again = Event(step=self.steps + 1 if self.steps else 0, session_log=SessionLog(status=SessionLog.START))
+        logger.output_formats[0].writer.file_writer.add_event(again)  # type: ignore[attr-defined]  # TensorBoard's
+        return logger
 
     def _write_rows(self) -> None:
         lines = "".join(json.dumps(row.as_json()) + "\n" for row in self.rows)
@@ -124,7 +163,7 @@ class Run(Generic[Evaluation]):
     def _write_cloned(self, results: Mapping[str, object]) -> None:
         write_atomically(self.folder / CLONED, json.dumps(results, indent=1) + "\n")
 
-    def _result(self, steps: int, *, finished: bool) -> TrainingResult[Evaluation]:
+    def _result(self, *, finished: bool) -> TrainingResult[Evaluation]:
         return TrainingResult(
-            folder=self.folder, rows=tuple(self.rows), steps=steps, seconds=self.seconds, finished=finished
+            folder=self.folder, rows=tuple(self.rows), steps=self.steps, seconds=self.seconds, finished=finished
         )

@@ -13,9 +13,10 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from dorothie_gym.baselines.learning_curves import draw_reward_curve
 from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, CriticWarmUp, clone, read_demonstrations
-from dorothie_gym.baselines.rl.checkpoint import Model, make_model, read_description, read_settings, restore, save_model
+from dorothie_gym.baselines.rl.checkpoint import Model, make_model, save_model
 from dorothie_gym.baselines.rl.environments import EnvFactory, make_training_env
 from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics, evaluate_policy, greedy_policy
+from dorothie_gym.baselines.rl.resumption import restore_state, state_of
 from dorothie_gym.baselines.rl.run import (
     BEST,
     CURVE,
@@ -27,12 +28,15 @@ from dorothie_gym.baselines.rl.run import (
     ignore_stage,
 )
 from dorothie_gym.baselines.rl.settings import Page, TrainingSettings
+from dorothie_gym.input_files import checked
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
-from dorothie_gym.policies.policy_loader import DESCRIPTION
 from dorothie_gym.recording import Fold
 
 LOGGED_STEPS: Final = 1024
 """Approximate number of steps between TensorBoard records of on-policy algorithms."""
+
+CHECKPOINT_SHARE: Final = 0.005
+"""Largest share of the time that the writing of checkpoints takes."""
 
 LOGGED_EPISODES: Final = 4
 """Number of episodes between TensorBoard records of off-policy algorithms."""
@@ -52,7 +56,10 @@ class TrainingEvaluation(RunEvaluation):
     def from_json(cls, page: Page) -> TrainingEvaluation:
         """Reads the output of `as_json`."""
         outcome = {name: value for name, value in page.items() if name not in ("steps", "seconds")}
-        return cls(steps=page["steps"], seconds=page["seconds"], outcome=EpisodeStatistics(**outcome))
+        return cls(
+            steps=int(page["steps"]), seconds=float(page["seconds"]),
+            outcome=checked(outcome, EpisodeStatistics, "evaluation"),
+        )  # fmt: skip
 
 
 def best_of(rows: Sequence[TrainingEvaluation]) -> TrainingEvaluation | None:
@@ -95,17 +102,15 @@ class Training(Run[TrainingEvaluation]):
         super().__init__(folder, on_progress, on_stage)
         self.settings = settings
         self.cloned: CloningResult | None = None
-        page = read_description(folder) if (folder / DESCRIPTION).is_file() else None
-        if page is not None:
-            settings.check_resumable(read_settings(page, TrainingSettings, folder), folder)
-            self.rows = self._read_rows(TrainingEvaluation)
+        begun = self._read_checkpoint(settings, TrainingEvaluation, folder)
         folder.mkdir(parents=True, exist_ok=True)
+        self._checkpoint_after = 0.0  # time of `time.perf_counter`
         self._vector = make_training_env(settings, ray)
         try:
-            self.model: Model = make_model(settings, self._vector, log=self._log_folder())
-            if page is not None:
-                restore(self.model, folder)
-                self.seconds = float(page["seconds"])
+            self.model: Model = make_model(settings, self._vector)
+            self.model.set_logger(self._make_logger(settings.algorithm))
+            if begun is not None:
+                restore_state(self.model, begun)
             elif settings.warm_start is not None:
                 self._warm_start(Path(settings.warm_start))
         except Exception:
@@ -116,26 +121,36 @@ class Training(Run[TrainingEvaluation]):
         """Trains.
 
         Returns:
-            The result; after Ctrl-C that of the steps so far, which are saved in the folder.
+            The result; after Ctrl-C that of the last checkpoint, from which the run can be resumed exactly.
         """
         settings, model = self.settings, self.model
         left = settings.steps - int(model.num_timesteps)
-        finished = left <= 0
+        finished = False
         try:
             if left > 0:
                 callbacks: list[BaseCallback] = [_Evaluations(self)]
                 if settings.warm_start is not None:
                     callbacks.append(CriticWarmUp())
-                model.learn(left, callback=callbacks, reset_num_timesteps=False, log_interval=_log_interval(model))
-                finished = True
+                # stable-baselines3 would count rollouts anew in a resumed run: they are logged by `_Evaluations`
+                interval = None if isinstance(model, OnPolicyAlgorithm) else LOGGED_EPISODES
+                model.learn(left, callback=callbacks, reset_num_timesteps=False, log_interval=interval)
+                self.checkpoint()
+            finished = True
         except KeyboardInterrupt:
-            finished = False
+            pass  # the steps since the last checkpoint are repeated when the run is resumed
         finally:
             self._vector.close()
-        save_model(model, settings, self.folder, self.seconds)
-        if self.rows:
-            self._draw_curve()
-        return self._result(int(model.num_timesteps), finished=finished)
+        return self._result(finished=finished)
+
+    def checkpoint(self, *, sparingly: bool = False) -> None:
+        """Writes a checkpoint; if `sparingly`, only if the writing takes at most `CHECKPOINT_SHARE` of the time."""
+        since = time.perf_counter()
+        if sparingly and since < self._checkpoint_after:
+            return
+        page, tensors = state_of(self.model)
+        self._write_checkpoint(self.settings, int(self.model.num_timesteps), page, tensors)
+        now = time.perf_counter()
+        self._checkpoint_after = now + (now - since) / CHECKPOINT_SHARE
 
     def _warm_start(self, corpus: Path) -> None:
         """Clones the Co-Wizards of a corpus."""
@@ -185,8 +200,11 @@ class _Evaluations(BaseCallback):
         self._due = (training.rows[-1].steps // every + 1) * every if training.rows else every
 
     def _on_training_start(self) -> None:
-        if self._training.cloned is not None:
-            self._training.evaluate()
+        training = self._training
+        if training.steps == 0 and not training.rows:
+            training.checkpoint()  # before any model: a folder with a model and no checkpoint is of an older version
+            if training.settings.warm_start is not None:
+                training.evaluate()
         self._since = time.perf_counter()
 
     def _on_step(self) -> bool:
@@ -196,6 +214,13 @@ class _Evaluations(BaseCallback):
         self._add_time()
         if self.num_timesteps >= self._due:
             self._evaluate()
+        self._training.checkpoint(sparingly=True)
+
+    def _on_rollout_end(self) -> None:
+        if isinstance(self.model, OnPolicyAlgorithm):  # the others count episodes
+            size = self.model.n_steps * self.model.n_envs
+            if (self.num_timesteps // size) % max(LOGGED_STEPS // size, 1) == 0:
+                self.model.dump_logs()
 
     def _on_training_end(self) -> None:
         self._add_time()
@@ -213,13 +238,6 @@ class _Evaluations(BaseCallback):
         self._due = (self.num_timesteps // every + 1) * every
         self._training.evaluate()
         self._since = time.perf_counter()
-
-
-def _log_interval(model: Model) -> int:
-    """Returns the interval of TensorBoard records in rollouts, or in episodes for off-policy algorithms."""
-    if not isinstance(model, OnPolicyAlgorithm):
-        return LOGGED_EPISODES
-    return max(LOGGED_STEPS // (model.n_steps * model.n_envs), 1)
 
 
 def _title(settings: TrainingSettings) -> str:

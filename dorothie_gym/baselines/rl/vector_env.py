@@ -256,7 +256,7 @@ def _serve(connection: Connection, make: MakeEnv, count: int) -> None:
 
 # --- Machines of a Ray cluster ----------------------------------------------------------------------------------------
 
-_READ_ONLY: Final = ("spaces", "has_attr", "get_attr", "env_is_wrapped", "action_masks")
+_READ_ONLY: Final = ("spaces", "has_attr", "get_attr", "env_is_wrapped", "action_masks", "recorded_episode")
 """Commands, and methods of environments, that change no environment."""
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import torch
 from gymnasium import spaces
 from numpy.typing import NDArray
-from stable_baselines3.common.logger import Logger, configure
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, Demonstrations, clone, freeze_actor
@@ -57,7 +56,7 @@ class Learner:
         settings: TrainingSettings,
         layout: RoleLayout,
         environments: Mapping[int, Sequence[int]],
-        log: Path | None,
+        logger: Logger,
     ) -> None:
         """Prepares an untrained learner.
 
@@ -66,7 +65,7 @@ class Learner:
             settings: settings of the network and of MaskablePPO.
             layout: layout of the rows.
             environments: environments that it learns in, by role; several roles share the network.
-            log: folder for TensorBoard, or None.
+            logger: logger of its learning.
         """
         self.name, self.roles = name, tuple(environments)
         self._layout, self.padded = layout, len(environments) > 1
@@ -77,7 +76,7 @@ class Learner:
         self.size = layout.padded_size if self.padded else layout.sizes[self.roles[0]]
         self.actions = layout.padded_actions if self.padded else layout.actions[self.roles[0]]
         self.model = make_network(settings, self.size, self.actions, len(self.players))
-        self.model.set_logger(Logger(None, []) if log is None else configure(str(log), ["tensorboard"]))
+        self.model.set_logger(logger)
         self.cloned = False
         self._vectors: Vector
         self._masks: Mask

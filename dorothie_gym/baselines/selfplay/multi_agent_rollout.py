@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from pathlib import Path
+from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import set_random_seed
 
 from dorothie_gym.baselines.rl.checkpoint import Model
@@ -18,8 +16,6 @@ from dorothie_gym.baselines.rl.settings import Arguments, SelfPlaySettings
 from dorothie_gym.baselines.rl.vector_env import make_vector_env
 from dorothie_gym.baselines.selfplay.env import RoleLayout, SelfPlayEnv
 from dorothie_gym.baselines.selfplay.learner import Learner, make_network, sample_actions
-from dorothie_gym.errors import InputFileError, ModelFileError, one_line
-from dorothie_gym.input_files import MAX_WEIGHTS, check_file
 from dorothie_gym.ontology import AGENT_ROLES, Role
 
 AD_WIZARD: Final = AGENT_ROLES.index(Role.AD_WIZARD)
@@ -30,8 +26,6 @@ ALL_ROLES: Final = "all"
 
 
 # --- Opponents --------------------------------------------------------------------------------------------------------
-
-POOL_FILE: Final = "past.safetensors"
 
 POOL_SIZE: Final = 5
 """Largest number of checkpoints in the pool; the latest are kept."""
@@ -55,27 +49,16 @@ class OpponentPool:
         """Loads a random member of the pool, which must not be empty, into a model."""
         model.policy.load_state_dict(self._weights[int(rng.integers(len(self._weights)))])
 
-    def save(self, folder: Path) -> None:
-        """Writes the pool into a folder."""
-        flat = {
-            f"{k}/{name}": value.contiguous()
-            for k, weights in enumerate(self._weights)
-            for name, value in weights.items()
-        }
-        save_file(flat, folder / POOL_FILE)
+    def tensors(self) -> dict[str, torch.Tensor]:
+        """Returns the weights of all members by name."""
+        return {f"{k}/{name}": value for k, weights in enumerate(self._weights) for name, value in weights.items()}
 
-    def load(self, folder: Path) -> None:
-        """Reads a saved pool; raises `ModelFileError` if it cannot be read."""
-        path = folder / POOL_FILE
-        try:
-            check_file(path, MAX_WEIGHTS)
-            tensors = load_file(path)
-            self._weights = [{} for _ in {name.split("/", 1)[0] for name in tensors}]
-            for name, value in tensors.items():
-                number, key = name.split("/", 1)
-                self._weights[int(number)][key] = value
-        except (SafetensorError, OSError, InputFileError, ValueError, IndexError) as error:
-            raise ModelFileError(f"{path}: cannot be read ({one_line(error)})") from None
+    def restore(self, tensors: Mapping[str, torch.Tensor]) -> None:
+        """Restores what `tensors` has returned; raises `ValueError` or `IndexError` if it is something else."""
+        self._weights = [{} for _ in {name.split("/", 1)[0] for name in tensors}]
+        for name, value in tensors.items():
+            number, key = name.split("/", 1)
+            self._weights[int(number)][key] = value
 
 
 # --- Rollouts ---------------------------------------------------------------------------------------------------------
@@ -102,12 +85,14 @@ class MultiAgentRollout:
         returns: sums of rewards of the sessions without scripted roles that ended since `reset`, by role (n, 3).
     """
 
-    def __init__(self, settings: SelfPlaySettings, log: Path | None, ray: str | None = None) -> None:
+    def __init__(
+        self, settings: SelfPlaySettings, make_logger: Callable[[str], Logger], ray: str | None = None
+    ) -> None:
         """Prepares environments and learners; raises `SettingsError` if the settings are invalid.
 
         Args:
             settings: settings of the training.
-            log: folder for TensorBoard, or None.
+            make_logger: returns the logger of a learner for its name.
             ray: address of a Ray cluster that steps the sessions; None for this machine.
         """
         self._settings = settings
@@ -126,7 +111,7 @@ class MultiAgentRollout:
             else {str(AGENT_ROLES[k]): {k: envs} for k, envs in environments.items()}
         )
         self.learners = [
-            Learner(name, settings.learner(settings.seed + k), self.layout, own, None if log is None else log / name)
+            Learner(name, settings.learner(settings.seed + k), self.layout, own, make_logger(name))
             for k, (name, own) in enumerate(by_learner.items())
         ]
         for learner in self.learners:

@@ -12,8 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.learning_curves import draw_selfplay_curve
-from dorothie_gym.baselines.rl.checkpoint import read_description, read_settings, restore, save_model
+from dorothie_gym.baselines.rl.checkpoint import (
+    parameters_of,
+    refusing_misfits,
+    save_model,
+    set_parameters,
+    tensors_under,
+)
 from dorothie_gym.baselines.rl.evaluation import FIRST_SEED, Act, EpisodeStatistics, evaluate_policy
+from dorothie_gym.baselines.rl.resumption import Checkpoint
 from dorothie_gym.baselines.rl.run import (
     CURVE,
     OnProgress,
@@ -27,10 +34,9 @@ from dorothie_gym.baselines.rl.settings import SELFPLAY, Page, SelfPlaySettings
 from dorothie_gym.baselines.selfplay.demonstrations import read_demonstrations
 from dorothie_gym.baselines.selfplay.learner import sample_actions
 from dorothie_gym.baselines.selfplay.multi_agent_rollout import AD_WIZARD, MultiAgentRollout, SelfPlayEnvFactory
-from dorothie_gym.errors import ModelFileError
+from dorothie_gym.input_files import checked
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.policies.policy_loader import DESCRIPTION
 from dorothie_gym.recording import Fold
 
 OPPONENTS: Final = ("scripted", "learned")
@@ -62,8 +68,7 @@ class SelfPlayEvaluation(RunEvaluation):
     @classmethod
     def from_json(cls, page: Page) -> SelfPlayEvaluation:
         """Reads the output of `as_json`."""
-        outcomes = {name: EpisodeStatistics(**page[name]) for name in OPPONENTS}
-        return cls(steps=page["steps"], seconds=page["seconds"], returns=page["returns"], **outcomes)
+        return checked(page, cls, "evaluation")
 
 
 class SelfPlayTraining(Run[SelfPlayEvaluation]):
@@ -74,7 +79,6 @@ class SelfPlayTraining(Run[SelfPlayEvaluation]):
     Attributes:
         settings: settings of the training.
         rollout: sessions and learners.
-        steps: number of steps done.
     """
 
     def __init__(
@@ -101,18 +105,17 @@ class SelfPlayTraining(Run[SelfPlayEvaluation]):
             ModelFileError: the run in the folder is damaged.
         """
         super().__init__(folder, on_progress, on_stage)
-        self.settings, self.steps = settings, 0
+        self.settings = settings
         self._totals = _totals([])  # of the training sessions since the last evaluation
-        begun = (folder / AGENT_ROLES[AD_WIZARD] / DESCRIPTION).is_file()
-        if begun:
-            page = read_description(folder / AGENT_ROLES[AD_WIZARD])
-            settings.check_resumable(read_settings(page, SelfPlaySettings, folder), folder)
+        begun = self._read_checkpoint(settings, SelfPlayEvaluation, folder / AGENT_ROLES[AD_WIZARD])
         folder.mkdir(parents=True, exist_ok=True)
-        self.rollout = MultiAgentRollout(settings, self._log_folder(), ray)
+        self.rollout = MultiAgentRollout(settings, self._make_logger, ray)
         try:
-            if begun:
-                self._resume()
-            elif settings.warm_start is not None:
+            if begun is None:
+                self._save_state(0)  # before any model: a folder with a model and no checkpoint is of an older version
+            else:
+                self._resume(begun)
+            if settings.warm_start is not None and not self.rows:
                 self._warm_start(Path(settings.warm_start))
         except Exception:
             self.rollout.close()
@@ -133,7 +136,7 @@ class SelfPlayTraining(Run[SelfPlayEvaluation]):
             pass  # the rollouts since the last checkpoint are repeated when the run is resumed
         finally:
             self.rollout.close()
-        return self._result(self.steps, finished=finished)
+        return self._result(finished=finished)
 
     def _warm_start(self, corpus: Path) -> None:
         """Clones the roles of a corpus; the first evaluation of the run is that of the clones."""
@@ -169,11 +172,11 @@ class SelfPlayTraining(Run[SelfPlayEvaluation]):
         self, steps: int, seconds: float, totals: NDArray[np.float64], row: SelfPlayEvaluation | None
     ) -> None:
         """Writes the state after a number of steps into the folder."""
-        self.steps, self.seconds, self._totals = steps, seconds, totals
+        self.seconds, self._totals = seconds, totals
         if row is not None:
             self.rows.append(row)
             self._totals = _totals([])
-        self._save()
+        self._save(steps)
         if row is not None:
             draw_selfplay_curve([row.as_json() for row in self.rows], _title(self.settings), self.folder / CURVE)
             self._on_progress(steps, self.settings.steps, row)
@@ -214,33 +217,37 @@ class SelfPlayTraining(Run[SelfPlayEvaluation]):
             logger.record(f"eval/length_against_{name}", outcome.length)
         logger.dump(row.steps)
 
-    def _save(self) -> None:
+    def _save(self, steps: int) -> None:
         layout = self.rollout.layout
         for k, role in enumerate(AGENT_ROLES):
             learner = self.rollout.learner_of(k)
             fields = {
                 "kind": SELFPLAY, "role": str(role), "size": layout.sizes[k], "actions": layout.actions[k],
-                "padded": [learner.size, learner.actions] if learner.padded else None, "tally": self._totals.tolist(),
+                "padded": [learner.size, learner.actions] if learner.padded else None,
             }  # fmt: skip
             save_model(learner.model, self.settings, self.folder / role, self.seconds, fields)
-        self.rollout.opponents.save(self.folder)
         self._write_rows()
+        self._save_state(steps)
 
-    def _resume(self) -> None:
-        """Restores the state of the last checkpoint in the folder."""
-        pages = {role: read_description(self.folder / role) for role in AGENT_ROLES}
-        steps = {int(page["steps"]) for page in pages.values()}
-        if len(steps) > 1:
-            raise ModelFileError(
-                f"{self.folder}: the models are of different steps ({sorted(steps)}); start a new training"
-            )
+    def _save_state(self, steps: int) -> None:
+        """Writes the checkpoint. Random generators are not part of it: `MultiAgentRollout.reset` seeds them."""
+        parameters: dict[str, Page] = {}
+        tensors = {f"past/{name}": value for name, value in self.rollout.opponents.tensors().items()}
         for learner in self.rollout.learners:
-            restore(learner.model, self.folder / AGENT_ROLES[learner.roles[0]])
-        self.rollout.opponents.load(self.folder)
-        self.steps = steps.pop()
-        self.rows = [row for row in self._read_rows(SelfPlayEvaluation) if row.steps <= self.steps]
-        page = pages[AGENT_ROLES[AD_WIZARD]]
-        self.seconds, self._totals = float(page["seconds"]), np.array(page["tally"], dtype=np.float64)
+            parameters[learner.name], own = parameters_of(learner.model)
+            tensors |= {f"{learner.name}/{name}": value for name, value in own.items()}
+        page: Page = {"parameters": parameters, "totals": self._totals.tolist()}
+        self._write_checkpoint(self.settings, steps, page, tensors)
+
+    def _resume(self, checkpoint: Checkpoint) -> None:
+        """Restores the state of the last checkpoint."""
+        page, tensors = checkpoint.page, checkpoint.tensors
+        with refusing_misfits(checkpoint.path):
+            for learner in self.rollout.learners:
+                own = tensors_under(f"{learner.name}/", tensors)
+                set_parameters(learner.model, page["parameters"][learner.name], own)
+            self.rollout.opponents.restore(tensors_under("past/", tensors))
+            self._totals = np.array(page["totals"], dtype=np.float64)
 
 
 def _totals(returns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:

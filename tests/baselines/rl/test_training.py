@@ -99,18 +99,6 @@ def test_finished_run_is_not_trained_again(tmp_path: Path) -> None:
     assert again.finished and again.steps == 64 and len(again.rows) == 1
 
 
-def test_ctrl_c_saves_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(self: Any, seconds: float, steps: int) -> None:
-        if steps >= 64:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(training_module.Training, "add_time", interrupted)
-    run = Training(settings_for("ppo", steps=1000), tmp_path).run()
-    assert not run.finished and run.steps == 64
-    monkeypatch.undo()
-    assert Training(settings_for("ppo", steps=128), tmp_path).run().steps == 128
-
-
 def test_folder_with_another_run_is_refused(tmp_path: Path) -> None:
     Training(settings_for("ppo"), tmp_path).run()
     with pytest.raises(SettingsError, match="another seed"):

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import errno
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 import torch
 from safetensors.torch import load_file
 
+from dorothie_gym.baselines.rl.resumption import CHECKPOINT
 from dorothie_gym.baselines.rl.settings import SelfPlaySettings, selfplay_settings
 from dorothie_gym.baselines.selfplay import training as training_module
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv
@@ -66,7 +69,7 @@ def test_networks_learn_and_are_saved(shared: bool, tmp_path: Path, monkeypatch:
     assert run.rows[-1].returns["co_wizard"] == run.rows[-1].returns["participant"] is not None
     assert run.rows[-1].returns["ad_wizard"] != run.rows[-1].returns["co_wizard"]
     found = {path.name for path in tmp_path.iterdir()}
-    assert {*AGENT_ROLES, "curve.png", "progress.jsonl", "past.safetensors"} <= found
+    assert {*AGENT_ROLES, "curve.png", "progress.jsonl", CHECKPOINT} <= found
     assert json.loads((tmp_path / "co_wizard" / "model.json").read_text(encoding="utf-8"))["kind"] == "selfplay"
     assert not list(tmp_path.rglob("*.zip")) and not list(tmp_path.rglob("*.pkl"))
 
@@ -87,6 +90,32 @@ def test_resumed_run_ends_with_the_same_weights(shared: bool, tmp_path: Path) ->
     assert_same(tmp_path / "whole", tmp_path / "cut")
     rows = [json.loads((tmp_path / name / "progress.jsonl").read_text(encoding="utf-8")) for name in ("whole", "cut")]
     assert {**rows[0], "seconds": 0} == {**rows[1], "seconds": 0}
+
+
+def test_run_killed_between_two_files_of_a_checkpoint_is_resumed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = settings_for(max_seconds=5.0, steps=64)
+    SelfPlayTraining(settings, tmp_path / "whole").run()
+    for written in (1, 4):  # files before the failure: the roles' are replaced one after another
+        with monkeypatch.context() as patched:
+            fail_after(written, patched)
+            with pytest.raises(OSError, match="No space left"):
+                SelfPlayTraining(settings, tmp_path / "cut").run()
+    assert SelfPlayTraining(settings, tmp_path / "cut").run().finished
+    assert_same(tmp_path / "whole", tmp_path / "cut")
+
+
+def fail_after(written: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lets the replacement of files fail after a number of them."""
+    replace, left = os.replace, iter(range(written))
+
+    def failing(one: Any, two: Any) -> None:
+        if next(left, None) is None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        replace(one, two)
+
+    monkeypatch.setattr("dorothie_gym.files.os.replace", failing)
 
 
 def test_worker_processes_do_not_change_the_weights(tmp_path: Path) -> None:
@@ -148,8 +177,8 @@ def test_runs_with_other_settings_and_damaged_runs_are_refused(tmp_path: Path) -
     SelfPlayTraining(settings_for(), tmp_path).run()
     with pytest.raises(SettingsError, match="another shared"):
         SelfPlayTraining(settings_for(shared=True), tmp_path)
-    (tmp_path / "past.safetensors").write_bytes(b"nothing")
-    with pytest.raises(ModelFileError, match=r"past\.safetensors"):
+    (tmp_path / CHECKPOINT).write_bytes(b"nothing")
+    with pytest.raises(ModelFileError, match=r"checkpoint\.safetensors"):
         SelfPlayTraining(settings_for(), tmp_path)
 
 

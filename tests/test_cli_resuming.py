@@ -1,0 +1,130 @@
+"""`train-rl`, killed or interrupted at any moment and started again, leaves the files of an undisturbed run.
+
+Durations differ: "seconds" in `model.json`, `best/model.json` and `progress.jsonl`, and the title of `curve.png`.
+`checkpoint.safetensors`, from which a run goes on, holds durations, too.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from dorothie_gym.cli.app import app
+
+pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+ROOT = Path(__file__).parents[1]
+
+SHORT = (
+    "--environments", "4", "--evaluate-every", "512", "--episodes", "1", "--set", "max_seconds=20",
+    "--set", "traffic=none",
+)  # fmt: skip
+
+
+def command(*words: str, out: Path) -> list[str]:
+    return [sys.executable, "-m", "dorothie_gym", "train-rl", *words, *SHORT, "--out", str(out)]
+
+
+def start(words: list[str], folder: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        words, cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True, stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def finish(words: list[str], folder: Path) -> None:
+    process = start(words, folder)
+    _, errors = process.communicate(timeout=240)
+    assert process.returncode == 0, errors
+
+
+def interrupt(words: list[str], folder: Path, sent: signal.Signals, when: Callable[[], bool]) -> bool:
+    """Starts a command and sends a signal as soon as a condition holds; returns whether that was before its end."""
+    process = start(words, folder)
+    while process.poll() is None and not when():
+        time.sleep(0.005)
+    process.send_signal(sent)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode in (0, -sent if sent == signal.SIGKILL else 128 + sent), errors
+    assert "Traceback" not in errors, errors
+    return process.returncode != 0
+
+
+def rows(out: Path) -> int:
+    path = out / "progress.jsonl"
+    return path.read_text(encoding="utf-8").count("\n") if path.exists() else 0
+
+
+def results(out: Path) -> dict[str, object]:
+    """Returns the content of all result files of a run by name, without durations."""
+    found: dict[str, object] = {}
+    for path in sorted(out.rglob("*")):
+        name = str(path.relative_to(out))
+        if path.suffix == ".safetensors" and path.name != "checkpoint.safetensors":
+            found[name] = path.read_bytes()
+        elif path.suffix == ".json":
+            found[name] = {**json.loads(path.read_text(encoding="utf-8")), "seconds": 0}
+        elif path.suffix == ".jsonl":
+            lines = path.read_text(encoding="utf-8").splitlines()
+            found[name] = [{**json.loads(line), "seconds": 0} for line in lines]
+        elif path.is_file() and path.suffix not in (".safetensors", ".png"):
+            assert "tensorboard" in name, f"{name} was left behind"
+    return found
+
+
+def test_killed_and_interrupted_training_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
+    training = ("maskable_ppo", "--steps", "2560", "--workers", "0")
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    finish(command(*training, out=whole), tmp_path)
+    words = command(*training, out=cut)
+    seen = [
+        interrupt(words, tmp_path, signal.SIGKILL, lambda: rows(cut) >= 2),
+        interrupt(words, tmp_path, signal.SIGTERM, lambda: rows(cut) >= 3),
+    ]
+    other = CliRunner().invoke(app, ["train-rl", *training, *SHORT, "--out", str(cut), "--seed", "1"])
+    assert other.exit_code == 2 and "another seed" in other.stderr and other.stderr.count("\n") == 1
+    seen.append(interrupt(words, tmp_path, signal.SIGINT, lambda: rows(cut) >= 4))
+    assert all(seen)  # each in the middle
+    finish(words, tmp_path)
+    assert results(cut) == results(whole)
+    assert rows(cut) == 5
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize(
+    "training",
+    [
+        ("ppo", "--workers", "2"),
+        ("maskable_ppo", "--workers", "0"),
+        ("a2c", "--workers", "0"),
+        ("dqn", "--workers", "2"),
+        ("sac", "--env", "dorothie_gym/Navigation-continuous-v0", "--workers", "0"),
+        ("selfplay", "--workers", "0"),
+    ],
+)
+def test_training_killed_at_random_moments_ends_as_an_undisturbed_one(
+    training: tuple[str, ...], tmp_path: Path
+) -> None:
+    rng, whole, cut = random.Random(7), tmp_path / "whole", tmp_path / "cut"
+    training = (*training, "--steps", "12000")
+    since = time.monotonic()
+    finish(command(*training, out=whole), tmp_path)
+    longest = time.monotonic() - since
+    words = command(*training, out=cut)
+    for sent in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGKILL, signal.SIGKILL):
+        moment = time.monotonic() + rng.uniform(3.0, longest / 2)
+        interrupt(words, tmp_path, sent, lambda moment=moment: time.monotonic() > moment)  # type: ignore[misc]
+    finish(words, tmp_path)
+    assert results(cut) == results(whole)
