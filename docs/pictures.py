@@ -1,6 +1,6 @@
 """Draws the pictures of the documentation again; a step of every release.
 
-python docs/pictures.py --corpus DIR       # all; DIR: dorothie-gym generate --sessions 60 --seed 9000 --out DIR
+python docs/pictures.py --corpus DIR       # all; DIR: dorothie-gym generate --sessions 183 --seed 77 --out DIR
 python docs/pictures.py session midtown    # some of them
 
 `navigation_curve.png` and `selfplay_curve.png` come from training runs, see `docs/pages.py curves` and
