@@ -11,7 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from dorothie_gym.errors import MAX_SHOWN, InputFileError, PolicyLoadError, did_you_mean
+from dorothie_gym.errors import MAX_SHOWN, InputFileError, PolicyLoadError, did_you_mean, short_repr
 from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
@@ -195,7 +195,7 @@ def _trained_player(given: str, path: Path, role: Role) -> Player:
     if loader is None:
         known = ", ".join(loadable_kinds())
         raise PolicyLoadError(
-            f"{role}: {given} is of the kind {' or '.join(kinds)}, which cannot be played (known: {known})"
+            f"{role}: {given} is of the kind {' or '.join(map(short_repr, kinds))}, which cannot be played (known: {known})"
         )
     training = {name: value for name in _COSTS if (value := _cost(description.get(name))) is not None}
     return Player(name=given, path=path, loader=loader, sha256=_sha256(path), training=training)

@@ -59,9 +59,16 @@ def test_file_without_kind_is_read_by_suffix(tmp_path: Path) -> None:
     assert one.sha256 != two.sha256
 
 
+def test_kind_with_line_breaks_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "model.json").write_text(json.dumps({"kind": "a\nb\r\nc"}))
+    with pytest.raises(PolicyLoadError) as caught:
+        find_player(str(tmp_path), Role.CO_WIZARD)
+    assert len(str(caught.value).splitlines()) == 1
+
+
 def test_kind_without_loader_raises_error(tmp_path: Path) -> None:
     (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
-    message = r"of the kind quiet or .json, which cannot be played \(known: benchmark, dorothie_gym-rl, selfplay\)"
+    message = r"of the kind 'quiet' or '.json', which cannot be played \(known: benchmark, dorothie_gym-rl, selfplay\)"
     with pytest.raises(PolicyLoadError, match=message):
         find_player(str(tmp_path / "model.json"), Role.CO_WIZARD)
     register_loader(".weights", load_silent)
