@@ -193,8 +193,8 @@ def _trained_player(given: str, path: Path, role: Role) -> Player:
     kinds = _kinds_of(path, description)
     loader = next((found for kind in kinds if (found := _loader_of(kind))), None)
     if loader is None:
-        found, known = " or ".join(map(short_repr, kinds)), ", ".join(loadable_kinds())
-        raise PolicyLoadError(f"{role}: {given} is of the kind {found}, which cannot be played (known: {known})")
+        stated, known = " or ".join(map(short_repr, kinds)), ", ".join(loadable_kinds())
+        raise PolicyLoadError(f"{role}: {given} is of the kind {stated}, which cannot be played (known: {known})")
     training = {name: value for name in _COSTS if (value := _cost(description.get(name))) is not None}
     return Player(name=given, path=path, loader=loader, sha256=_sha256(path), training=training)
 
