@@ -43,7 +43,14 @@ MAX_MESSAGE: Final = 1000
 
 
 class DorothieGymError(Exception):
-    """Root of all exceptions that dorothie_gym raises on purpose."""
+    """Root of all exceptions that dorothie_gym raises on purpose; the message is one line of printable characters."""
+
+    def __str__(self) -> str:
+        return printable(self.message())
+
+    def message(self) -> str:
+        """Returns the message as it was written; it may quote names of a file as they are."""
+        return super().__str__()
 
 
 class InputFileError(DorothieGymError, ValueError):
@@ -60,7 +67,8 @@ class InputFileError(DorothieGymError, ValueError):
         super().__init__(str(where), reason, place)
         self.where, self.reason, self.place = str(where), reason, place
 
-    def __str__(self) -> str:
+    def message(self) -> str:
+        """Returns file, place and reason."""
         return f"{self.where}{', ' if self.place else ''}{self.place}: {self.reason}"
 
 
@@ -82,7 +90,8 @@ class TownError(DorothieGymError, ValueError):
         super().__init__(source, element, reason)
         self.source, self.element, self.reason = source, element, reason
 
-    def __str__(self) -> str:
+    def message(self) -> str:
+        """Returns source, element and reason."""
         return one_line(f"{self.source}: {self.element}: {self.reason}", MAX_MESSAGE)
 
 
@@ -100,8 +109,12 @@ class StoryboardError(DorothieGymError, ValueError):
     """
 
     def __init__(self, template: str, field: str, reason: str) -> None:
-        super().__init__(one_line(f"storyboard {template}: {field}: {reason}", MAX_MESSAGE))
+        super().__init__(template, field, reason)
         self.template, self.field, self.reason = template, field, reason
+
+    def message(self) -> str:
+        """Returns template, field and reason."""
+        return one_line(f"storyboard {self.template}: {self.field}: {self.reason}", MAX_MESSAGE)
 
 
 class SessionError(DorothieGymError, ValueError):
@@ -162,6 +175,16 @@ class ProcessError(DorothieGymError, RuntimeError):
 
 class BenchmarkProcessError(ProcessError):
     """A measuring process ended before it reported a result."""
+
+
+def printable(text: str) -> str:
+    r"""Returns a text on one line: spaces for line breaks and tabs, escapes such as `\x1b` for control characters."""
+    if text.isprintable():
+        return text
+    return "".join(
+        each if each.isprintable() else " " if each.isspace() else each.encode("unicode_escape").decode()
+        for each in text
+    )
 
 
 def one_line(text: object, limit: int = 300) -> str:
