@@ -66,31 +66,36 @@ VARIANTS: Mapping[str, tuple[str, Callable[[TOTOConfig], TOTOConfig], Callable[[
 def main(
     corpus: Annotated[Path, typer.Argument(help="folder of the corpus")],
     seeds: Annotated[int, typer.Option(help="number of seeds")] = 2,
-    variants: Annotated[str, typer.Option(help="comma-separated names; by default all")] = "",
+    epochs: Annotated[int, typer.Option(min=1, help="largest number of epochs")] = 16,
+    variants: Annotated[str, typer.Option(help="semicolon-separated names; by default all")] = "",
     encoder: Annotated[str, typer.Option(help="text encoder")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
 ) -> None:
-    """Prints the validation metrics of each variant, mean over seeds [%]."""
+    """Prints the validation metrics of each variant and the mean of the metrics, over seeds [%]."""
     torch.set_num_threads(1)
-    chosen = [name.strip() for name in variants.split(",")] if variants else list(VARIANTS)
+    chosen = [name.strip() for name in variants.split(";")] if variants else list(VARIANTS)
     material, found = Dataset.load(corpus, encoder), {}
     if not as_json:
-        print(f"{'variant':36}", *(f"{column:>22}" for column in COLUMNS))
+        print(f"{'variant':36}", *(f"{column:>22}" for column in (*COLUMNS, "mean")))
     for name in chosen:
-        scores = [_score(name, material, seed) for seed in range(seeds)]
+        scores = [_score(name, material, seed, epochs) for seed in range(seeds)]
         found[name] = {key: fmean(score[key] for score in scores) for key in COLUMNS}
+        found[name]["mean"] = fmean(found[name].values())
         if not as_json:
-            print(f"{name:36}", *(f"{100.0 * found[name][key]:22.1f}" for key in COLUMNS), flush=True)
+            print(f"{name:36}", *(f"{100.0 * value:22.1f}" for value in found[name].values()), flush=True)
     if as_json:
-        print(json.dumps({"corpus": material.columns.content, "seeds": seeds, "validation": found}, indent=1))
+        about = {"corpus": material.columns.content, "seeds": seeds, "epochs": epochs}
+        print(json.dumps({**about, "validation": found}, indent=1))
 
 
-def _score(name: str, material: Dataset, seed: int) -> dict[str, float]:
+def _score(name: str, material: Dataset, seed: int, epochs: int) -> dict[str, float]:
     command, reconfigured, changed = VARIANTS[name]
     row = find_row(command)
     assert row.change is not None
     torch.manual_seed(seed)
-    model = build_model(row, reconfigured(row.change(SIZES["small"]())), material)
+    config = reconfigured(row.change(SIZES["small"]()))
+    config = replace(config, min_epochs=min(config.min_epochs, epochs), max_epochs=epochs)
+    model = build_model(row, config, material)
     changed(model)
     learned, checked = (material.examples(fold, model.spec) for fold in (TRAIN, VALIDATION))
     with tempfile.TemporaryDirectory() as folder:
