@@ -25,7 +25,6 @@ from dorothie_gym.engine.scenario import (
 from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView, metadata_at
-from dorothie_gym.envs.time_limit import TimeLimitedEnv, decisions_in
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
@@ -55,6 +54,7 @@ from dorothie_gym.spaces import (
     StepInfo,
 )
 from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
 NEARER = 1.0
 """Decrease of the cost to go that counts as progress for `patience` [m]."""

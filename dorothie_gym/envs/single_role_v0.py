@@ -16,13 +16,13 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_option
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
-from dorothie_gym.envs.time_limit import TimeLimitedEnv, decisions_in
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, StepInfo, action_space, noop, observation_space
 from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
 
 class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):

@@ -39,6 +39,7 @@ from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import CLEAR_OF_CAR
+from dorothie_gym.time_limit import TimeLimited, steps_until
 
 ROUNDS = 8
 """Largest number of rounds in which vehicles and pedestrians too close to the ego are placed again."""
@@ -263,7 +264,7 @@ def config_with_town(config: Mapping[str, object] | None, town: str | Path | Non
     return settings
 
 
-class TownEnv(Restorable, AbstractEnv):
+class TownEnv(Restorable, TimeLimited, AbstractEnv):
     """Driving through a town among other vehicles, as an environment of highway-env.
 
     ## Description
@@ -318,6 +319,11 @@ class TownEnv(Restorable, AbstractEnv):
         self._network: TownNetwork | None = None
         self._network_of: str | None = None
         super().__init__(config_with_town(config, town), render_mode)
+
+    @property
+    def decision_limit(self) -> int:
+        """Decisions until truncation."""
+        return steps_until(self.config["duration"], 1.0 / self.config["policy_frequency"])
 
     @classmethod
     def default_config(cls) -> TownConfig:

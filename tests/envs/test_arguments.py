@@ -60,6 +60,8 @@ def test_unknown_reset_option_causes_a_warning(name: str) -> None:
         ("Navigation-v0", {}, 1200),
         ("Navigation-v0", {"max_seconds": 900.0}, 1800),
         ("Navigation-continuous-v0", {}, 6000),
+        ("Town-v0", {}, 60),
+        ("Town-v0", {"config": {"policy_frequency": 5, "duration": 3.1}}, 16),
         ("UfN-v0", {"corpus": "x"}, None),
     ],
 )
@@ -79,6 +81,16 @@ def test_episode_ends_at_the_limit_of_the_specification() -> None:
     env.reset(seed=0)
     ends = [env.step(env.unwrapped.noop_action)[3] for _ in range(5)]  # type: ignore[attr-defined]  # of SingleRole
     assert ends == [False] * 4 + [True]
+
+
+@pytest.mark.parametrize(("frequency", "duration"), [(1, 3), (5, 2.0), (15, 0.7)])
+def test_town_is_truncated_at_the_limit_of_its_specification(frequency: int, duration: float) -> None:
+    settings = {"policy_frequency": frequency, "duration": duration, "vehicles": 0}
+    env = gym.make("dorothie_gym/Town-v0", config=settings)
+    assert env.spec is not None and env.spec.max_episode_steps is not None
+    env.reset(seed=0)
+    ends = [env.step(1)[3] for _ in range(env.spec.max_episode_steps)]
+    assert ends == [False] * (len(ends) - 1) + [True]
 
 
 def test_a_limit_given_to_make_is_kept() -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from dataclasses import replace
+from itertools import accumulate, repeat
 from typing import TypeVar
 
 import gymnasium as gym
@@ -14,8 +15,8 @@ ObsType = TypeVar("ObsType")
 ActType = TypeVar("ActType")
 
 
-class TimeLimitedEnv(gym.Env[ObsType, ActType]):
-    """Environment whose `spec.max_episode_steps` is the number of decisions after which it truncates an episode.
+class TimeLimited(ABC):
+    """Part of an environment; its `spec.max_episode_steps` is the number of decisions until it truncates an episode.
 
     The number follows from the arguments. The ids are registered without one, because `gymnasium.make` would then
     add a `TimeLimit` of the default arguments and cut episodes that are to last longer.
@@ -38,6 +39,15 @@ class TimeLimitedEnv(gym.Env[ObsType, ActType]):
         if spec is not None and spec.max_episode_steps is None:
             spec = replace(spec, max_episode_steps=self.decision_limit)
         self._spec = spec
+
+
+class TimeLimitedEnv(TimeLimited, gym.Env[ObsType, ActType]):
+    """Environment with a limit of its own, see `TimeLimited`."""
+
+
+def steps_until(seconds: float, step: float) -> int:
+    """Returns after how many steps a clock that adds up steps of equal length [s] has reached a time [s]."""
+    return next(number for number, time in enumerate(accumulate(repeat(step)), start=1) if time >= seconds)
 
 
 def decisions_in(seconds: float, decision_frequency: float) -> int:
