@@ -287,4 +287,5 @@ def mutate_folder(folder: Path, random: Random) -> None:
             file.unlink()
             file.mkdir()
         else:
-            file.write_bytes(random.choice(files).read_bytes() if file.exists() else b"")
+            other = random.choice(files)
+            file.write_bytes(other.read_bytes() if other.is_file() else b"")
