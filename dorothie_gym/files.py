@@ -42,10 +42,13 @@ def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
     try:
         yield part
         os.replace(part, path)
-    except BaseException as error:
+    except OSError as error:
         part.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename in (None, str(part)) and error.errno is not None:
+        if error.errno is not None and error.filename in (None, str(part)):
             raise OSError(error.errno, error.strerror, str(path)) from error  # errors of writing name no file
+        raise
+    except BaseException:
+        part.unlink(missing_ok=True)
         raise
 
 
@@ -84,6 +87,10 @@ def new_folder(folder: Path, *, hidden: bool = False) -> Iterator[Path]:
         part.chmod(0o755)  # temporary folders are closed to other users
         yield part
         part.rename(folder)
+    except OSError as error:
+        if error.errno is not None and error.filename is None:
+            raise OSError(error.errno, error.strerror, str(folder)) from error  # errors of writing name no file
+        raise
     finally:
         shutil.rmtree(part, ignore_errors=True)
 

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import errno
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -55,3 +58,14 @@ def test_failed_folder_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="taken"), new_folder(tmp_path / "taken"):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="a device of Linux")
+@pytest.mark.parametrize("writing", [replacing, new_folder])
+def test_full_disk_is_reported_with_the_name_of_the_file(
+    writing: Callable[[Path], AbstractContextManager[Path]], tmp_path: Path
+) -> None:
+    with pytest.raises(OSError, match="No space left") as caught, writing(tmp_path / "a"):
+        Path("/dev/full").write_text("more")
+    assert caught.value.errno == errno.ENOSPC and caught.value.filename == str(tmp_path / "a")
+    assert not list(tmp_path.iterdir())

@@ -70,6 +70,9 @@ class Experiment:
     out: Path
     strict: bool = False
 
+    def __str__(self) -> str:
+        return f"{self.model} ({self.size}), seed {self.seed}"
+
     @property
     def row(self) -> ModelEntry:
         """Entry of the model in the table."""

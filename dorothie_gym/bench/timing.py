@@ -23,6 +23,7 @@ from types import TracebackType
 from typing import Any, Final, NoReturn, Self, TypeAlias
 
 from dorothie_gym.errors import BenchmarkProcessError
+from dorothie_gym.interruption import starting_process
 from dorothie_gym.processors import available_processors
 
 Progress: TypeAlias = Callable[[str, float], None]
@@ -153,9 +154,10 @@ class Worker:
         self._job = job
         self._noise = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")  # noqa: SIM115
         command = [sys.executable, "-m", __name__, job, json.dumps(settings)]
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._noise, text=True
-        )
+        with starting_process():
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._noise, text=True
+            )
 
     def __enter__(self) -> Self:
         """Returns the worker."""

@@ -34,6 +34,7 @@ from dorothie_gym.benchmark.paper_comparison import (
 )
 from dorothie_gym.benchmark.scoring import class_labels
 from dorothie_gym.benchmark.table import ResultsTable
+from dorothie_gym.files import replacing, write_atomically
 from dorothie_gym.recording import Task
 from dorothie_gym.rendering.charts import INK, SHEET, SOFT, dress_percent_axes, empty_figure
 
@@ -77,7 +78,7 @@ def write_report(table: ResultsTable, folder: Path | str, *, pictures: bool = Tr
     }
     written = []
     for name, text in texts.items():
-        (place / name).write_text(text, encoding="utf-8")
+        write_atomically(place / name, text)
         written.append(place / name)
     if pictures:
         written.append(draw_table(table, place / "table.png"))
@@ -322,7 +323,8 @@ def draw_table(table: ResultsTable, path: Path | str) -> Path:
         figure.text(0.012, 1 - 0.42 / height, title, fontsize=14, weight="bold")
         figure.text(0.012, 1 - 0.68 / height, _subtitle(table), fontsize=9.5, color=SOFT)
         _legend(figure, table, height)
-        figure.savefig(path, format="png")
+        with replacing(Path(path)) as new:
+            figure.savefig(new, format="png")
     return Path(path)
 
 
@@ -357,7 +359,8 @@ def draw_confusions(table: ResultsTable, model: str, path: Path | str) -> Path:
                 matrix = table.confusion(model, part, task)
                 if matrix is not None:
                     _matrix(figure.add_subplot(grid[row, column], anchor="N"), matrix, task, part, seeds)
-        figure.savefig(path, format="png")
+        with replacing(Path(path)) as new:
+            figure.savefig(new, format="png")
     return Path(path)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -23,6 +25,9 @@ Facts: TypeAlias = dict[str, Any]
 
 FAILED = 1
 """Exit code where a command could not do its work."""
+
+_NO_SPACE = tuple(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name))
+"""Numbers of the errors that end when there is more space: full disk, used up quota, too large file."""
 
 BAD_INPUT = 2
 """Exit code for invalid input."""
@@ -70,7 +75,7 @@ def print_json(value: Mapping[str, object] | Sequence[object]) -> None:
 
 @contextmanager
 def reporting_errors() -> Iterator[None]:
-    """Turns errors into one message and exit code 2, or 1 if the output was deleted during the command."""
+    """Turns errors into one message and exit code 2, or 1 if the disk is full or the output was deleted meanwhile."""
     from dorothie_gym.errors import DorothieGymError, OutputFolderError
 
     try:
@@ -80,7 +85,10 @@ def reporting_errors() -> Iterator[None]:
     except DorothieGymError as error:
         fail(str(error))
     except OSError as error:
-        fail(f"{error.filename}: {error.strerror}; check the path" if error.filename else str(error))
+        where = f"{error.filename}: " if error.filename else ""
+        if error.errno is not None and error.errno in _NO_SPACE:
+            fail(f"{where}{os.strerror(error.errno)}; make space and run the same command again", FAILED)
+        fail(f"{where}{error.strerror}; check the path" if where else str(error))
 
 
 def check_picture(path: Path) -> None:

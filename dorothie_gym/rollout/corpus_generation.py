@@ -43,6 +43,9 @@ class SessionPlan:
         """Folder of the session within the corpus."""
         return f"{self.fold}/{self.number:04d}-{self.town}"
 
+    def __str__(self) -> str:
+        return f"session {self.number} ({self.town}, seed {self.seed})"
+
 
 def plan_corpus(sessions: int, seed: int) -> tuple[SessionPlan, ...]:
     """Returns the plans of the sessions of a corpus; the towns of a fold take turns.

@@ -39,6 +39,7 @@ def run_tasks(
 
     Raises:
         ProcessError: a task failed in another process, or its process died.
+        OSError: a file cannot be read or written.
     """
     waiting = list(reversed(list(tasks)))
     if workers == 1:
@@ -95,6 +96,8 @@ class _Worker(Generic[Task, Result]):
         except (EOFError, ConnectionResetError):
             self._raise_death()
         if not done:
+            if isinstance(result, OSError):
+                raise result
             raise ProcessError(f"{self._task}: {result}")
         found: Result = result
         return found
@@ -118,13 +121,17 @@ def _serve(connection: Connection, prepare: Callable[[], Callable[[Task], Result
             task = connection.recv()
         except (EOFError, ConnectionResetError):
             return
-        answer: tuple[bool, Result | str]
+        answer: tuple[bool, Result | str | OSError]
         try:
             work = work or prepare()
             answer = True, work(task)
         except Exception as error:  # any error is reported to the caller
-            where = traceback.extract_tb(error.__traceback__)[-1]
-            answer = False, f"{type(error).__name__}: {error} ({os.path.basename(where.filename)}, line {where.lineno})"
+            if isinstance(error, OSError) and error.filename is not None:
+                answer = False, OSError(error.errno, error.strerror, str(error.filename))
+            else:
+                where = traceback.extract_tb(error.__traceback__)[-1]
+                place = f"{os.path.basename(where.filename)}, line {where.lineno}"
+                answer = False, f"{type(error).__name__}: {error} ({place})"
         connection.send(answer)
 
 

@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from dorothie_gym.errors import ProcessError
+from dorothie_gym.rollout import plan_corpus
 from dorothie_gym.rollout.processes import run_tasks
 from tests.rollout import workshop
 
@@ -25,3 +28,17 @@ def test_failure_names_task_and_reason() -> None:
 def test_death_of_a_worker_is_reported_at_once() -> None:
     with pytest.raises(ProcessError, match="died with code -9"):
         list(run_tasks(workshop.dying, range(5), workers=2))
+
+
+def test_failure_names_the_session() -> None:
+    plans = plan_corpus(2, 7)
+    named = r"session [01] \(\w+, seed \d+\): ValueError: the town is closed \(workshop\.py, line \d+\)"
+    with pytest.raises(ProcessError, match=f"^{named}$"):
+        list(run_tasks(workshop.refusing_sessions, plans, workers=2))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_file_that_cannot_be_written_is_an_error_of_the_system_in_every_process(workers: int, tmp_path: Path) -> None:
+    with pytest.raises(IsADirectoryError) as caught:
+        list(run_tasks(workshop.writing, [str(tmp_path)] * 2, workers=workers))
+    assert caught.value.filename == str(tmp_path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable
+from pathlib import Path
 
 
 def squares() -> Callable[[int], int]:
@@ -26,3 +27,14 @@ def dying() -> Callable[[int], int]:
         return number
 
     return work
+
+
+def refusing_sessions() -> Callable[[object], object]:
+    def refuse(task: object) -> object:
+        raise ValueError("the town is closed")
+
+    return refuse
+
+
+def writing() -> Callable[[str], int]:
+    return lambda path: Path(path).write_bytes(b"full")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import RolloutError
+from dorothie_gym.files import replacing
 from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
 from dorothie_gym.ontology import Role
 from dorothie_gym.rendering.charts import INK, dress_percent_axes, empty_figure
@@ -318,7 +319,8 @@ def draw_rows(rows: Sequence[ChartRow], path: Path | str) -> Path:
         axes[0].set_ylim(len(names) - 0.5, -0.5)
         figure.text(0.012, 1 - 0.38 / height, "Co-Wizards in the loop", fontsize=14, weight="bold")
         _legend(figure, {row.part for row in rows}, height)
-        figure.savefig(path, format="png")
+        with replacing(Path(path)) as part:
+            figure.savefig(part, format="png")
     return Path(path)
 
 

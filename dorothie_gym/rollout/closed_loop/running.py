@@ -51,6 +51,9 @@ class RolloutPlan:
         """Folder of the session within the folder of the rollout."""
         return f"{SESSIONS_FOLDER}/{self.number:04d}-{safe_name(Path(self.town).stem)}"
 
+    def __str__(self) -> str:
+        return f"session {self.number} ({self.town}, seed {self.seed})"
+
 
 @dataclass(frozen=True, kw_only=True)
 class RolloutSettings:
