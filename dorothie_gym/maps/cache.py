@@ -21,7 +21,7 @@ import msgspec
 import numpy as np
 
 from dorothie_gym import angles
-from dorothie_gym.errors import InputFileError, TownArchiveError
+from dorothie_gym.errors import InputFileError, TownArchiveError, one_line
 from dorothie_gym.files import PART
 from dorothie_gym.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, read_file
 from dorothie_gym.maps.model import (
@@ -38,7 +38,7 @@ from dorothie_gym.maps.model import (
     Site,
     Street,
 )
-from dorothie_gym.maps.town import Town
+from dorothie_gym.maps.town import MAX_EXTENT, Town
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
 from dorothie_gym.user_cache import cache_folder, read_signed, write_signed
 
@@ -123,7 +123,7 @@ def unpack(data: bytes, key: str) -> Town:
         zipfile.BadZipFile,
         zlib.error,
     ) as error:
-        raise TownArchiveError(f"it holds no town: {error}") from error
+        raise TownArchiveError(f"it holds no town: {one_line(error)}") from error
 
 
 def _column(values: list[object], arrays: list[Array]) -> _Column:
@@ -230,11 +230,20 @@ def _faults(town: Town) -> Iterator[str]:
     for lane in town.lanes:
         if lane.points.shape != (len(lane.widths), 3) or len(lane.widths) < 2 or not lane.speed_limit > 0.0:
             yield f"lane {lane.id} has no line, widths or speed limit"
+    if not all(walk.points.ndim == 2 and walk.points.shape[1] == 3 for walk in town.sidewalks):
+        yield "a sidewalk has no line"
     arrays = [array for lane in town.lanes for array in (lane.points, lane.widths)]
     arrays += [crosswalk.outline for crosswalk in town.crosswalks] + [walk.points for walk in town.sidewalks]
     places = [site.position + site.waypoint for site in town.sites] + [each.position for each in town.signals]
     if not all(bool(np.all(np.abs(array) < 1e9)) for array in (*arrays, *map(np.array, places))):
         yield "a position is not finite"
+    if not town.extent <= MAX_EXTENT:
+        yield "it is too large"
+    lines = [lane.points for lane in town.lanes] + [walk.points for walk in town.sidewalks]
+    if not all(
+        bool(np.all(np.sum(np.diff(line[:, :2], axis=0) ** 2, axis=1) > 0.0)) for line in lines if line.ndim == 2
+    ):
+        yield "two points of a line are in one place"
     for programme in town.programmes:
         shown = {signal for phase in programme.phases for signal in (*phase.green, *phase.yellow)}
         if not ({*programme.signals} | shown) <= signals or not all(phase.duration > 0.0 for phase in programme.phases):

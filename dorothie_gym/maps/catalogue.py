@@ -17,7 +17,7 @@ from dorothie_gym.files import JsonValue
 from dorothie_gym.input_files import MAX_OPENDRIVE, check_file
 from dorothie_gym.maps.cache import through_cache
 from dorothie_gym.maps.model import LaneLink, SignalKind
-from dorothie_gym.maps.town import Town
+from dorothie_gym.maps.town import Town, check_extent
 
 SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")
 """Training towns (in the paper: CARLA's Town01, Town03 and Town05)."""
@@ -106,10 +106,13 @@ def _compile(path: Path) -> Town:
     if path.suffix.lower() == ".xodr":
         from dorothie_gym.maps.opendrive import read_opendrive
 
-        return read_opendrive(path)
-    from dorothie_gym.maps.yaml import read_yaml_town
+        town = read_opendrive(path)
+    else:
+        from dorothie_gym.maps.yaml import read_yaml_town
 
-    return read_yaml_town(path)
+        town = read_yaml_town(path)
+    check_extent(town, str(path))
+    return town
 
 
 # --- Summary figures -------------------------------------------------------------------------------------------------

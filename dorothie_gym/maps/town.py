@@ -9,6 +9,7 @@ import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.copying import shared
+from dorothie_gym.errors import TownError
 from dorothie_gym.maps.lane_graph import LaneGraph, build_lane_graph
 from dorothie_gym.maps.model import (
     Crosswalk,
@@ -23,6 +24,24 @@ from dorothie_gym.maps.model import (
     Street,
 )
 from dorothie_gym.maps.traffic_lights import LightColour, LightProgramme
+
+MAX_EXTENT = 20_000.0
+"""Largest extent of a town along x and y [m]; the index of its lanes takes 250 MB there."""
+
+
+def check_extent(town: Town, source: str) -> None:
+    """Raises `TownError` if a town is too large to be simulated.
+
+    Args:
+        town: the town.
+        source: file or name that the message gives.
+    """
+    if not town.extent <= MAX_EXTENT:
+        raise TownError(
+            source,
+            "town",
+            f"spans {town.extent / 1000.0:g} km; at most {MAX_EXTENT / 1000.0:g} km can be simulated: remove far roads",
+        )
 
 
 @shared
@@ -75,6 +94,15 @@ class Town:
     def kilometres(self) -> float:
         """Length of all driving lanes, connectors included [km]."""
         return sum(lane.length for lane in self.lanes) / 1000.0
+
+    @cached_property
+    def extent(self) -> float:
+        """Distance between the outermost points of the lanes along x or y, whichever is larger [m]; 0 without lanes."""
+        ends = [(lane.points[:, :2].min(axis=0), lane.points[:, :2].max(axis=0)) for lane in self.lanes]
+        if not ends:
+            return 0.0
+        low, high = (np.array(side) for side in zip(*ends, strict=True))
+        return float((high.max(axis=0) - low.min(axis=0)).max())
 
     @cached_property
     def _links_from(self) -> tuple[tuple[LaneLink, ...], ...]:

@@ -130,6 +130,17 @@ def test_content_without_a_town_is_refused_even_with_a_correct_checksum(data: by
         unpack(data, "key")
 
 
+@pytest.mark.parametrize(
+    ("number", "fault"), [(0.0, "two points of a line are in one place"), (1e8, "it is too large")]
+)
+def test_numbers_that_no_town_has_are_refused(number: float, fault: str) -> None:
+    with np.load(io.BytesIO(pack(load_town("brookside"), "key"))) as file:
+        document, floats = file["document"], file["floats"].copy()
+    floats[:6] = [number, 0.0, 0.0, 0.0, 0.0, 1.0]  # the first two points of a lane
+    with pytest.raises(TownArchiveError, match=fault):
+        unpack(_npz(document=document, floats=floats), "key")
+
+
 def test_a_town_with_something_unknown_in_it_is_not_packed() -> None:
     town = town_with_everything()
     town.name = {1, 2}  # type: ignore[assignment]  # a wrong type on purpose

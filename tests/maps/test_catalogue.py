@@ -5,6 +5,10 @@ import pytest
 
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.catalogue import load_town, town_names
+from dorothie_gym.maps.opendrive import read_opendrive
+from dorothie_gym.sim.network.network import TownNetwork
+
+from .opendrive_text import geometry, opendrive, road
 
 LOOP = """\
 junctions: {a: [0, 0], b: [100, 0]}
@@ -60,3 +64,19 @@ def test_an_unknown_town_is_reported_with_the_known_towns(name: str) -> None:
 def test_a_missing_file_is_reported(tmp_path: Path, name: str) -> None:
     with pytest.raises(TownError, match=rf"{name}: file: cannot be read \(No such file or directory\)"):
         load_town(tmp_path / name)
+
+
+@pytest.mark.parametrize("far", [3e4, 1e6, 1e12])
+def test_a_map_with_roads_far_apart_is_refused(far: float, tmp_path: Path) -> None:
+    path = tmp_path / "far.xodr"
+    path.write_text(opendrive(road(1), road(2, plan=geometry("<line/>", 100.0, x=far))))
+    with pytest.raises(TownError, match=r"far\.xodr: town: spans .* km; at most 20 km can be simulated"):
+        load_town(path)
+    with pytest.raises(TownError, match="spans"):
+        TownNetwork(read_opendrive(path))
+
+
+def test_a_map_of_ten_kilometres_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "far.xodr"
+    path.write_text(opendrive(road(1), road(2, plan=geometry("<line/>", 100.0, x=1e4))))
+    assert load_town(path).extent == pytest.approx(10_100.0)

@@ -15,7 +15,7 @@ from highway_env.road.road import RoadNetwork
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane, LinkType
 from dorothie_gym.maps.polyline import HEIGHT, LaneTable
-from dorothie_gym.maps.town import Town
+from dorothie_gym.maps.town import Town, check_extent
 from dorothie_gym.sim.network.grid import GridIndex
 from dorothie_gym.sim.network.lane import PolylineLane
 
@@ -123,10 +123,11 @@ class TownNetwork(RoadNetwork):
     """
 
     def __init__(self, town: Town) -> None:
-        """Builds the graph and the index of a town; raises `ValueError` if it has no lanes."""
+        """Builds the graph and the index of a town; raises `ValueError` if it has no lanes or is too large."""
         super().__init__()
         if not town.lanes:
             raise ValueError(f"town {town.name!r} has no lanes: there is nothing to drive on")
+        check_extent(town, town.name)
         self.town = town
         for (start, end), lanes in road_edges(town).items():
             for lane in lanes:
