@@ -27,6 +27,7 @@ from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.egos import play_share
 from dorothie_gym.sim.batch.town_vector_env import TownVectorEnv
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
+from dorothie_gym.sim.ego.path import find_sides
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import closest_walk
 from dorothie_gym.sim.sensing.perception import look_around
@@ -35,6 +36,8 @@ from dorothie_gym.sim.state.town_arrays import TownArrays, empty_town
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step
 from dorothie_gym.sim.town_env import TownEnv
+from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
+from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import noop
 
 TOWN: Final = "brookside"
@@ -68,6 +71,7 @@ def warm_up(progress: Progress | None = None, *, everything: bool = False) -> No
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
         engine.reset(seed=0)
         _compile_rare()
+        _call_what_follows_a_step(engine.session.world)
         if everything:
             _play(TownEnv())
         wait()
@@ -98,6 +102,15 @@ def _compile_rare() -> None:
         look_around.compile_for(world, 0, np.zeros((0, 2)))
         closest_walk.compile_for(town, Footway.STREET, 0.0, 0.0, 0.0)
     TownNetwork(load_town(TOWN)).lane_of(0).local_coordinates(np.zeros(2))
+
+
+def _call_what_follows_a_step(world: World) -> None:
+    """Calls the functions that read a step of a world, while the second process compiles the step."""
+    arrays, poses = world.actors.arrays, np.zeros((2, world.actors.arrays.poses.shape[1]))
+    world.localizer.localize(poses, 0)
+    world.reports.close(poses, 1, stood=False)
+    world.visibility.signal(1.0)
+    find_sides(arrays.path, 0, CAR_LENGTH, CAR_WIDTH)
 
 
 def _play(env: TownEnv | TownVectorEnv) -> None:
