@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import shutil
@@ -32,8 +33,11 @@ def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
             is `path` with the ending `PART`, so that a later write removes what a killed process left.
 
     Raises:
-        OSError: the file cannot be written; the error names `path`.
+        OSError: the file cannot be written, or a pipe or device is there, which a file must not replace; the error
+            names `path`.
     """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.EINVAL, "Is a pipe or device, not a file", str(path))
     if shared:
         part = path.with_name(f"{path.name[:80]}.{secrets.token_hex(8)}{PART}")
     else:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -33,6 +34,14 @@ def test_link_in_the_place_of_the_part_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / f"a{PART}").symlink_to(tmp_path / "outside")
     write_atomically(tmp_path / "a", "new")
     assert (tmp_path / "outside").read_text() == "precious"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+def test_pipe_is_not_replaced_by_a_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="pipe or device"):
+        write_atomically(tmp_path / "pipe", "new")
+    assert (tmp_path / "pipe").is_fifo()
 
 
 def test_shared_parts_have_names_of_their_own(tmp_path: Path) -> None:
