@@ -14,6 +14,7 @@ import typer
 from dorothie_gym.cli.completion import complete_algorithm, complete_env
 from dorothie_gym.cli.options import AsJson, Ray
 from dorothie_gym.cli.output import FAILED, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
+from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.processors import available_processors
 
@@ -163,6 +164,8 @@ def _train(
     settings = tuned_settings(algorithm, env, env_settings=given, **changes)
     if changes["workers"] is None and ray is None:
         settings = _with_default_workers(settings)
+    if ray is None and settings.env.startswith("dorothie_gym/"):
+        compile_first()
     with _progress(settings.steps, out, _line, quiet=as_json) as (on_progress, on_stage):
         result = Training(settings, out, on_progress, ray, on_stage).run()
     if as_json:
@@ -218,6 +221,8 @@ def _train_selfplay(out: Path, given: Given, changes: Given, *, ray: str | None,
     settings: SelfPlaySettings = selfplay_settings(given, **changes)
     if changes["workers"] is None and ray is None:
         settings = _with_default_workers(settings)
+    if ray is None:
+        compile_first()
     with _progress(settings.steps, out, _selfplay_line, quiet=as_json) as (on_progress, on_stage):
         result = SelfPlayTraining(settings, out, on_progress, ray, on_stage).run()
     if as_json:
