@@ -11,6 +11,7 @@ DorothieGymError
 ├── TownArchiveError     a cached town is damaged or of another format
 ├── StoryboardError      a storyboard cannot be read, bound or played
 ├── SessionError         a recorded session or corpus cannot be read or written
+├── OutputFolderError    an output folder was deleted or replaced while it was being written
 ├── PolicyLoadError      a policy name or file cannot be resolved
 ├── PredictionError      predictions cannot be scored
 ├── FeatureStoreError    cached features are damaged

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.baselines.tensor_files import save_tensors
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.rollout import generate_corpus
 
@@ -95,7 +94,10 @@ def test_disks_of_many_sizes(name: str, corpus: Path, disk: Path) -> None:
 
 
 def test_tensors_that_cannot_be_written_raise_an_error_of_the_system(tmp_path: Path) -> None:
-    torch = pytest.importorskip("torch")
+    import torch
+
+    from dorothie_gym.baselines.tensor_files import save_tensors
+
     (tmp_path / "taken").mkdir()
     with pytest.raises(OSError, match="taken") as caught:
         save_tensors({"weights": torch.zeros(10)}, tmp_path / "taken")

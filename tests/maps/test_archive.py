@@ -130,6 +130,12 @@ def test_content_without_a_town_is_refused_even_with_a_correct_checksum(data: by
         unpack(data, "key")
 
 
+def test_message_quotes_little_of_a_long_text() -> None:
+    with pytest.raises(TownArchiveError) as caught:
+        unpack(_document(links={"source": [0], "target": [1], "type": ["a" * 100_000]}), "key")
+    assert len(str(caught.value)) < 1000
+
+
 @pytest.mark.parametrize(
     ("number", "fault"), [(0.0, "two points of a line are in one place"), (1e8, "it is too large")]
 )

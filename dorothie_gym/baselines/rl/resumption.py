@@ -147,7 +147,6 @@ def restore_state(model: Model, checkpoint: Checkpoint) -> None:
     """
     with refusing_misfits(checkpoint.path):
         _restore(model, checkpoint.page, checkpoint.tensors)
-    with refusing_misfits(checkpoint.path):
         repeated = [
             model.env.env_method("repeat_episode", start, checkpoint.tensors[f"actions/{k}"].numpy(), indices=[k])[0]
             for k, start in enumerate(checkpoint.page["episodes"])
