@@ -13,6 +13,7 @@ import numpy as np
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane
+from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.state.records import PathPointRecord, RecordArray, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.route import locate
@@ -173,15 +174,8 @@ class Path:
     @property
     def headings(self) -> Array:
         """Direction at each point (n,) [rad], unwrapped."""
-        steps = np.diff(self.points, axis=0)
-        segment = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-        middle = (self.s[:-1] + self.s[1:]) / 2
-        # from those of the segments at their middles; the ends go on with the curvature
-        headings = np.interp(self.s, middle, segment)
-        if len(segment) > 1:
-            headings[0] = segment[0] - (segment[1] - segment[0]) * (middle[0] - 0.0) / (middle[1] - middle[0])
-            rate = (segment[-1] - segment[-2]) / (middle[-1] - middle[-2])
-            headings[-1] = segment[-1] + rate * (self.s[-1] - middle[-1])
+        headings = np.empty(len(self.s))
+        find_headings(self.points, self.s, headings)
         return headings
 
     @property
@@ -256,6 +250,36 @@ def _sample(lane: Lane, stations: Array) -> Array:
 
 def _heights(lane: Lane, stations: Array) -> Array:
     return np.interp(stations, lane.stations, lane.points[:, 2])
+
+
+@compiled
+def find_headings(points: Array, s: Array, headings: Array) -> None:
+    """Computes the direction of a path at each of its points, unwrapped [rad].
+
+    The directions of the segments are those at their middles, between which they are interpolated; both ends
+    extrapolate the curvature.
+
+    Args:
+        points: (n, 2) [m], n >= 2.
+        s: distance along the path of each point (n,) [m].
+        headings: (n,) the result.
+    """
+    last = len(s) - 1
+    wrapped = unwrapped = math.atan2(points[1, 1] - points[0, 1], points[1, 0] - points[0, 0])
+    middle, turns = (s[0] + s[1]) / 2, 0.0
+    headings[0] = headings[1] = unwrapped
+    for k in range(1, last):
+        before, unwrapped_before, middle_before = wrapped, unwrapped, middle
+        wrapped = math.atan2(points[k + 1, 1] - points[k, 1], points[k + 1, 0] - points[k, 0])
+        turn = wrapped - before
+        if abs(turn) > math.pi:
+            turns += wrap_radians(turn) - turn
+        unwrapped, middle = wrapped + turns, (s[k] + s[k + 1]) / 2
+        bend = (unwrapped - unwrapped_before) / (middle - middle_before)
+        headings[k] = bend * (s[k] - middle_before) + unwrapped_before
+        if k == 1:
+            headings[0] = unwrapped_before - (unwrapped - unwrapped_before) * middle_before / (middle - middle_before)
+        headings[k + 1] = unwrapped + bend * (s[k + 1] - middle)
 
 
 # --- Place of the ego on its path (compiled) --------------------------------------------------------------------------
