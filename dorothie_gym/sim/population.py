@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
+from dorothie_gym.compilation import compiled
 from dorothie_gym.maps.lane_neighbours import rightmost
+from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import closest_walk, place_beside
 from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
 from dorothie_gym.sim.pedestrians.walking import place_walker
+from dorothie_gym.sim.randomness import POOL, seed_of
 from dorothie_gym.sim.state.codes import NOBODY, Footway, Kind, Walk
-from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, empty_records
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, RecordArray, empty_records
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import CAR_KEY, WorldArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
@@ -28,7 +33,7 @@ from dorothie_gym.sim.traffic.parameters import (
     CYCLIST_SPEEDS,
     CYCLIST_WIDTH,
 )
-from dorothie_gym.sim.traffic.respawn import is_clear_of_people, is_free, new_key, put_on_lane
+from dorothie_gym.sim.traffic.respawn import SHORTEST, is_clear_of_people, is_free, new_key, put_on_lane
 
 STREET_WAY_REACH = 1.0
 """Distance to the way beside a street within which a pedestrian is placed on it [m]."""
@@ -60,17 +65,30 @@ def add_vehicle(
     if not len(empty):
         raise ValueError(f"the world has room for {len(world.vehicles)} vehicles, and all are there")
     number = int(empty[0])
+    _put_vehicle(town, world, number, int(kind), lane, float(station), desired, np.zeros(POOL, dtype=np.int64))
+    return number
+
+
+_CAR_RADIUS = 0.5 * math.hypot(CAR_LENGTH, CAR_WIDTH)
+_CYCLIST_RADIUS = 0.5 * math.hypot(CYCLIST_LENGTH, CYCLIST_WIDTH)
+
+
+@compiled
+def _put_vehicle(
+    town: TownArrays, world: WorldArrays, number: int, kind: int, lane: int, station: float, desired: float,
+    pool: NDArray[np.int64],
+) -> None:  # fmt: skip
+    """Places a new vehicle in a free row; see `add_vehicle`, and for `pool` `randomness.seed_of`."""
     vehicle = world.vehicles[number]
     vehicle.kind, vehicle.key, vehicle.touched, vehicle.odometer = kind, new_key(world), False, 0.0
-    vehicle.random = _random(world, int(vehicle.key))
+    vehicle.random = seed_of(world.clock[0].random, vehicle.key, pool) | 1
     vehicle.length, vehicle.width, vehicle.desired, vehicle.to_right = CAR_LENGTH, CAR_WIDTH, desired, 0.0
-    if kind is Kind.CYCLIST:
-        vehicle.length, vehicle.width = CYCLIST_LENGTH, CYCLIST_WIDTH
+    vehicle.radius = _CAR_RADIUS
+    if kind == Kind.CYCLIST:
+        vehicle.length, vehicle.width, vehicle.radius = CYCLIST_LENGTH, CYCLIST_WIDTH, _CYCLIST_RADIUS
         vehicle.desired = min(max(desired, CYCLIST_SPEEDS[0]), CYCLIST_SPEEDS[1])
-    vehicle.radius = 0.5 * math.hypot(vehicle.length, vehicle.width)
-    put_on_lane(town, vehicle, lane, float(station))
+    put_on_lane(town, vehicle, lane, station)
     rebuild(town, world)
-    return number
 
 
 def add_car(town: TownArrays, world: WorldArrays, lane: int, station: float) -> None:
@@ -114,13 +132,21 @@ def add_pedestrian(town: TownArrays, world: WorldArrays, walk: int, station: flo
     if not 0 <= walk < len(town.walks) or town.walks[walk].length <= 0.0:
         raise ValueError(f"there is no footway {walk} in this town")
     number = int(empty[0])
+    _put_pedestrian(town, world, number, walk, station, pace, np.zeros(POOL, dtype=np.int64))
+    return number
+
+
+@compiled
+def _put_pedestrian(
+    town: TownArrays, world: WorldArrays, number: int, walk: int, station: float, pace: float, pool: NDArray[np.int64]
+) -> None:
+    """Places a new pedestrian in a free row; see `add_pedestrian`, and for `pool` `randomness.seed_of`."""
     walker = world.pedestrians[number]
     walker.key, walker.odometer = new_key(world), 0.0
-    walker.random = _random(world, int(walker.key))
+    walker.random = seed_of(world.clock[0].random, walker.key, pool) | 1
     walker.walk, walker.station, walker.pace = walk, station, pace
     walker.direction = 1.0 if walker.random & 2 else -1.0
     place_walker(town, walker)
-    return number
 
 
 def add_street_walker(
@@ -235,24 +261,28 @@ def _reached(network: TownNetwork, town: TownArrays, prop: PropRecord) -> list[t
     return [(lane, station) for _, lane, station in sorted(found)]
 
 
-def _random(world: WorldArrays, key: int) -> int:
-    """Returns the first state of a body's random numbers: a function of the world's seed and the body's key."""
-    return int(np.random.SeedSequence((int(world.clock[0].random), key)).generate_state(1)[0]) | 1
-
-
 # --- Spawning places --------------------------------------------------------------------------------------------------
 
 
 def free_places(town: Town, rng: np.random.Generator, count: int) -> list[tuple[int, float]]:
     """Draws places on lanes outside junctions evenly along the road, candidates for spawning."""
-    lanes = [lane for lane in town.lanes if not lane.in_junction and lane.length > 12.0]
-    weights = np.array([lane.length for lane in lanes])
-    chosen = rng.choice(len(lanes), size=count, p=weights / weights.sum())
+    lanes, stations = _draw_places(town, rng, count)
+    return list(zip(lanes.tolist(), stations.tolist(), strict=True))
+
+
+def _draw_places(town: Town, rng: np.random.Generator, count: int) -> tuple[NDArray[np.int64], Array]:
+    """As `free_places`: lanes (n,) and stations (n,) [m]."""
+    lanes, lengths = _open_lanes(town)
+    chosen = rng.choice(len(lanes), size=count, p=lengths / lengths.sum())
     shares = rng.uniform(size=count)
-    return [
-        (lanes[int(i)].id, float(5.0 + share * (lanes[int(i)].length - 10.0)))
-        for i, share in zip(chosen, shares, strict=True)
-    ]
+    return lanes[chosen], 5.0 + shares * (lengths[chosen] - 10.0)
+
+
+@lru_cache(maxsize=16)
+def _open_lanes(town: Town) -> tuple[NDArray[np.int64], Array]:
+    """Returns ids and lengths [m] of the lanes on which vehicles appear."""
+    lanes = [lane for lane in town.lanes if not lane.in_junction and lane.length > SHORTEST]
+    return np.array([lane.id for lane in lanes]), np.array([lane.length for lane in lanes])
 
 
 # --- Initial population -----------------------------------------------------------------------------------------------
@@ -292,18 +322,46 @@ def _add_traffic(
 ) -> None:
     room = min(vehicles, int((world.vehicles["kind"] == Kind.EMPTY).sum()))
     rideable = town.lanes["cycling"] & (town.lanes["right"] < 0) & (town.lanes["junction"] < 0)
-    kinds = np.where(rng.random(room) < cyclists * rideable.any(), Kind.CYCLIST, Kind.CAR)
-    count = 0
-    for lane, station in free_places(network.town, rng, TRIES * vehicles):
-        if count == room:
-            return
-        kind = Kind(kinds[count])
-        if kind is Kind.CYCLIST and not rideable[lane]:
+    cycles = rng.random(room) < cyclists * rideable.any()
+    lanes, stations = _draw_places(network.town, rng, TRIES * vehicles)
+    state = rng.bit_generator.state
+    shares = rng.random(room)
+    count = _fill_lanes(town, world, lanes, stations, rideable, cycles, shares, np.zeros(POOL, dtype=np.int64))
+    rng.bit_generator.state = state
+    rng.random(count)  # as many numbers as there are new vehicles, for those that draw after them
+
+
+@compiled
+def _fill_lanes(
+    town: TownArrays, world: WorldArrays, lanes: NDArray[np.int64], stations: Array, rideable: NDArray[np.bool_],
+    cycles: NDArray[np.bool_], shares: Array, pool: NDArray[np.int64],
+) -> int:  # fmt: skip
+    """Adds vehicles at the first free ones of some places; returns how many.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        lanes: (n,) of the places.
+        stations: (n,) [m].
+        rideable: (lanes,) on which cyclists may begin.
+        cycles: (room,) whether each new vehicle is a cyclist.
+        shares: (room,) in [0, 1): its desired speed, as a share of the range.
+        pool: see `randomness.seed_of`.
+    """
+    count, row = 0, 0
+    for k in range(len(lanes)):
+        if count == len(cycles):
+            break
+        if cycles[count] and not rideable[lanes[k]]:
             continue
-        if is_free(town, world, lane, station, int(NOBODY), CLEAR_OF_CAR):
-            speeds = CYCLIST_SPEEDS if kind is Kind.CYCLIST else SPEEDS
-            add_vehicle(town, world, lane, station, kind=kind, desired=float(rng.uniform(*speeds)))
+        if is_free(town, world, lanes[k], stations[k], NOBODY, CLEAR_OF_CAR):
+            while world.vehicles[row].kind != Kind.EMPTY:
+                row += 1
+            low, high = CYCLIST_SPEEDS if cycles[count] else SPEEDS
+            kind, desired = Kind.CYCLIST if cycles[count] else Kind.CAR, low + (high - low) * shares[count]
+            _put_vehicle(town, world, row, kind, lanes[k], stations[k], desired, pool)
             count += 1
+    return count
 
 
 def _add_people(town: TownArrays, world: WorldArrays, rng: np.random.Generator, pedestrians: int) -> None:
@@ -313,14 +371,40 @@ def _add_people(town: TownArrays, world: WorldArrays, rng: np.random.Generator, 
     room = min(pedestrians, int((world.pedestrians["state"] == Walk.EMPTY).sum()))
     if room == 0 or not lengths.any():
         return
-    count = 0
-    place = empty_records(PedestrianRecord, 1)[0]
-    place.direction = 1.0
-    for walk in rng.choice(len(lengths), size=TRIES * room, p=lengths / lengths.sum()):
+    walks = rng.choice(len(lengths), size=TRIES * room, p=lengths / lengths.sum())
+    place = empty_records(PedestrianRecord, 1)
+    _fill_footways(town, world, walks, rng.random(len(walks) + room), room, place, np.zeros(POOL, dtype=np.int64))
+
+
+@compiled
+def _fill_footways(
+    town: TownArrays, world: WorldArrays, walks: NDArray[np.int64], shares: Array, room: int,
+    place: RecordArray[PedestrianRecord], pool: NDArray[np.int64],
+) -> None:  # fmt: skip
+    """Adds pedestrians at free places.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        walks: (n,) footways that are tried.
+        shares: (n + room,) in [0, 1): of the way's length, and after each free place of the range of the speeds.
+        room: how many at most.
+        place: (1,) scratch.
+        pool: see `randomness.seed_of`.
+    """
+    count, row, k = 0, 0, 0
+    walker = place[0]
+    walker.direction = 1.0
+    for walk in walks:
         if count == room:
             return
-        place.walk, place.station = walk, rng.uniform(0.0, lengths[walk])
-        x, y, _, _ = place_beside(town, place, float(place.station), 0.0)
-        if is_clear_of_people(world, x, y, int(NOBODY), CLEAR_OF_WALKER):
-            add_pedestrian(town, world, int(walk), float(place.station), pace=float(rng.uniform(*PACES)))
+        walker.walk, walker.station = walk, town.walks[walk].length * shares[k]
+        k += 1
+        x, y, _, _ = place_beside(town, walker, walker.station, 0.0)
+        if is_clear_of_people(world, x, y, NOBODY, CLEAR_OF_WALKER):
+            while world.pedestrians[row].state != Walk.EMPTY:
+                row += 1
+            pace = PACES[0] + (PACES[1] - PACES[0]) * shares[k]
+            k += 1
+            _put_pedestrian(town, world, row, walk, walker.station, pace, pool)
             count += 1

@@ -89,11 +89,13 @@ def map_labels(names: Sequence[LandmarkName]) -> tuple[str, ...]:
     return tuple(labels)
 
 
+@functools.cache
 def categories() -> tuple[str, ...]:
     """Returns all categories of the catalogue, sorted."""
     return tuple(sorted({kind.category for kind in catalogue().values()}))
 
 
+@functools.lru_cache(maxsize=256)
 def kinds_in(category: str) -> tuple[LandmarkKind, ...]:
     """Returns the kinds whose category starts with `category`, in the order of the ids of the ontology."""
     return tuple(kind for kind in catalogue().values() if kind.category.startswith(category))

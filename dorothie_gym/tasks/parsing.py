@@ -266,6 +266,7 @@ _SUBGOAL_FIELDS = (
 )
 
 
+@functools.cache
 def template_names() -> tuple[str, ...]:
     """Returns the names of the templates of the package, sorted."""
     return tuple(sorted(entry.name.removesuffix(".json") for entry in _SHIPPED.iterdir()))
@@ -303,8 +304,7 @@ def load_template(name_or_path: str | Path) -> StoryboardTemplate:
         StoryboardError: if the template does not exist or is invalid.
     """
     if isinstance(name_or_path, str) and name_or_path in template_names():
-        text = (_SHIPPED / f"{name_or_path}.json").read_text(encoding="utf-8")
-        return parse_template(text, name_or_path)
+        return _shipped_template(name_or_path)
     path = Path(name_or_path)
     if isinstance(name_or_path, str) and path.suffix == "" and path.name == name_or_path and not path.exists():
         known, hint = ", ".join(template_names()), did_you_mean(name_or_path, template_names())
@@ -318,6 +318,11 @@ def load_template(name_or_path: str | Path) -> StoryboardTemplate:
     except InputFileError as error:
         raise StoryboardError(str(name_or_path), "file", error.reason) from None
     return parse_template(text, path.stem, source=str(name_or_path))
+
+
+@functools.cache
+def _shipped_template(name: str) -> StoryboardTemplate:
+    return parse_template((_SHIPPED / f"{name}.json").read_text(encoding="utf-8"), name)
 
 
 def parse_template(text: str, name: str, *, source: str | None = None) -> StoryboardTemplate:

@@ -9,15 +9,18 @@ from dorothie_gym.sim.population import (
     add_pedestrian,
     add_prop,
     add_vehicle,
+    free_places,
     move_prop,
     populate,
     remove_pedestrian,
     remove_vehicle,
 )
-from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.sim.state.codes import NOBODY, Kind, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world, grown
 from dorothie_gym.sim.step import step
+from dorothie_gym.sim.traffic.parameters import CLEAR_OF_CAR, CYCLIST_SPEEDS
+from dorothie_gym.sim.traffic.respawn import is_free
 from tests.sim.network.towns import find_town, straight_town
 from tests.sim.state.states import DT, Pose, kernel_world
 
@@ -43,6 +46,24 @@ def test_grown_world_evolves_as_one_with_room_from_the_start():
         step(arrays, world, 300, DT)
     for name in ("vehicles", "pedestrians", "props", "clock", "lamps", "busy", "heads"):
         assert getattr(small, name).tobytes() == getattr(large, name).tobytes(), name
+
+
+def test_traffic_takes_the_first_free_places_that_were_drawn():
+    network = TownNetwork(find_town("brookside"))
+    arrays = town_arrays(network)
+    filled, expected = (empty_world(arrays, vehicles=12, pedestrians=0, props=0, seed=4) for _ in range(2))
+    populate(network, arrays, filled, seed=5, vehicles=12, pedestrians=0, cyclists=0.5)
+    rng = np.random.default_rng(5)
+    kinds = [Kind.CYCLIST if number < 0.5 else Kind.CAR for number in rng.random(12)]
+    rideable = arrays.lanes["cycling"] & (arrays.lanes["right"] < 0) & (arrays.lanes["junction"] < 0)
+    for lane, station in free_places(network.town, rng, 40 * 12):
+        if not kinds:
+            break
+        free = is_free(arrays, expected, lane, station, int(NOBODY), CLEAR_OF_CAR)
+        if free and (kinds[0] is Kind.CAR or rideable[lane]):
+            speeds = CYCLIST_SPEEDS if kinds[0] is Kind.CYCLIST else (6.5, 10.0)
+            add_vehicle(arrays, expected, lane, station, kind=kinds.pop(0), desired=rng.uniform(*speeds))
+    assert filled.vehicles.tobytes() == expected.vehicles.tobytes()
 
 
 def test_world_does_not_shrink():

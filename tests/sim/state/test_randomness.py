@@ -2,7 +2,7 @@ import numpy as np
 
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle
-from dorothie_gym.sim.randomness import choose, draw
+from dorothie_gym.sim.randomness import POOL, choose, draw, seed_of
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
 from tests.sim.network.towns import straight_town
@@ -31,3 +31,10 @@ def test_choices_are_even_and_differ_by_seed():
     chosen = np.array([choose(one, 5) for _ in range(10_000)])
     assert (np.abs(np.bincount(chosen, minlength=5) - 2000) < 200).all()
     assert [choose(other, 1000) for _ in range(5)] != [choose(one, 1000) for _ in range(5)]
+
+
+def test_seeds_are_those_of_numpy():
+    pool = np.zeros(POOL, dtype=np.int64)
+    numbers = np.random.default_rng(0).integers(0, 1 << 32, (500, 2)).tolist()
+    for first, second in [(0, 0), (1, 0), ((1 << 32) - 1, (1 << 32) - 1), *numbers]:
+        assert seed_of(first, second, pool) == np.random.SeedSequence((first, second)).generate_state(1)[0]
