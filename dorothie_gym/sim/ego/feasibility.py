@@ -60,7 +60,7 @@ def may_change_cruise(cruise: float, up: bool) -> bool:
 
 def is_past_stopping(speed: float, room: float) -> bool:
     """Returns whether a moving ego cannot stop within some room [m] any more, at a speed [m/s]."""
-    return speed > EGO_MOVING and speed**2 / (2 * HARD_STOP) > room
+    return speed > EGO_MOVING and speed * speed / (2 * HARD_STOP) > room
 
 
 def has_room_to_switch(room: float) -> bool:
@@ -75,7 +75,7 @@ def u_turn_braking(speed: float, squared_speed: float = U_TURN_SPEED**2) -> floa
         speed: of the ego [m/s].
         squared_speed: square of the speed of a U-turn [m^2/s^2]; the scripted roles count on 12.0.
     """
-    return max(0.0, speed**2 - squared_speed) / (2 * PLANNED_BRAKING)
+    return max(0.0, speed * speed - squared_speed) / (2 * PLANNED_BRAKING)
 
 
 def u_turn_start(station: float, speed: float) -> float:
@@ -92,7 +92,7 @@ def switch_is_blocked(props: PropPlaces, lane: Lane, station: float, speed: floa
         station: place of the ego along it [m].
         speed: of the ego [m/s].
     """
-    way = LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed**2 / (2 * PLANNED_BRAKING)
+    way = LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed * speed / (2 * PLANNED_BRAKING)
     return _is_blocked(props, lane, station - HALF_LENGTH, station + way + MANOEUVRE_PROP_GAP)
 
 

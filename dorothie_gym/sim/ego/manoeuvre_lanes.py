@@ -203,7 +203,7 @@ class LaneChooser:
             spare = (lane.length - at) - changes * (distance + LEAD)
             if k == 0:  # begins late enough to stop before it if others are beside the ego
                 most = max(end - at - changes * (distance + LEAD), 0.0)
-                lead = LEAD + min(speed**2 / (2 * PLANNED_BRAKING), most)
+                lead = LEAD + min(speed * speed / (2 * PLANNED_BRAKING), most)
             else:
                 lead = min(max(spare, LEAD), SETTLE)
             begin = min(at + lead, lane.length - distance)

@@ -75,7 +75,7 @@ def switch(source: Lane, target: Lane, start: float, distance: float) -> PathPie
     t = np.linspace(0.0, 1.0, max(3, math.ceil(distance / PATH_SPACING) + 1))
     begin, _ = target.project(source.position(start))
     end, _ = target.project(source.position(start + distance))
-    weight = (t**3 * (10 - 15 * t + 6 * t**2))[:, None]
+    weight = (t * t * t * (10 - 15 * t + 6 * (t * t)))[:, None]
     stations = begin + t * (end - begin)
     points = (1 - weight) * _sample(source, start + t * distance) + weight * _sample(target, stations)
     return PathPiece(
@@ -186,7 +186,8 @@ class Path:
     @property
     def curvatures(self) -> Array:
         """Curvature at each point (n,) [1/m], positive to the right."""
-        bends: Array = np.gradient(self.headings, self.s)
+        bends = np.empty(len(self.s))
+        find_bends(self.headings, self.s, bends)
         return bends
 
     def index_at(self, s: float) -> int:
@@ -280,6 +281,27 @@ def find_headings(points: Array, s: Array, headings: Array) -> None:
         if k == 1:
             headings[0] = unwrapped_before - (unwrapped - unwrapped_before) * middle_before / (middle - middle_before)
         headings[k + 1] = unwrapped + bend * (s[k + 1] - middle)
+
+
+@compiled
+def find_bends(headings: Array, s: Array, bends: Array) -> None:
+    """Computes the curvature of a path at each of its points, positive to the right [1/m].
+
+    These are differences of second order, at both ends of first order, as those of `np.gradient`.
+
+    Args:
+        headings: direction at each point (n,) [rad], n >= 2.
+        s: distance along the path of each point (n,) [m].
+        bends: (n,) the result.
+    """
+    last = len(s) - 1
+    bends[0] = (headings[1] - headings[0]) / (s[1] - s[0])
+    bends[last] = (headings[last] - headings[last - 1]) / (s[last] - s[last - 1])
+    for k in range(1, last):
+        before, after = s[k] - s[k - 1], s[k + 1] - s[k]
+        a, c = -after / (before * (before + after)), before / (after * (before + after))
+        b = (after - before) / (before * after)
+        bends[k] = a * headings[k - 1] + b * headings[k] + c * headings[k + 1]
 
 
 # --- Place of the ego on its path (compiled) --------------------------------------------------------------------------

@@ -33,3 +33,10 @@ def test_headings_of_a_path_are_those_of_the_c_library_on_every_processor(name: 
         for end, inner in ((0, 1), (-1, -2)):
             rate = (directions[inner] - directions[end]) / (middles[inner] - middles[end])
             assert path.headings[end] == pytest.approx(directions[end] + rate * (path.s[end] - middles[end]), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["brookside", "Town01"])
+def test_curvatures_of_a_path_are_gradients_of_its_headings(name: str) -> None:
+    for path in paths(name):
+        if len(set(np.diff(path.s).tolist())) > 1:  # NumPy has another formula for even spacing
+            assert path.curvatures.tolist() == np.gradient(path.headings, path.s).tolist()
