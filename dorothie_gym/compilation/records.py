@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 Float: TypeAlias = Annotated[float, "f8"]
 Int32: TypeAlias = Annotated[int, "i4"]
 Int64: TypeAlias = Annotated[int, "i8"]
+UInt64: TypeAlias = Annotated[int, "u8"]
 Flag: TypeAlias = Annotated[bool, "b1"]
 
 Record = TypeVar("Record")

@@ -106,11 +106,8 @@ def _compile_rare() -> None:
 
 def _call_what_follows_a_step(world: World) -> None:
     """Calls the functions that read a step of a world, while the second process compiles the step."""
-    arrays, poses = world.actors.arrays, np.zeros((2, world.actors.arrays.poses.shape[1]))
-    world.localizer.localize(poses, 0)
-    world.reports.close(poses, 1, stood=False)
     world.visibility.signal(1.0)
-    find_sides(arrays.path, 0, CAR_LENGTH, CAR_WIDTH)
+    find_sides(world.actors.arrays.path, 0, CAR_LENGTH, CAR_WIDTH)
 
 
 def _play(env: TownEnv | TownVectorEnv) -> None:

@@ -1,16 +1,23 @@
-"""Random numbers whose state lives in an array, the same in every process: Marsaglia's xorshift32 (2003)."""
+"""Random numbers whose state lies in records, the same in every process.
+
+- xorshift32 (Marsaglia, 2003) for the choices of traffic and pedestrians, one stream a body.
+- PCG64 (O'Neill, 2014) with the ziggurat of Marsaglia and Tsang (2000) for normal numbers: those of
+  `numpy.random.Generator.standard_normal`, from the state of a generator on.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba.np.random._constants import fi_double, ki_double, wi_double, ziggurat_nor_inv_r, ziggurat_nor_r
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled
 
 if TYPE_CHECKING:
-    from dorothie_gym.sim.state.records import RandomBody
+    from dorothie_gym.sim.state.records import RandomBody, RandomStream
 
 MASK = 0xFFFFFFFF
 
@@ -65,3 +72,80 @@ def seed_of(first: int, second: int, pool: NDArray[np.int64]) -> int:
 def _hashed(value: int, constant: int, factor: int) -> int:
     value = (int(value) ^ constant) * (constant * factor & MASK) & MASK
     return value ^ value >> 16
+
+
+# --- Normal numbers ---------------------------------------------------------------------------------------------------
+
+_MASK64 = 0xFFFFFFFFFFFFFFFF
+_HIGH, _LOW = 0x2360ED051FC65DA4, 0x4385DF649FCCF645
+"""PCG64's multiplier of 128 bits, by halves."""
+
+_LAYERS, _WIDTHS, _HEIGHTS = ki_double, wi_double, fi_double
+"""Tables of the ziggurat of 256 layers, NumPy's own: share of each layer under the curve, width and height."""
+
+_TAIL, _INVERSE_TAIL = float(ziggurat_nor_r), float(ziggurat_nor_inv_r)
+"""Where the tail begins, and one over that."""
+
+
+def begin_stream(stream: RandomStream, generator: np.random.Generator) -> None:
+    """Continues a generator's numbers from a record's stream.
+
+    Raises:
+        TypeError: the generator is not of the kind PCG64, as `numpy.random.default_rng` makes it.
+    """
+    if not isinstance(generator.bit_generator, np.random.PCG64):
+        raise TypeError(f"the generator must be of the kind PCG64, not {type(generator.bit_generator).__name__}")
+    numbers = generator.bit_generator.state["state"]
+    stream.state_high, stream.state_low = divmod(numbers["state"], 1 << 64)
+    stream.step_high, stream.step_low = divmod(numbers["inc"], 1 << 64)
+
+
+@compiled
+def _next_bits(stream: RandomStream) -> int:
+    """Returns 64 random bits, and advances a stream (PCG's XSL-RR).
+
+    Plain Python computes with masks, compiled code with integers that wrap; the bits are the same.
+    """
+    high, low = int(stream.state_high), int(stream.state_low)
+    upper, lower = (low >> 32) & MASK, low & MASK
+    first, second = lower * (_LOW & MASK), lower * (_LOW >> 32)
+    third, fourth = upper * (_LOW & MASK), upper * (_LOW >> 32)
+    carry = ((first >> 32) & MASK) + (second & MASK) + (third & MASK)
+    product = fourth + ((second >> 32) & MASK) + ((third >> 32) & MASK) + (carry >> 32)
+    high = (product + high * _LOW + low * _HIGH) & _MASK64
+    low = (low * _LOW) & _MASK64
+    step = int(stream.step_low)
+    total = (low + step) & _MASK64
+    overflow = (((low & step) | ((low | step) & ~total)) >> 63) & 1
+    high, low = (high + int(stream.step_high) + overflow) & _MASK64, total
+    stream.state_high, stream.state_low = high, low
+    turn, bits = (high >> 58) & 63, high ^ low
+    return ((bits >> turn) & (_MASK64 >> turn)) | ((bits << ((64 - turn) & 63)) & _MASK64)
+
+
+@compiled
+def _next_share(stream: RandomStream) -> float:
+    """Returns a number in [0, 1)."""
+    return float(((_next_bits(stream) >> 11) & 0x1FFFFFFFFFFFFF) * (1.0 / 9007199254740992.0))
+
+
+@compiled
+def draw_normal(stream: RandomStream) -> float:
+    """Returns a number of the standard normal distribution, and advances a stream."""
+    while True:
+        bits = _next_bits(stream)
+        layer, place = bits & 0xFF, (bits >> 9) & 0x000FFFFFFFFFFFFF
+        number = place * _WIDTHS[layer]
+        if (bits >> 8) & 1:
+            number = -number
+        if place < int(_LAYERS[layer]):
+            return float(number)
+        if layer == 0:
+            while True:
+                beyond = -_INVERSE_TAIL * math.log1p(-_next_share(stream))
+                height = -math.log1p(-_next_share(stream))
+                if height + height > beyond * beyond:
+                    return -(_TAIL + beyond) if (place >> 8) & 1 else _TAIL + beyond
+        height = (_HEIGHTS[layer - 1] - _HEIGHTS[layer]) * _next_share(stream) + _HEIGHTS[layer]
+        if height < math.exp(-0.5 * number * number):
+            return float(number)

@@ -14,6 +14,7 @@ from dorothie_gym.sim.collisions import collide
 from dorothie_gym.sim.ego.motion_control import guide
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
+from dorothie_gym.sim.sensing.localizer import localize
 from dorothie_gym.sim.state.codes import Kind, Wait
 from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.world_arrays import note_pose, trace
@@ -23,6 +24,7 @@ from dorothie_gym.sim.traffic.parameters import TRAFFIC_STANDING
 from dorothie_gym.sim.traffic.respawn import tow
 from dorothie_gym.sim.traffic.route import locate
 from dorothie_gym.sim.traffic.vehicle_models import move, slip_of
+from dorothie_gym.sim.traffic_rules import watch
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
 def step(
     town: TownArrays, world: WorldArrays, substeps: int, dt: float, acceleration: float = 0.0, steering: float = 0.0
 ) -> None:
-    """Steps a world.
+    """Steps a world; then localizes the ego that follows a path, if there is one, and watches over its driving.
 
     As on a highway-env road, all bodies decide on the state at the beginning of a substep, then all move.
 
@@ -46,8 +48,9 @@ def step(
         steering: angle of their front wheels, positive to the right [rad].
     """
     vehicles, slip = world.vehicles, slip_of(steering)
-    world.car[0].events = world.car[0].frames = 0
-    if len(vehicles) > 0 and vehicles[0].kind == Kind.DRIVEN:
+    driven = len(vehicles) > 0 and vehicles[0].kind == Kind.DRIVEN
+    world.car[0].events = world.car[0].breaches = world.car[0].frames = 0
+    if driven:
         note_pose(world, 0)
     for _ in range(substeps):
         for i in range(len(vehicles)):
@@ -57,8 +60,11 @@ def step(
         _move(town, world, dt, True)
         _meet(town, world, dt, True)
         world.clock[0].time = world.clock[0].frame * dt
-        if len(vehicles) > 0 and vehicles[0].kind == Kind.DRIVEN:
+        if driven:
             trace(world)
+    if driven:
+        localize(world, dt)
+        watch(town, world)
 
 
 # Each phase is compiled on its own: inlined into one function they would take the compiler twice as long.

@@ -18,16 +18,14 @@ from dorothie_gym.sim.ego.ego_controller import EgoController
 from dorothie_gym.sim.ego.obstacles import Hazard, PerceivedBody
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car, CarRecord
-from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind, WorldEventLog
+from dorothie_gym.sim.infractions import WorldEvent, WorldEventLog
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_car
 from dorothie_gym.sim.road import TownRoad
-from dorothie_gym.sim.sensing.localizer import Localizer
+from dorothie_gym.sim.sensing.localizer import Localizer, switch_on
 from dorothie_gym.sim.sensing.perception import BODY, Perception, look_around
 from dorothie_gym.sim.sensing.visibility import Visibility
-from dorothie_gym.sim.state.codes import EventCode
 from dorothie_gym.sim.state.records import (
-    EventRecord,
     EyeRecord,
     PedestrianRecord,
     PropRecord,
@@ -40,7 +38,6 @@ from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import FRAMES
-from dorothie_gym.sim.traffic_rules import HEIGHT
 from dorothie_gym.sim.weather import Weather, Wind
 
 FAULT_SECONDS = 30.0
@@ -122,15 +119,13 @@ class World(Lookups, Restorable):
         self.wind = Wind(np.random.default_rng(wind_seed))
         self._perception = Perception(np.random.default_rng(perceive_seed))
         self.actors.populate(vehicles=config.vehicles, pedestrians=config.pedestrians)
-        self.localizer = Localizer(
-            float(self.car.position[0]), float(self.car.position[1]), float(self.car.heading),
-            np.random.default_rng(locate_seed),
-        )  # fmt: skip
+        switch_on(self.actors.arrays, np.random.default_rng(locate_seed))
+        self.localizer = Localizer(self.actors)
         self.faults: dict[Sensor, int] = {}
         self.frame = 0
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
         self.offsets: Array = np.zeros(0)
-        self.reports = WorldEventLog(self.network, self.car.LENGTH)
+        self.reports = WorldEventLog(self.network, self.actors)
 
     # --- Copies -------------------------------------------------------------------------------------------------------
 
@@ -155,22 +150,16 @@ class World(Lookups, Restorable):
 
     def step(self, frames: int) -> list[WorldEvent]:
         """Runs the world for a number of physics frames; returns the events of the ego."""
-        if frames <= FRAMES:
-            trace, poses = self._run(frames)
-        else:
-            parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
-            trace = np.concatenate([part for part, _ in parts])
-            poses = np.concatenate([parts[0][1][:1], *(part[1:] for _, part in parts)])
+        parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
+        trace = parts[0] if len(parts) == 1 else np.concatenate(parts)
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
-        self.localizer.localize(poses, self.frame - frames, gps_from=self.faults.get(Sensor.GPS, 0))
         if self.faults:
             self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
         self.planner.props = self._props_seen()
-        stood = self.car.speed == 0.0 and poses[0, :HEIGHT].tolist() == poses[-1, :HEIGHT].tolist()
-        return self.reports.close(poses, self.frame, stood=stood)
+        return self.reports.take()
 
-    def _run(self, frames: int) -> tuple[Array, Array]:
-        """Steps all bodies by no more than `FRAMES` substeps; returns the ego's trace and poses, see `WorldArrays`."""
+    def _run(self, frames: int) -> Array:
+        """Steps all bodies by no more than `FRAMES` substeps; returns the ego's trace, see `WorldArrays`."""
         arrays, record = self.actors.arrays, self._record
         self.planner.extend(self.car.speed)
         self.ego.brief(arrays, record)
@@ -179,10 +168,10 @@ class World(Lookups, Restorable):
         self.ego.debrief(record)
         self.car.refresh()
         self.frame += frames
-        events, _ = record.outcome.item()
-        if events:
-            self._report(arrays.events[:events])
-        return arrays.trace[:frames].copy(), arrays.poses[: frames + 1].copy()
+        events, breaches, _ = record.outcome.item()
+        if events or breaches:
+            self.reports.note(events, breaches)
+        return arrays.trace[:frames].copy()
 
     @property
     def _record(self) -> CarRecord:
@@ -198,23 +187,6 @@ class World(Lookups, Restorable):
             wind = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
             self._record.air[()] = self.weather.friction, wind, self.wind.heading, tuple(self.wind.phases)
 
-    def _report(self, events: RecordArray[EventRecord]) -> None:
-        """Reports events of the compiled loops."""
-        for event in events:
-            frame, kind = int(event.frame), ObjectClass(int(event.kind))
-            if event.code == EventCode.HAZARD_STOP:
-                distance = round(float(event.value), 2)
-                self.reports.add(WorldEventKind.HAZARD_STOP, frame, reason=kind.label, distance=distance)
-            elif event.code == EventCode.HAZARD_END:
-                seconds = round(float(event.value) / FRAME_RATE, 2)
-                self.reports.add(WorldEventKind.HAZARD_END, frame, reason=kind.label, seconds=seconds)
-            else:
-                self.reports.infraction(
-                    WorldEventKind.COLLISION, frame, lane=int(event.lane), station=float(event.station),
-                    x=float(event.x), y=float(event.y), key=int(event.key), other=kind,
-                    own_fault=bool(event.own), speed=round(float(event.value), 2),
-                )  # fmt: skip
-
     @property
     def hazard(self) -> Hazard | None:
         """Cause of a hazard stop, or None."""
@@ -224,7 +196,7 @@ class World(Lookups, Restorable):
     @property
     def collisions(self) -> int:
         """Number of collisions by the ego's own fault."""
-        _, collisions = self._record.outcome.item()
+        *_, collisions = self._record.outcome.item()
         return int(collisions)
 
     def find_path(self) -> None:
@@ -291,4 +263,5 @@ class World(Lookups, Restorable):
             self.faults[sensor] = self.frame + round(FAULT_SECONDS * FRAME_RATE)
         else:
             del self.faults[sensor]
+        self.localizer.lose_gps(self.faults.get(Sensor.GPS, 0))
         return None

@@ -29,7 +29,7 @@ def drifted_env(shift: tuple[float, float, float] = (0.0, 0.0, 0.0), vehicles: i
     x, y, heading = (float(v) for v in (*world.car.position, world.car.heading))
     ahead, right, turn = shift
     c, s = math.cos(heading), math.sin(heading)
-    world.localizer._mean[:3] = x + ahead * c - right * s, y + ahead * s + right * c, heading + turn
+    world.actors.arrays.localizer[0].estimate[:3] = x + ahead * c - right * s, y + ahead * s + right * c, heading + turn
     return env
 
 
@@ -92,7 +92,7 @@ def test_waypoints_are_extended_straight_before_path_start() -> None:
     world = env.session.world
     start = world.planner.path.position_at(0.0)
     heading = world.planner.path.heading_at(0.0)
-    world.localizer._mean[:2] = start[0] - 20 * math.cos(heading), start[1] - 20 * math.sin(heading)
+    world.actors.arrays.localizer[0].estimate[:2] = start[0] - 20 * math.cos(heading), start[1] - 20 * math.sin(heading)
     bearings = EgoMeasurements(world)
     believed = np.zeros((3, 2))
     bearings.write_path(5.0, np.zeros((3, 2)), np.zeros(3, dtype=np.int64), believed)

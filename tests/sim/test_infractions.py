@@ -12,9 +12,6 @@ from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.infractions import (
     INFRACTION_KINDS,
-    Breach,
-    Infraction,
-    InfractionWatch,
     WorldEvent,
     WorldEventKind,
 )
@@ -23,6 +20,7 @@ from dorothie_gym.sim.world import World
 from tests.sim.crossings import across, crossing, lit_crossing, way_in, way_out
 from tests.sim.driving import ALONE, long_lane, network, run, world_at
 from tests.sim.forcing import TOO_LATE, blind, park, straight_street, swerve
+from tests.sim.state.trajectory_watch import TrajectoryWatch
 
 
 def world_in(town: Town, lane: int, station: float, config: WorldConfig = ALONE) -> World:
@@ -99,8 +97,8 @@ def way(
     )  # fmt: skip
 
 
-def watch_in(town: Town) -> InfractionWatch:
-    return InfractionWatch(TownNetwork(town), 5.0)
+def watch_in(town: Town) -> TrajectoryWatch:
+    return TrajectoryWatch(TownNetwork(town))
 
 
 def northwards(middle: float, count: int, step: float = 0.25) -> list[tuple[float, float]]:
@@ -108,8 +106,8 @@ def northwards(middle: float, count: int, step: float = 0.25) -> list[tuple[floa
     return [(2.0, middle - step * k) for k in range(count)]
 
 
-def kinds(found: list[Breach]) -> list[Infraction]:
-    return [breach.kind for breach in found]
+def kinds(found: list[WorldEvent]) -> list[WorldEventKind]:
+    return [event.kind for event in found]
 
 
 NORTH = -math.pi / 2
@@ -120,7 +118,7 @@ def test_light_counts_at_the_frame_at_which_the_front_passes() -> None:
     places = northwards(15.0, 4)  # the front passes the line at 12 m between the poses 2 and 3
     for frame, broken in ((0, False), (599, False), (680, False), (687, False), (689, True), (1400, True)):
         found = watch_in(town).look(way(places, NORTH), frame)
-        assert kinds(found) == ([Infraction.RED_LIGHT] if broken else []), frame
+        assert kinds(found) == ([WorldEventKind.RED_LIGHT] if broken else []), frame
         assert all(breach.frame == frame + 3 for breach in found)
 
 
@@ -129,9 +127,9 @@ def test_line_is_not_passed_in_a_u_turn_or_from_the_other_side() -> None:
     watch = watch_in(town)
     places = northwards(15.0, 8)
     assert watch.look(way(places, NORTH, turning=True), 0) == []
-    assert kinds(watch.look(way(places[::-1], -NORTH), 0)) == [Infraction.WRONG_WAY]
+    assert kinds(watch.look(way(places[::-1], -NORTH), 0)) == [WorldEventKind.WRONG_WAY]
     aside = [(x + 2.5, y) for x, y in places]  # on no lane that ends here
-    assert Infraction.RED_LIGHT not in kinds(watch.look(way(aside, NORTH), 0))
+    assert WorldEventKind.RED_LIGHT not in kinds(watch.look(way(aside, NORTH), 0))
 
 
 @pytest.mark.parametrize(("stands_at", "broken"), [(1.0, False), (3.0, False), (5.0, True), (None, True)])
@@ -146,7 +144,7 @@ def test_stand_too_far_before_the_line_does_not_count(stands_at: float | None, b
     # cut in two, as decisions cut it
     found = watch.look(way(places[:40], NORTH, speeds=speeds[:40]), 0)
     found += watch.look(way(places[39:], NORTH, speeds=speeds[39:]), 39)
-    assert kinds(found) == ([Infraction.STOP_SIGN] if broken else [])
+    assert kinds(found) == ([WorldEventKind.STOP_SIGN] if broken else [])
 
 
 def test_a_stand_counts_for_one_passage_only() -> None:
@@ -155,7 +153,7 @@ def test_a_stand_counts_for_one_passage_only() -> None:
     places = northwards(16.0, 12)
     speeds = [0.0] + [8.0] * 11
     assert watch.look(way(places, NORTH, speeds=speeds), 0) == []
-    assert kinds(watch.look(way(places, NORTH), 0)) == [Infraction.STOP_SIGN]
+    assert kinds(watch.look(way(places, NORTH), 0)) == [WorldEventKind.STOP_SIGN]
 
 
 # --- lanes --------------------------------------------------------------------------------------------------------
@@ -167,11 +165,11 @@ def test_road_ends_half_a_metre_outside_of_its_lanes(beside: float, off: bool) -
     assert town.lanes[way_in("s")].widths[0] == 4.0
     places = [(2.0 + beside, 60.0 - k) for k in range(20)]
     found = watch_in(town).look(way(places, NORTH), 0)
-    assert kinds(found) == ([Infraction.OFF_ROAD] if off else [])
+    assert kinds(found) == ([WorldEventKind.OFF_ROAD] if off else [])
     for breach in found:
-        assert breach.lane == way_in("s")
-        assert breach.station == pytest.approx(120.0 - 59.0)
-        assert breach.key is None
+        assert breach.data["lane"] == way_in("s")
+        assert breach.data["station"] == pytest.approx(120.0 - 59.0)
+        assert breach.data["key"] is None
 
 
 def test_leaving_the_road_is_reported_once_per_departure() -> None:
@@ -206,7 +204,7 @@ def test_across_the_road_is_not_against_the_traffic(degrees: int, against: bool)
     town = crossing()
     places = [(2.0, 60.0)] * 5
     found = watch_in(town).look(way(places, NORTH + math.radians(degrees)), 0)
-    assert kinds(found) == ([Infraction.WRONG_WAY] if against else [])
+    assert kinds(found) == ([WorldEventKind.WRONG_WAY] if against else [])
 
 
 def test_no_direction_is_wrong_in_a_junction() -> None:

@@ -10,47 +10,56 @@ import pytest
 
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array, SignalKind
-from dorothie_gym.sim.infractions import Infraction, InfractionWatch
+from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.traffic.parameters import FRAMES
 from tests.sim.crossings import crossing, way_in
 from tests.sim.driving import network
 from tests.sim.state.plain_rules import LENGTH, PlainWatch, lawless_way
+from tests.sim.state.trajectory_watch import TrajectoryWatch
 
 
-def compare(roads: TownNetwork, poses: Array, decision: int, frame: int = 0) -> Counter[Infraction]:
+def compare(roads: TownNetwork, poses: Array, decision: int, frame: int = 0) -> Counter[WorldEventKind]:
     """Breaches of a way that both watches agree on, cut into decisions."""
-    compiled, plain = InfractionWatch(roads, LENGTH), PlainWatch(roads)
-    count: Counter[Infraction] = Counter()
+    compiled, plain = TrajectoryWatch(roads), PlainWatch(roads)
+    count: Counter[WorldEventKind] = Counter()
     for k in range(0, len(poses) - 1, decision):
         stretch = poses[k : k + decision + 1]
         found, expected = compiled.look(stretch, frame + k), plain.look(stretch, frame + k)
-        assert [replace(b, station=0.0) for b in found] == [replace(b, station=0.0) for b in expected]
-        assert [b.station for b in found] == pytest.approx([b.station for b in expected], abs=1e-9)
-        count.update(breach.kind for breach in found)
+        assert [without_station(event) for event in found] == [without_station(event) for event in expected]
+        assert [event.data["station"] for event in found] == pytest.approx(
+            [event.data["station"] for event in expected], abs=0.0101
+        )
+        count.update(event.kind for event in found)
+    assert +Counter(compiled.infractions) == count
     return count
+
+
+def without_station(event: WorldEvent) -> WorldEvent:
+    return replace(event, data={**event.data, "station": None})
 
 
 @pytest.mark.parametrize("name", ["brookside", "northgate", "Town02", "Town05"])
 def test_breaches_equal_those_of_exhaustive_loops(name: str) -> None:
-    roads, count = network(name), Counter[Infraction]()
+    roads, count = network(name), Counter[WorldEventKind]()
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        count += compare(roads, lawless_way(roads, rng, 450), int(rng.integers(1, 40)), int(rng.integers(3000)))
-    assert count[Infraction.OFF_ROAD] > 0
-    assert count[Infraction.WRONG_WAY] > 0
+        count += compare(roads, lawless_way(roads, rng, 450), int(rng.integers(1, FRAMES + 1)), int(rng.integers(3000)))
+    assert count[WorldEventKind.OFF_ROAD] > 0
+    assert count[WorldEventKind.WRONG_WAY] > 0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["brookside", "midtown", "northgate", "Town02", "Town05"])
 def test_breaches_equal_those_of_exhaustive_loops_on_many_drives(name: str) -> None:
-    roads, count = network(name), Counter[Infraction]()
+    roads, count = network(name), Counter[WorldEventKind]()
     for seed in range(100, 160):
         rng = np.random.default_rng(seed)
-        count += compare(roads, lawless_way(roads, rng, 450), int(rng.integers(1, 40)), int(rng.integers(3000)))
+        count += compare(roads, lawless_way(roads, rng, 450), int(rng.integers(1, FRAMES + 1)), int(rng.integers(3000)))
     lines = {signal.kind for signal in PlainWatch(roads).signals.values()}
-    assert count[Infraction.OFF_ROAD] > 10
-    assert count[Infraction.WRONG_WAY] > 10
-    assert count[Infraction.RED_LIGHT] > 0 or SignalKind.TRAFFIC_LIGHT not in lines
+    assert count[WorldEventKind.OFF_ROAD] > 10
+    assert count[WorldEventKind.WRONG_WAY] > 10
+    assert count[WorldEventKind.RED_LIGHT] > 0 or SignalKind.TRAFFIC_LIGHT not in lines
 
 
 def passages(rng: np.random.Generator, count: int) -> Array:
@@ -67,10 +76,10 @@ def passages(rng: np.random.Generator, count: int) -> Array:
 
 
 def test_stands_at_stop_signs_equal_those_of_exhaustive_loops() -> None:
-    roads, count = TownNetwork(crossing({"s": SignalKind.STOP})), Counter[Infraction]()
+    roads, count = TownNetwork(crossing({"s": SignalKind.STOP})), Counter[WorldEventKind]()
     for seed in range(8):
-        count += compare(roads, passages(np.random.default_rng(seed), 10), 1 + 3 * seed)
-    assert 20 < count[Infraction.STOP_SIGN] < 60
+        count += compare(roads, passages(np.random.default_rng(seed), 10), 1 + 2 * seed)
+    assert 20 < count[WorldEventKind.STOP_SIGN] < 60
 
 
 def test_lanes_too_wide_for_the_cells_are_searched_one_by_one() -> None:
@@ -80,5 +89,5 @@ def test_lanes_too_wide_for_the_cells_are_searched_one_by_one() -> None:
     roads = TownNetwork(Town(name="wide", lanes=lanes, links=town.links, junctions=town.junctions))
     poses = np.zeros((20, 6))
     poses[:, 0], poses[:, 1], poses[:, 2] = 2.0 + np.linspace(6.5, 8.3, 20), 60.0, -np.pi / 2
-    assert compare(roads, poses, 5) == {Infraction.OFF_ROAD: 1}
+    assert compare(roads, poses, 5) == {WorldEventKind.OFF_ROAD: 1}
     assert compare(roads, poses[:10], 5) == {}

@@ -117,7 +117,7 @@ class CarRecord:
         pedals: throttle, steer and brake of an outside driver.
         place: s, offset and roadblock: its place on the path, and the distance of a roadblock.
         hazard: hazard and hazard_gap: the cause of a hazard stop.
-        outcome: numbers of events and collisions.
+        outcome: numbers of events, breaches of rules and collisions.
         air: friction, wind, wind_heading and wind_phase: effects of the weather.
     """
 
@@ -127,5 +127,5 @@ class CarRecord:
         self.pedals = fields(arrays.car, "throttle", "steer", "brake")
         self.place = fields(arrays.car, "s", "offset", "roadblock")
         self.hazard = fields(arrays.car, "hazard", "hazard_gap")
-        self.outcome = fields(arrays.car, "events", "collisions")
+        self.outcome = fields(arrays.car, "events", "breaches", "collisions")
         self.air = fields(arrays.car, "friction", "wind", "wind_heading", "wind_phase")

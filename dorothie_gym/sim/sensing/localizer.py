@@ -9,12 +9,20 @@ differently, which would change recorded sessions.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled
+from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.randomness import begin_stream, draw_normal
+from dorothie_gym.sim.state.record_views import ArrayHolder
+from dorothie_gym.sim.state.records import LOCALIZER_STATES, ODOMETRY_DRAWS, plain
+from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 SCALE_SIGMA = 0.02
 """Relative error of the odometer, constant for a car (tyre wear, pressure)."""
@@ -37,36 +45,30 @@ GYRO_NOISE = math.radians(0.05)
 STANDS = 1e-3
 """Movement per frame below which the car stands and cannot turn [m]."""
 
-ODOMETRY_DRAWS = 4
-"""Normal random numbers per frame: for the bias, the gyro, the slip and the skid."""
-
-STATES = 5
-"""x, y [m], heading [rad], scale of the odometer, bias of the gyro [rad/s]."""
-
 
 @compiled
-def measure(track: Array, draws: Array, k: int, dt: float, truth: Array) -> tuple[float, float, float]:
+def measure(track: Array, k: int, draws: Array, dt: float, truth: Array) -> tuple[float, float, float]:
     """Returns the measurements of a frame.
 
     Args:
         track: true poses, x, y, heading and whatever else, of successive frames (n + 1, 3 or more) [m, m, rad].
-        draws: normal numbers (n, DRAWS or more).
         k: number of the frame: from pose k to k + 1.
+        draws: normal numbers (ODOMETRY_DRAWS or more,).
         dt: time of a frame [s].
         truth: (2,) true scale of the odometer and true bias of the gyro [rad/s], whose random walk is continued.
 
     Returns:
         Way ahead and to the right [m] and turn [rad]; all of them 0 if the car stands.
     """
-    truth[1] += BIAS_WALK * math.sqrt(dt) * draws[k, 0]
+    truth[1] += BIAS_WALK * math.sqrt(dt) * draws[0]
     dx, dy = track[k + 1, 0] - track[k, 0], track[k + 1, 1] - track[k, 1]
     way = math.sqrt(dx * dx + dy * dy)
     if way <= STANDS:
         return 0.0, 0.0, 0.0
     c, s, root = math.cos(track[k, 2]), math.sin(track[k, 2]), math.sqrt(way)
-    ahead = (dx * c + dy * s) * truth[0] + SLIP * root * draws[k, 2]
-    right = (dy * c - dx * s) * truth[0] + SKID * root * draws[k, 3]
-    turn = track[k + 1, 2] - track[k, 2] + truth[1] * dt + GYRO_NOISE * math.sqrt(dt) * draws[k, 1]
+    ahead = (dx * c + dy * s) * truth[0] + SLIP * root * draws[2]
+    right = (dy * c - dx * s) * truth[0] + SKID * root * draws[3]
+    turn = track[k + 1, 2] - track[k, 2] + truth[1] * dt + GYRO_NOISE * math.sqrt(dt) * draws[1]
     return ahead, right, turn
 
 
@@ -78,7 +80,7 @@ def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: flo
     diagonal are not 0, so that it is applied row by row, then column by column.
 
     Args:
-        mean: (5,) see `STATES`; written.
+        mean: (5,) see `records.LOCALIZER_STATES`; written.
         covariance: (5, 5) of it; written.
         ahead: way ahead [m]; `right` to the right of that.
         right: [m].
@@ -93,11 +95,11 @@ def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: flo
     ahead, right = ahead / scale, right / scale
     c, s = math.cos(mean[2]), math.sin(mean[2])
     dx, dy = ahead * c - right * s, ahead * s + right * c
-    for j in range(STATES):
+    for j in range(LOCALIZER_STATES):
         p[0, j] -= dy * p[2, j] + dx / scale * p[3, j]
         p[1, j] += dx * p[2, j] - dy / scale * p[3, j]
         p[2, j] -= dt * p[4, j]
-    for i in range(STATES):
+    for i in range(LOCALIZER_STATES):
         p[i, 0] -= dy * p[i, 2] + dx / scale * p[i, 3]
         p[i, 1] += dx * p[i, 2] - dy / scale * p[i, 3]
         p[i, 2] -= dt * p[i, 4]
@@ -107,7 +109,7 @@ def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: flo
     p[1, 1] += slip * s * s + skid * c * c
     p[0, 1] += (slip - skid) * c * s
     p[2, 2] += GYRO_NOISE * GYRO_NOISE * dt
-    for i in range(1, STATES):  # keeps the matrix symmetric in spite of rounding
+    for i in range(1, LOCALIZER_STATES):  # keeps the matrix symmetric in spite of rounding
         for j in range(i):
             p[i, j] = p[j, i]
     mean[0] += dx
@@ -127,64 +129,77 @@ DEPARTURE_SIGMAS = (0.1, 0.1, 0.01)
 """Standard deviations of the place of departure [m, m, rad]."""
 
 
-class Localizer:
-    """Estimator of the ego's pose from its sensors, whose errors are drawn here by the seed."""
+class Localizer(Lookups):
+    """Estimator of the ego's pose from its sensors: a view on the record of its world."""
 
-    def __init__(self, x: float, y: float, heading: float, rng: np.random.Generator) -> None:
-        self._mean = np.array([x, y, heading, 1.0, 0.0])
-        self._covariance = np.diag(np.square([*DEPARTURE_SIGMAS, SCALE_SIGMA, BIAS_SIGMA]))
-        self._rng = rng
-        scale, bias = rng.standard_normal(2)
-        self._truth = np.array([1.0 + SCALE_SIGMA * scale, BIAS_SIGMA * bias])
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_record_of", "_own_record")
+
+    _record_of: WorldArrays | None = None
+
+    def __init__(self, holder: ArrayHolder) -> None:
+        """Shows the estimate in `holder.arrays`, which may be replaced by others with more room."""
+        self._holder = holder
+
+    @property
+    def _record(self) -> NDArray[np.void]:
+        arrays: WorldArrays = self._holder.arrays
+        if arrays is not self._record_of:
+            self._record_of, self._own_record = arrays, plain(arrays.localizer)
+        return self._own_record
 
     @property
     def pose(self) -> Array:
         """Estimate (x, y, heading) [m, m, rad]."""
-        return self._mean[:3].copy()
+        pose: Array = self._record["estimate"][0, :3].copy()
+        return pose
 
     @property
     def covariance(self) -> Array:
         """Covariance (3, 3) of the estimate."""
-        return self._covariance[:3, :3].copy()
+        covariance: Array = self._record["covariance"][0, :3, :3].copy()
+        return covariance
 
-    def localize(self, track: Array, frame: int, *, gps_from: int = 0) -> None:
-        """Updates the estimate with the odometry of each frame and a GPS fix every `FIX_EVERY` frames, errors added.
+    def lose_gps(self, until: int) -> None:
+        """Leaves the localizer without GPS before a frame."""
+        self._record["gps_from"] = until
 
-        The estimate does not depend on the number of frames per call: each frame draws the same numbers.
 
-        Args:
-            track: true poses of successive frames, the first of them that of the previous call: x, y, heading, and
-                further columns, which are ignored (n + 1, 3 or more) [m, m, rad].
-            frame: number of the first pose's frame.
-            gps_from: there is no GPS before this frame.
-        """
-        draws = self._rng.standard_normal((len(track) - 1, ODOMETRY_DRAWS + 2))
-        follow(track, draws, frame, gps_from, 1.0 / FRAME_RATE, self._mean, self._covariance, self._truth)
+def switch_on(world: WorldArrays, rng: np.random.Generator) -> None:
+    """Begins to localize the ego of a world, where it is now.
+
+    Args:
+        world: arrays of the world.
+        rng: source of the errors of its sensors, which continue the generator's numbers.
+    """
+    record, car = world.localizer[0], world.vehicles[0]
+    scale, bias = rng.standard_normal(2)
+    record.estimate[:] = car.x, car.y, car.heading, 1.0, 0.0
+    record.covariance[:] = np.diag(np.square([*DEPARTURE_SIGMAS, SCALE_SIGMA, BIAS_SIGMA]))
+    record.truth[:] = 1.0 + SCALE_SIGMA * scale, BIAS_SIGMA * bias
+    begin_stream(record, rng)
 
 
 @compiled
-def follow(
-    track: Array, draws: Array, frame: int, gps_from: int, dt: float, mean: Array, covariance: Array, truth: Array
-) -> None:
-    """As `Localizer.localize`.
+def localize(world: WorldArrays, dt: float) -> None:
+    """Updates the estimate with the odometry of each frame and a GPS fix every `FIX_EVERY` frames, errors added.
+
+    The estimate does not depend on the number of frames per call: each frame draws the same numbers.
 
     Args:
-        track: true poses (n + 1, 3 or more).
-        draws: normal numbers (n, DRAWS + 2): those of odometry, and of a fix.
-        frame: number of the first pose's frame.
-        gps_from: there is no GPS before this frame.
+        world: arrays of a world after a call of `sim.step.step`, with the poses of the ego in it.
         dt: time of a frame [s].
-        mean: (5,) estimate; written.
-        covariance: (5, 5) of it; written.
-        truth: (2,) true scale of the odometer and true bias of the gyro [rad/s]; written.
     """
-    for k in range(len(draws)):
-        ahead, right, turn = measure(track, draws, k, dt, truth)
-        reckon(mean, covariance, ahead, right, turn, dt)
-        now = frame + k + 1
-        if now % FIX_EVERY == 0 and now >= gps_from:
+    record, track, frames = world.localizer[0], world.poses, int(world.car[0].frames)
+    for k in range(frames):
+        for n in range(ODOMETRY_DRAWS + 2):
+            record.draws[n] = draw_normal(record)
+        ahead, right, turn = measure(track, k, record.draws, dt, record.truth)
+        reckon(record.estimate, record.covariance, ahead, right, turn, dt)
+        now = world.clock[0].frame - frames + k + 1
+        if now % FIX_EVERY == 0 and now >= record.gps_from:
             for axis in range(2):
-                correct(mean, covariance, axis, track[k + 1, axis] + GPS_SIGMA * draws[k, ODOMETRY_DRAWS + axis])
+                fix = track[k + 1, axis] + GPS_SIGMA * record.draws[ODOMETRY_DRAWS + axis]
+                correct(record.estimate, record.covariance, axis, fix)
 
 
 @compiled
@@ -201,14 +216,14 @@ def correct(mean: Array, covariance: Array, axis: int, fix: float) -> None:
     """
     p = covariance
     off, spread = fix - mean[axis], p[axis, axis] + GPS_SIGMA * GPS_SIGMA
-    for i in range(STATES):
+    for i in range(LOCALIZER_STATES):
         mean[i] += p[i, axis] / spread * off
-    for i in range(STATES):
-        for j in range(STATES):
+    for i in range(LOCALIZER_STATES):
+        for j in range(LOCALIZER_STATES):
             if i != axis and j != axis:
                 p[i, j] -= p[i, axis] * p[axis, j] / spread
     left = GPS_SIGMA * GPS_SIGMA / spread
-    for i in range(STATES):
+    for i in range(LOCALIZER_STATES):
         if i != axis:
             p[i, axis] *= left
             p[axis, i] = p[i, axis]

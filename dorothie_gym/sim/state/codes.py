@@ -115,3 +115,17 @@ class EventCode(enum.IntEnum):
     HAZARD_STOP = 1
     HAZARD_END = 2
     COLLISION = 3
+
+
+class Breach(enum.IntEnum):
+    """Kind of a breach of the rules by the ego."""
+
+    COLLISION = 0
+    RED_LIGHT = 1
+    STOP_SIGN = 2
+    OFF_ROAD = 3
+    WRONG_WAY = 4
+
+
+COLLISION, RED_LIGHT, STOP_SIGN, OFF_ROAD, WRONG_WAY = (int(kind) for kind in Breach)
+"""Kinds of breaches, as plain numbers."""

@@ -12,11 +12,13 @@ from dorothie_gym.compilation.records import Float as Float
 from dorothie_gym.compilation.records import Int32 as Int32
 from dorothie_gym.compilation.records import Int64 as Int64
 from dorothie_gym.compilation.records import RecordArray as RecordArray
+from dorothie_gym.compilation.records import UInt64 as UInt64
 from dorothie_gym.compilation.records import empty_records as empty_records
 from dorothie_gym.compilation.records import fields as fields
 from dorothie_gym.compilation.records import filled_records as filled_records
 from dorothie_gym.compilation.records import plain as plain
 from dorothie_gym.compilation.records import record_dtype as record_dtype
+from dorothie_gym.sim.state.codes import Breach
 from dorothie_gym.sim.traffic.parameters import CLOSED, GOALS, PLANNED
 
 
@@ -24,6 +26,15 @@ class RandomBody(Protocol):
     """A record with the state of its own random numbers."""
 
     random: int
+
+
+class RandomStream(Protocol):
+    """A record with a stream of random numbers, PCG64: state and increment of 128 bits, by halves."""
+
+    state_high: int
+    state_low: int
+    step_high: int
+    step_low: int
 
 
 class PlacedBody(Protocol):
@@ -361,7 +372,8 @@ class EgoRecord:
     stopped_until: Int64  # frame up to which it stands after a collision, and length of such stands [frames]
     collision_stop: Int64
     collisions: Int64  # number of collisions by its own fault
-    events: Int32  # rows of `events` and `trace` in use
+    events: Int32  # rows of `events`, `breaches` and `trace` in use
+    breaches: Int32
     frames: Int32
 
 
@@ -444,6 +456,27 @@ class EyeRecord:
     clear: Flag  # whether all within `visibility.CLEAR_SIGHT` is seen without errors
 
 
+ODOMETRY_DRAWS = 4
+"""Normal random numbers that a frame of odometry takes: for the bias, the gyro, the slip and the skid."""
+
+LOCALIZER_STATES = 5
+"""States of the localizer: x, y [m], heading [rad], scale of the odometer, bias of the gyro [rad/s]."""
+
+
+class LocalizerRecord:
+    """Pose estimate of the ego, and the errors of its sensors: the true ones, and the stream of further ones."""
+
+    estimate: Annotated[NDArray[np.float64], "f8", (LOCALIZER_STATES,)]
+    covariance: Annotated[NDArray[np.float64], "f8", (LOCALIZER_STATES, LOCALIZER_STATES)]
+    truth: Annotated[NDArray[np.float64], "f8", (2,)]  # true scale of the odometer and bias of the gyro [rad/s]
+    draws: Annotated[NDArray[np.float64], "f8", (ODOMETRY_DRAWS + 2,)]  # of the last frame: odometry, and a fix
+    state_high: UInt64  # `RandomStream`
+    state_low: UInt64
+    step_high: UInt64
+    step_low: UInt64
+    gps_from: Int64  # frame before which there is no GPS
+
+
 # --- Rules ------------------------------------------------------------------------------------------------------------
 
 
@@ -456,20 +489,33 @@ class StopLineRecord:
     sin: Float
     half_width: Float
     height: Float
+    lane: Int32
+    signal: Int32  # id of the light or sign
     is_stop: Flag
 
 
 class LineMarkRecord:
-    """State of a line for one vehicle: whether it has stood there; `near` is a scratch list of the lines nearby."""
+    """State of a line for the ego: whether it has stood there; `near` is a scratch list of the lines nearby."""
 
     near: Int32
     stood: Flag
 
 
-class FindingRecord:
-    """A breach of a rule: pose, `traffic_rules.FindingKind`, number of line or lane, and station on a lane [m]."""
+class WatchRecord:
+    """Watch over the rules: breaches so far by `codes.Breach`, and the last frame of those that go on for a while."""
 
-    station: Float
-    pose: Int32
-    kind: Int32
-    number: Int32
+    counts: Annotated[NDArray[np.int64], "i8", (len(Breach),)]
+    last: Annotated[NDArray[np.int64], "i8", (len(Breach),)]
+
+
+class BreachRecord:
+    """A breach of a rule by the ego, other than collisions."""
+
+    frame: Int64
+    x: Float  # of the car's middle [m]
+    y: Float
+    height: Float
+    station: Float  # along the lane [m]
+    kind: Int32  # `codes.Breach`
+    lane: Int32  # lane that was left over its end, or the nearest one, -1 for none nearby
+    signal: Int32  # id of the light or sign, -1 where there is none

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
-from dorothie_gym.maps.polyline import LaneTable
+from dorothie_gym.maps.polyline import WIDTH, LaneTable
 from dorothie_gym.maps.right_of_way import RightOfWay, right_of_way
 from dorothie_gym.maps.town import Town
+from dorothie_gym.sim.network.grid import CELL_REACH, SLACK
 from dorothie_gym.sim.network.lane_lookup import build_cells
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.walkways import build_walkways
@@ -29,6 +30,7 @@ from dorothie_gym.sim.state.records import (
     ProgrammeRecord,
     RecordArray,
     SiblingRecord,
+    StopLineRecord,
     WalkwayRecord,
     empty_records,
     filled_records,
@@ -43,6 +45,12 @@ CAR_REAR = CAR_LENGTH / 2
 
 LEVEL_TOWN = 2.0
 """In a town whose lanes are no further apart in height than this, heights decide nothing [m]."""
+
+OFF_ROAD_MARGIN = 0.5
+"""Distance of the car's middle outside of all lanes, connectors included, from which on it is off the road [m]."""
+
+WIDE_LANE = 2.0 * (CELL_REACH - 2.0 * OFF_ROAD_MARGIN - SLACK)
+"""Width up to which cells list all lanes that a place is within `OFF_ROAD_MARGIN` of [m]."""
 
 _CONTROLS = {
     None: TrafficControl.NONE, SignalKind.TRAFFIC_LIGHT: TrafficControl.LIGHT,
@@ -75,7 +83,9 @@ class TownArrays(NamedTuple):
         crossings: crosswalks.
         passages: passages of lanes over crosswalks, those of a lane in the order of their stations.
         junctions: (j, 3) middle [m] of each junction's connectors, and the radius in which they lie [m].
+        lines: ends of lanes with a light or stop sign, in the order of the lanes.
         flat: whether all lanes are so level that heights do not matter.
+        wide: whether some lane is wider than `WIDE_LANE`.
     """
 
     points: Array
@@ -95,7 +105,9 @@ class TownArrays(NamedTuple):
     crossings: RecordArray[CrossingRecord]
     passages: RecordArray[PassageRecord]
     junctions: Array
+    lines: RecordArray[StopLineRecord]
     flat: bool
+    wide: bool
 
     @property
     def nbytes(self) -> int:
@@ -134,7 +146,9 @@ def empty_town() -> TownArrays:
         crossings=empty_records(CrossingRecord, 0),
         passages=empty_records(PassageRecord, 0),
         junctions=np.zeros((0, 3)),
+        lines=empty_records(StopLineRecord, 0),
         flat=True,
+        wide=False,
     )
 
 
@@ -157,7 +171,7 @@ def _build(network: TownNetwork) -> TownArrays:
         network.table.points, lanes, neighbours, relations, siblings, programmes, phase_ends, colours,
         cells.origin, cells.bounds, cells.entries,
         walkways.points, walkways.walks, walkways.mouths, walkways.crossings, walkways.passages, _mouths(town, lanes),
-        bool(high - low < LEVEL_TOWN),
+        _lines(town), bool(high - low < LEVEL_TOWN), bool(network.table.points[:, WIDTH].max() > WIDE_LANE),
     )  # fmt: skip
 
 
@@ -247,6 +261,26 @@ def _mouths(town: Town, lanes: RecordArray[LaneRecord]) -> Array:
             middle = (every.min(axis=0) + every.max(axis=0)) / 2
             found[number] = *middle, float(np.sqrt(((every - middle) ** 2).sum(axis=1)).max())
     return found
+
+
+def _lines(town: Town) -> RecordArray[StopLineRecord]:
+    rules = right_of_way(town)
+    found = {
+        lane: signal
+        for signal in town.signals
+        if signal.kind in (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP)
+        for lane in signal.lanes
+        if rules.control(lane) is signal.kind
+    }
+    records = empty_records(StopLineRecord, len(found))
+    for record, lane in zip(records, sorted(found), strict=True):
+        end, heading = town.lanes[lane].points[-1], float(town.lanes[lane].headings[-1])
+        record.x, record.y, record.height = end
+        record.cos, record.sin = math.cos(heading), math.sin(heading)
+        record.half_width = float(town.lanes[lane].widths[-1]) / 2
+        record.lane, record.signal = lane, found[lane].id
+        record.is_stop = found[lane].kind is SignalKind.STOP
+    return records
 
 
 def _exit(town: Town, connector: int) -> int:

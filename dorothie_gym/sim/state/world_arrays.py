@@ -16,11 +16,14 @@ from dorothie_gym.sim.state.codes import NOBODY, U_TURN
 from dorothie_gym.sim.state.records import (
     POSE,
     TRACE,
+    BreachRecord,
     ClockRecord,
     EgoRecord,
     EventRecord,
     EyeRecord,
     LampRecord,
+    LineMarkRecord,
+    LocalizerRecord,
     NodeRecord,
     PathPointRecord,
     PedestrianRecord,
@@ -28,6 +31,7 @@ from dorothie_gym.sim.state.records import (
     RecordArray,
     SeenRecord,
     VehicleRecord,
+    WatchRecord,
     empty_records,
     record_dtype,
 )
@@ -43,6 +47,12 @@ CAR_KEY = 0
 
 STACK = 32
 """Size of the stack of searches along lanes."""
+
+LONG_AGO = -(1 << 40)
+"""A frame before all others."""
+
+BREACHES = FRAMES + 2
+"""Most breaches in one call of `step`: a line each frame, and the road and the direction left once."""
 
 
 @by_reference
@@ -69,6 +79,10 @@ class WorldArrays(NamedTuple):
         trace: (f, 10) its trajectory in the last call of `step`, see `records.TRACE`.
         poses: (f + 1, 6) its poses before that call and after each of its substeps, see `records.POSE`.
         events: its events in that call.
+        localizer: (1,) its pose estimate.
+        watch: (1,) numbers of its breaches of the rules.
+        marks: its stands at the lines of the town.
+        breaches: its breaches in the last call of `step`, collisions left out.
     """
 
     vehicles: RecordArray[VehicleRecord]
@@ -90,6 +104,10 @@ class WorldArrays(NamedTuple):
     trace: Array
     poses: Array
     events: RecordArray[EventRecord]
+    localizer: RecordArray[LocalizerRecord]
+    watch: RecordArray[WatchRecord]
+    marks: RecordArray[LineMarkRecord]
+    breaches: RecordArray[BreachRecord]
 
     @property
     def nbytes(self) -> int:
@@ -132,7 +150,7 @@ _DTYPES = [
     *map(record_dtype, (VehicleRecord, PedestrianRecord, PropRecord, NodeRecord)), *map(np.dtype, "iid"),
     record_dtype(LampRecord), *map(np.dtype, "iid"),
     *map(record_dtype, (ClockRecord, EgoRecord, PathPointRecord, EyeRecord, SeenRecord)), *map(np.dtype, "dd"),
-    record_dtype(EventRecord),
+    *map(record_dtype, (EventRecord, LocalizerRecord, WatchRecord, LineMarkRecord, BreachRecord)),
 ]  # fmt: skip
 """Types of the arrays of a world, in order."""
 
@@ -188,11 +206,17 @@ def empty_world(
         trace=np.zeros((FRAMES if driven else 1, len(TRACE))),
         poses=np.zeros((1 + FRAMES if driven else 1, len(POSE))),
         events=empty_records(EventRecord, EVENTS if driven else 1),
+        localizer=empty_records(LocalizerRecord, 1),
+        watch=empty_records(WatchRecord, 1),
+        marks=empty_records(LineMarkRecord, len(town.lines) if driven else 1),
+        breaches=empty_records(BreachRecord, BREACHES if driven else 1),
     )
     world.car["closed"] = NOBODY
     world.car["closed_at"] = -math.inf
     world.car["lateral_last"] = world.car["stop_at"] = world.car["roadblock"] = world.car["action_end"] = math.inf
     world.car["hold_speed"] = -1.0
+    world.localizer["estimate"][:, 3] = 1.0
+    world.watch["last"] = LONG_AGO
     world.nodes["lane"] = world.nodes["next"] = world.nodes["before"] = NOBODY
     world.lamps["until"] = -math.inf
     world.props["lane"] = NOBODY

@@ -19,13 +19,13 @@ from dorothie_gym.sim.sensing.localizer import (
     FIX_EVERY,
     GPS_SIGMA,
     GYRO_NOISE,
-    ODOMETRY_DRAWS,
     SCALE_SIGMA,
     SKID,
     SLIP,
-    Localizer,
     measure,
 )
+from dorothie_gym.sim.state.records import ODOMETRY_DRAWS
+from tests.sim.sensing.odometer import CarriedLocalizer
 
 RUNS = 400
 SPEED = 30 / 3.6
@@ -78,13 +78,13 @@ def drives() -> tuple[tuple[Moment, ...], ...]:
 
 def one_drive(seed: int) -> tuple[Moment, ...]:
     track = drive(WARM + FAULT + AFTER, np.random.default_rng([seed, 1]))
-    localizer = Localizer(*track[0], np.random.default_rng([seed, 2]))
+    localizer = CarriedLocalizer(*track[0], np.random.default_rng([seed, 2]))
     moments = []
     works_again = round((WARM + FAULT) * FRAME_RATE) + 1
     for k in range(FIX_EVERY, len(track), FIX_EVERY):
         time = k * DT
         off = WARM < time <= WARM + FAULT
-        localizer.localize(track[k - FIX_EVERY : k + 1], k - FIX_EVERY, gps_from=works_again if off else 0)
+        localizer.carry(track[k - FIX_EVERY : k + 1], k - FIX_EVERY, gps_from=works_again if off else 0)
         moments.append(Moment(time, localizer.pose - track[k], localizer.covariance))
     return tuple(moments)
 
@@ -129,10 +129,10 @@ def test_gps_brings_the_estimate_back_within_five_seconds() -> None:
 
 
 def test_a_standing_car_does_not_drift() -> None:
-    localizer = Localizer(3.0, 4.0, 0.5, np.random.default_rng(0))
+    localizer = CarriedLocalizer(3.0, 4.0, 0.5, np.random.default_rng(0))
     before = localizer.pose
     for k in range(60):
-        localizer.localize(np.tile([3.0, 4.0, 0.5], (16, 1)), 15 * k, gps_from=10_000)
+        localizer.carry(np.tile([3.0, 4.0, 0.5], (16, 1)), 15 * k, gps_from=10_000)
     np.testing.assert_array_equal(localizer.pose, before)
 
 
@@ -140,9 +140,9 @@ def test_frames_may_be_bundled_in_any_way() -> None:
     track = drive(20.0, np.random.default_rng(4))
     found = []
     for bundle in (1, 7, 15, 60):
-        localizer = Localizer(*track[0], np.random.default_rng(9))
+        localizer = CarriedLocalizer(*track[0], np.random.default_rng(9))
         for k in range(0, len(track) - 1, bundle):
-            localizer.localize(track[k : k + bundle + 1], k, gps_from=200)
+            localizer.carry(track[k : k + bundle + 1], k, gps_from=200)
         found.append((localizer.pose.tobytes(), localizer.covariance.tobytes()))
     assert found == found[:1] * 4
 
@@ -150,28 +150,17 @@ def test_frames_may_be_bundled_in_any_way() -> None:
 def test_fixes_come_twice_a_second_and_not_before_gps_works() -> None:
     track, seen = drive(4.0, np.random.default_rng(4)), []
     for gps_from in (0, 61, 10_000):
-        localizer = Localizer(*track[0], np.random.default_rng(9))
+        localizer = CarriedLocalizer(*track[0], np.random.default_rng(9))
         spreads = []
         for k in range(len(track) - 1):
-            localizer.localize(track[k : k + 2], k, gps_from=gps_from)
+            localizer.carry(track[k : k + 2], k, gps_from=gps_from)
             spreads.append(float(np.trace(localizer.covariance[:2, :2])))
         seen.append([k + 2 for k in range(len(spreads) - 1) if spreads[k + 1] < spreads[k]])
     assert seen == [[15, 30, 45, 60, 75, 90, 105, 120], [75, 90, 105, 120], []]
 
 
-def test_other_columns_of_the_track_do_not_matter() -> None:
-    track = drive(10.0, np.random.default_rng(4))
-    wide = np.column_stack((track, np.random.default_rng(0).standard_normal((len(track), 3))))
-    poses = []
-    for way in (track, wide):
-        localizer = Localizer(*track[0], np.random.default_rng(9))
-        localizer.localize(way, 0)
-        poses.append(localizer.pose)
-    np.testing.assert_array_equal(*poses)
-
-
 def test_estimates_are_copies() -> None:
-    localizer = Localizer(3.0, 4.0, 0.5, np.random.default_rng(0))
+    localizer = CarriedLocalizer(3.0, 4.0, 0.5, np.random.default_rng(0))
     localizer.pose[0], localizer.covariance[0, 0] = 99.0, 99.0
     np.testing.assert_array_equal(localizer.pose, [3.0, 4.0, 0.5])
     assert localizer.covariance[0, 0] < 1.0
@@ -212,16 +201,16 @@ def test_estimates_are_those_of_filterpy() -> None:
     track = drive(300.0, np.random.default_rng(11))
     track[3000:3600] = track[3000]  # stands for 20 s
     track[3600:, :] += track[3000] - track[3600]
-    localizer, numbers = Localizer(*track[0], np.random.default_rng(5)), np.random.default_rng(5)
+    localizer, numbers = CarriedLocalizer(*track[0], np.random.default_rng(5)), np.random.default_rng(5)
     reference = Reference(track[0])
     scale, bias = numbers.standard_normal(2)
     truth = np.array([1.0 + SCALE_SIGMA * scale, BIAS_SIGMA * bias])
     draws = numbers.standard_normal((len(track) - 1, ODOMETRY_DRAWS + 2))
     for k in range(0, len(track) - 1, FIX_EVERY):
         gps_from = 5400 if 4500 <= k < 5400 else 0
-        localizer.localize(track[k : k + FIX_EVERY + 1], k, gps_from=gps_from)
+        localizer.carry(track[k : k + FIX_EVERY + 1], k, gps_from=gps_from)
         for frame in range(k, k + FIX_EVERY):
-            reference.go(*measure(track, draws, frame, DT, truth))
+            reference.go(*measure(track, frame, draws[frame], DT, truth))
         if k + FIX_EVERY >= gps_from:
             fix = track[k + FIX_EVERY, :2] + GPS_SIGMA * draws[k + FIX_EVERY - 1, ODOMETRY_DRAWS:]
             reference.update(fix, lambda _: np.eye(2, 5), lambda state: state[:2])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.sensing.localizer import BIAS_WALK, ODOMETRY_DRAWS, STATES, measure, reckon
+from dorothie_gym.sim.sensing.localizer import BIAS_WALK, measure, reckon
+from dorothie_gym.sim.state.records import LOCALIZER_STATES, ODOMETRY_DRAWS
 
 DT = 1 / 30
 
@@ -31,9 +32,13 @@ def dead_reckon(
         truth: scale and bias.
         believed: heading at the start, scale and bias.
     """
-    mean, covariance, state = np.array([0.0, 0.0, *believed]), np.zeros((STATES, STATES)), np.array(truth)
+    mean, covariance, state = (
+        np.array([0.0, 0.0, *believed]),
+        np.zeros((LOCALIZER_STATES, LOCALIZER_STATES)),
+        np.array(truth),
+    )
     for k in range(len(draws)):
-        reckon(mean, covariance, *measure(track, draws, k, DT, state), DT)
+        reckon(mean, covariance, *measure(track, k, draws[k], DT, state), DT)
     return mean, covariance
 
 
@@ -65,16 +70,16 @@ def test_covariance_follows_the_derivatives_of_dead_reckoning(believed: tuple[fl
     def end(heading: float, scale: float, bias: float) -> Array:
         return dead_reckon(track, exact(), (1.01, 0.005), (heading, scale, bias))[0]
 
-    jacobian, step = np.eye(STATES), 1e-6
+    jacobian, step = np.eye(LOCALIZER_STATES), 1e-6
     for k in range(3):
         up, down = list(believed), list(believed)
         up[k], down[k] = up[k] + step, down[k] - step
         jacobian[:, 2 + k] = (end(*up) - end(*down)) / (2 * step)
-    root = np.random.default_rng(0).standard_normal((STATES, STATES))
+    root = np.random.default_rng(0).standard_normal((LOCALIZER_STATES, LOCALIZER_STATES))
     before = root @ root.T
     mean, covariance = np.array([0.0, 0.0, *believed]), before.copy()
     for k in range(90):
-        reckon(mean, covariance, *measure(track, exact(), k, DT, truth), DT)
+        reckon(mean, covariance, *measure(track, k, exact()[k], DT, truth), DT)
     own = dead_reckon(track, exact(), (1.01, 0.005), believed)[1]
     np.testing.assert_allclose(covariance - own, jacobian @ before @ jacobian.T, rtol=1e-6, atol=1e-6)
 

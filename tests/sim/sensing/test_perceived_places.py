@@ -10,11 +10,11 @@ from pathlib import Path
 SENSES = """
 import hashlib
 import numpy as np
-from dorothie_gym.sim.infractions import InfractionWatch
-from dorothie_gym.sim.sensing.localizer import Localizer
 from dorothie_gym.sim.sensing.visibility import Visibility
 from tests.sim.driving import network
 from tests.sim.state.plain_rules import lawless_way
+from tests.sim.state.trajectory_watch import TrajectoryWatch
+from tests.sim.sensing.odometer import CarriedLocalizer
 from tests.sim.sensing.test_seen_bodies import Street
 digest = hashlib.sha256()
 for seed in range(4):
@@ -22,9 +22,9 @@ for seed in range(4):
     digest.update(Street(seed).seen(view, 100 * seed, seed).tobytes())
 roads = network("brookside")
 way = lawless_way(roads, np.random.default_rng(2), 450)
-watch, localizer = InfractionWatch(roads, 5.0), Localizer(*way[0, :3], np.random.default_rng(7))
+watch, localizer = TrajectoryWatch(roads), CarriedLocalizer(*way[0, :3], np.random.default_rng(7))
 for k in range(0, 450, 15):
-    localizer.localize(way[k : k + 16], k, gps_from=200)
+    localizer.carry(way[k : k + 16], k, gps_from=200)
     digest.update(localizer.pose.tobytes() + localizer.covariance.tobytes())
     digest.update(repr(watch.look(way[k : k + 16], k)).encode())
 print(digest.hexdigest())

@@ -12,18 +12,19 @@ from dorothie_gym.maps.right_of_way import right_of_way
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.infractions import Breach, Infraction
+from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.state.town_arrays import OFF_ROAD_MARGIN
 from dorothie_gym.sim.traffic.parameters import AT_LINE, TRAFFIC_STANDING
-from dorothie_gym.sim.traffic_rules import AGAINST, BREACH_PAUSE, FORGET, NEARBY, OFF_ROAD_MARGIN
+from dorothie_gym.sim.traffic_rules import AGAINST, BREACH_PAUSE, FORGET, NEARBY
 
 LENGTH = 5.0
 NOT_YET = -(10**9)
 
 
 class PlainWatch:
-    """`InfractionWatch` with loops over everything."""
+    """`sim.traffic_rules.watch` with loops over everything."""
 
     def __init__(self, network: TownNetwork) -> None:
         town, rules = network.town, right_of_way(network.town)
@@ -38,11 +39,11 @@ class PlainWatch:
         self.along = np.column_stack((np.cos(headings), np.sin(headings)))
         self.halves = np.array([town.lanes[lane].widths[-1] / 2 for lane in self.lines])
         self.stood: set[int] = set()
-        self.last = {Infraction.OFF_ROAD: NOT_YET, Infraction.WRONG_WAY: NOT_YET}
+        self.last = {WorldEventKind.OFF_ROAD: NOT_YET, WorldEventKind.WRONG_WAY: NOT_YET}
         self.lanes = [network.get_lane(index) for index in network.lanes_dict()]
 
-    def look(self, poses: Array, frame: int) -> list[Breach]:
-        found: list[Breach] = []
+    def look(self, poses: Array, frame: int) -> list[WorldEvent]:
+        found: list[WorldEvent] = []
         before = self._to_lines(poses[0])
         for k in range(1, len(poses)):
             now = self._to_lines(poses[k])
@@ -69,7 +70,7 @@ class PlainWatch:
 
     def _at_lines(
         self, pose: Array, before: tuple[Array, Array, Array, bool], now: tuple[Array, Array, Array, bool], frame: int
-    ) -> list[Breach]:
+    ) -> list[WorldEvent]:
         if before[3]:
             self.stood |= set(np.flatnonzero(before[2] & (before[0] <= 0.0) & (before[0] >= -AT_LINE)).tolist())
         passed = now[2] & (before[0] <= 0.0) & (now[0] > 0.0)
@@ -80,22 +81,24 @@ class PlainWatch:
         signal = self.signals[lane]
         self.stood.discard(j)
         if signal.kind is SignalKind.STOP:
-            kind, other, broken = Infraction.STOP_SIGN, ObjectClass.TRAFFIC_SIGN, not stood
+            kind, other, broken = WorldEventKind.STOP_SIGN, ObjectClass.TRAFFIC_SIGN, not stood
         else:
-            kind, other = Infraction.RED_LIGHT, ObjectClass.TRAFFIC_LIGHT
+            kind, other = WorldEventKind.RED_LIGHT, ObjectClass.TRAFFIC_LIGHT
             broken = self.town.light(lane, (frame - 1) / FRAME_RATE) is LightColour.RED
         if not broken:
             return []
         station = self.town.lanes[lane].length
-        return [Breach(kind=kind, frame=frame, lane=lane, station=station, x=float(pose[0]), y=float(pose[1]),
-                       key=signal.id, other=other)]  # fmt: skip
+        return [_event(kind, frame, lane, station, *pose[:2].tolist(), key=signal.id, other=other.label)]
 
-    def _beside_lanes(self, pose: Array, frame: int) -> list[Breach]:
+    def _beside_lanes(self, pose: Array, frame: int) -> list[WorldEvent]:
         x, y, heading, _, height, _ = pose.tolist()
         places = [(*self._on(lane, x, y, heading), lane) for lane in self.lanes if self._near(lane, x, y, height)]
         on = [runs_with for out, _, runs_with, _ in places if out <= 0.0]
         outside = min((out for out, *_ in places), default=math.inf)
-        broken = {Infraction.OFF_ROAD: outside > OFF_ROAD_MARGIN, Infraction.WRONG_WAY: bool(on) and not any(on)}
+        broken = {
+            WorldEventKind.OFF_ROAD: outside > OFF_ROAD_MARGIN,
+            WorldEventKind.WRONG_WAY: bool(on) and not any(on),
+        }
         found = []
         for kind in (kind for kind, is_broken in broken.items() if is_broken):
             last, self.last[kind] = self.last[kind], frame
@@ -106,10 +109,7 @@ class PlainWatch:
             else:
                 lane = self.network.get_lane(self.network.get_closest_lane_index(np.array([x, y]), height=height))
                 station = lane.local_coordinates(np.array([x, y]))[0]
-            found.append(
-                Breach(kind=kind, frame=frame, lane=lane.town_lane.id, station=min(max(station, 0.0), lane.length),
-                       x=x, y=y)
-            )  # fmt: skip
+            found.append(_event(kind, frame, lane.town_lane.id, min(max(station, 0.0), lane.length), x, y))
         return found
 
     def _near(self, lane: PolylineLane, x: float, y: float, height: float) -> bool:
@@ -125,6 +125,14 @@ class PlainWatch:
         out = max(abs(lateral) - 0.5 * lane.width_at(station), -station, station - lane.length)
         runs_with = lane.town_lane.in_junction or math.cos(heading - lane.heading_at(station)) > AGAINST
         return out, station, runs_with
+
+
+def _event(
+    kind: WorldEventKind, frame: int, lane: int, station: float, x: float, y: float,
+    key: int | None = None, other: str | None = None,
+) -> WorldEvent:  # fmt: skip
+    place = {"lane": lane, "station": round(float(station), 2), "x": round(x, 3), "y": round(y, 3)}
+    return WorldEvent(frame=frame, kind=kind, data={**place, "key": key, "other": other})
 
 
 def lawless_way(network: TownNetwork, rng: np.random.Generator, frames: int) -> Array:

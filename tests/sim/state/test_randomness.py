@@ -1,8 +1,11 @@
 import numpy as np
+import pytest
 
+from dorothie_gym.compilation import compiled
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle
-from dorothie_gym.sim.randomness import POOL, choose, draw, seed_of
+from dorothie_gym.sim.randomness import POOL, begin_stream, choose, draw, draw_normal, seed_of
+from dorothie_gym.sim.state.records import LocalizerRecord, empty_records
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
 from tests.sim.network.towns import straight_town
@@ -38,3 +41,36 @@ def test_seeds_are_those_of_numpy():
     numbers = np.random.default_rng(0).integers(0, 1 << 32, (500, 2)).tolist()
     for first, second in [(0, 0), (1, 0), ((1 << 32) - 1, (1 << 32) - 1), *numbers]:
         assert seed_of(first, second, pool) == np.random.SeedSequence((first, second)).generate_state(1)[0]
+
+
+@compiled
+def fill(stream, numbers):
+    for k in range(len(numbers)):
+        numbers[k] = draw_normal(stream)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 2**31 - 1, 2**63])
+def test_normal_numbers_are_those_of_numpy(seed):
+    generator = np.random.default_rng(seed)
+    generator.standard_normal(seed % 7)
+    stream = empty_records(LocalizerRecord, 1)[0]
+    begin_stream(stream, generator)
+    for count in (1, 6, 1_000_000):  # one in 4,000 lies in the tail
+        drawn = np.empty(count)
+        fill(stream, drawn)
+        assert drawn.tobytes() == generator.standard_normal(count).tobytes()
+    assert np.abs(drawn).max() > 4.0
+    state = generator.bit_generator.state["state"]
+    assert (int(stream.state_high) << 64) + int(stream.state_low) == state["state"]
+
+
+def test_normal_numbers_are_the_same_in_plain_python():
+    generator, stream = np.random.default_rng(3), empty_records(LocalizerRecord, 1)[0]
+    begin_stream(stream, generator)
+    plain = getattr(draw_normal, "py_func", draw_normal)
+    assert [plain(stream) for _ in range(200)] == generator.standard_normal(200).tolist()
+
+
+def test_generators_of_other_kinds_have_no_stream():
+    with pytest.raises(TypeError, match="PCG64, not MT19937"):
+        begin_stream(empty_records(LocalizerRecord, 1)[0], np.random.Generator(np.random.MT19937(0)))
