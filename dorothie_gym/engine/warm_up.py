@@ -22,6 +22,7 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.interruption import starting_process
 from dorothie_gym.maps import load_town
+from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.egos import play_share
@@ -101,6 +102,9 @@ def _compile_rare() -> None:
     if isinstance(look_around, CompiledFunction) and isinstance(closest_walk, CompiledFunction):
         look_around.compile_for(world, 0, np.zeros((0, 2)))
         closest_walk.compile_for(town, Footway.STREET, 0.0, 0.0, 0.0)
+    search = router(load_town(TOWN))
+    search.reachable((0, 0.0))
+    search.distances_to((0, 0.0))
     TownNetwork(load_town(TOWN)).lane_of(0).local_coordinates(np.zeros(2))
 
 

@@ -78,14 +78,19 @@ class OncomingLanes:
 
         None in a junction, on a lane that is not the leftmost, and without an oncoming lane nearby.
         """
-        candidates = self._near.get(lane_id)
-        if candidates is None:
-            candidates = self._near[lane_id] = self._lanes_near(lane_id)
+        candidates = self.candidates(lane_id)
         if not len(candidates):
             return None
         table = self._table
-        found = Oncoming(*_across(table.points, table.offsets, table.ends, lane_id, station, candidates))
+        found = Oncoming(*across(table.points, table.offsets, table.ends, lane_id, station, candidates))
         return found if found.lane >= 0 else None
+
+    def candidates(self, lane_id: int) -> IntArray:
+        """Returns the lanes that may be oncoming somewhere along a lane (n,)."""
+        found = self._near.get(lane_id)
+        if found is None:
+            found = self._near[lane_id] = self._lanes_near(lane_id)
+        return found
 
     def _lanes_near(self, lane_id: int) -> IntArray:
         """Returns the lanes outside junctions that are close enough to be oncoming somewhere along a lane."""
@@ -101,7 +106,7 @@ class OncomingLanes:
 
 
 @allocating
-def _across(
+def across(
     points: Array, offsets: IntArray, ends: Array, lane: int, station: float, candidates: IntArray
 ) -> tuple[int, float, float]:
     """Returns the closest oncoming lane among candidates (-1: none), the station on it [m], and the distance [m]."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,22 +11,30 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import breadth_first_order, connected_components, dijkstra
+from scipy.sparse.csgraph import breadth_first_order, connected_components
 
+from dorothie_gym.compilation.records import RecordArray, empty_records, fields, plain
 from dorothie_gym.maps.model import NO_JUNCTION, LinkType
+from dorothie_gym.maps.route_arrays import empty_search, place_records
+from dorothie_gym.maps.route_search import find_costs, find_departures, find_route
 from dorothie_gym.maps.routing_graph import (
     CELL,
     CHANGE_COST,
+    CHANGE_LEFT,
     CHANGE_LENGTH,
+    CHANGE_RIGHT,
     LANE_ENTRIES,
+    NONE,
     SHORT_CHANGE,
     TURN_COST,
     U_TURN_COST,
-    CellGraph,
-    IntArray,
     LaneEntry,
     Place,
-    RoutingEdges,
+    RoutingEdge,
+    RoutingGraph,
+    cheapest,
+    joined,
+    routing_graph,
 )
 from dorothie_gym.maps.town import Town
 
@@ -44,8 +53,6 @@ __all__ = [
     "Router",
     "router",
 ]
-
-_FOLLOW = LANE_ENTRIES.index(LaneEntry.FOLLOW)
 
 # Type of each manoeuvre other than following a lane, and its action angle [degrees, positive left].
 _MANOEUVRES = {
@@ -164,23 +171,36 @@ def _instruction(town: Town, one: Leg, two: Leg, distance: float) -> Instruction
     )
 
 
+class _Searches(threading.local):
+    """Scratch space of a thread for searches in a town."""
+
+    def __init__(self, graph: RoutingGraph) -> None:
+        self.search = empty_search(graph)
+
+
 class Router:
-    """Route search on the routing graph of a town; use `router` to share one for each town."""
+    """Route search on the routing graph of a town; use `router` to share one for each town.
+
+    Attributes:
+        lane_cells: for each lane the number of its first cell, the number of cells, and the length of each [m].
+    """
 
     def __init__(self, town: Town) -> None:
-        self._town = town
-        self._graph = CellGraph(town)
+        self._graph = routing_graph(town)
+        self._searches = _Searches(self._graph)
+        self.lane_cells: list[tuple[int, int, float]] = plain(self._graph.lanes)[["first", "cells", "size"]].tolist()
 
     def cell(self, lane: int, station: float) -> int:
         """Returns the cell that contains a place."""
-        return self._graph.cell(lane, station)
+        first, count, size = self.lane_cells[lane]
+        return first + min(max(int(station / size), 0), count - 1)
 
     def cells_of(self, places: Iterable[Place]) -> set[int]:
         """Returns the cells that contain the given places."""
-        return self._graph.cells_of(places)
+        return {self.cell(lane, station) for lane, station in places}
 
     def route(self, start: Place, goal: Place, blocked: Sequence[Place] = ()) -> Route | None:
-        """Returns the cheapest route between two places, or None if there is none.
+        """Returns the cheapest route between two places, or None if there is none; see `find_route`.
 
         Args:
             start: where the car is.
@@ -188,23 +208,26 @@ class Router:
             blocked: impassable places (roadblocks). The route does not enter their cells, nor by lane changes; in
                 the cell of the start only those ahead count.
         """
-        graph = self._graph
-        extra = RoutingEdges.join([graph.departures(start, goal, blocked), graph.arrivals(goal)])
-        edges = self._open(blocked, extra)
-        cost, previous = dijkstra(self._matrix(edges), indices=np.array(graph.start), return_predecessors=True)
-        if not math.isfinite(cost[graph.goal]):
+        search = self._searches.search
+        if not find_route(self._graph, search, *start, *goal, place_records(blocked), len(blocked)):
             return None
-        nodes = _trace(previous, graph.start, graph.goal)
-        keys = edges.source * graph.nodes + edges.target
-        taken = edges.take(np.searchsorted(keys, nodes[:-1] * graph.nodes + nodes[1:]))
-        return _lay(taken, start, goal, float(cost[graph.goal]))
+        cost, _, steps, count = fields(search.result, "cost", "extra", "steps", "legs").item()
+        rows = plain(search.legs)[:count].tolist()
+        legs = tuple(Leg(lane, LANE_ENTRIES[entry], begin, end) for begin, end, lane, entry in rows)
+        length = sum(max(leg.end - leg.start, 0.0) for leg in legs) + float(search.driven[:steps].sum())
+        return Route(legs=legs, length=length, cost=cost)
+
+    def distances_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
+        """Returns the cost from the start of each cell to a goal (cells,) [m at 40 km/h]; inf without a route."""
+        costs = np.empty(self._graph.cells)
+        find_costs(self._graph, self._searches.search, *goal, place_records(blocked), len(blocked), costs)
+        return costs
+
+    # --- What can be reached ----------------------------------------------------------------------------------------
 
     def reachable(self, start: Place, blocked: Sequence[Place] = ()) -> NDArray[np.bool_]:
         """Returns which cells (cells,) are reachable despite roadblocks; the cell of the start always is."""
-        edges = self._open(blocked, self._graph.departures(start, None, blocked))
-        order = breadth_first_order(self._matrix(edges), self._graph.start, directed=True, return_predecessors=False)
-        found = np.zeros(self._graph.nodes, dtype=np.bool_)
-        found[order] = True
+        found = self._reached(self._matrix(blocked, self._departures(start, blocked)), self._graph.start)
         found[self.cell(*start)] = True
         return found[: self._graph.cells]
 
@@ -221,92 +244,78 @@ class Router:
             stands: stopping places before the roadblocks, at the beginnings of the blocked sections.
             held: stopping place of the car before the next roadblock, if that is near.
         """
-        graph = self._graph
-        extra = [graph.departures(start, None, blocked)]
+        extra = [self._departures(start, blocked), *map(self._stand, stands)]
         if held is not None:
-            extra.append(graph.stand(held, graph.start))
-        order = breadth_first_order(
-            self._passable(blocked, stands, extra), graph.start, directed=True, return_predecessors=False
-        )
-        found = np.zeros(graph.nodes, dtype=np.bool_)
-        found[order] = True
-        found[graph.start] = False
+            extra.append(self._stand(held, self._graph.start))
+        found = self._reached(self._matrix(blocked, *extra), self._graph.start)
+        found[self._graph.start] = False
         return found
 
     def safe(
         self, goals: Sequence[int], blocked: Sequence[Place] = (), stands: Sequence[Place] = ()
     ) -> NDArray[np.bool_]:
         """Returns the nodes from which all goal cells are reachable despite roadblocks; see `onward`."""
-        matrix = self._passable(blocked, stands, [])
+        matrix = self._matrix(blocked, *map(self._stand, stands))
         _, group = connected_components(matrix, directed=True, connection="strong")
         reverse = matrix.T.tocsr()
         result = np.ones(self._graph.nodes, dtype=np.bool_)
         # the nodes of a strongly connected group reach the same nodes, and most of a town is one group
         for goal in {int(group[goal]): goal for goal in goals}.values():
-            order = breadth_first_order(reverse, goal, directed=True, return_predecessors=False)
-            leading = np.zeros(self._graph.nodes, dtype=np.bool_)
-            leading[order] = True
-            result &= leading
+            result &= self._reached(reverse, goal)
         return result
 
     def leads_to(self, stand: Place, nodes: NDArray[np.bool_], blocked: Sequence[Place]) -> bool:
         """Returns whether one edge leads from a stopping place before a roadblock to one of the nodes (nodes,)."""
-        edges = self._clear(self._graph.stand(stand, self._graph.start), blocked)
-        return bool(nodes[edges.target].any())
+        edges = self._clear(self._stand(stand, self._graph.start), blocked)
+        return bool(nodes[edges["target"]].any())
 
-    def _passable(
-        self, blocked: Sequence[Place], stands: Sequence[Place], extra: Sequence[RoutingEdges]
-    ) -> csr_matrix[np.float64]:
-        joined = RoutingEdges.join([RoutingEdges.make(0), *extra, *(self._graph.stand(place) for place in stands)])
-        return self._matrix(self._open(blocked, joined))
+    def _departures(self, start: Place, blocked: Sequence[Place]) -> RecordArray[RoutingEdge]:
+        """Returns the edges from a start, see `find_departures`."""
+        search = self._searches.search
+        count = find_departures(self._graph, search, *start, NONE, 0.0, place_records(blocked), len(blocked))
+        return joined(search.extra[:count])
 
-    def distances_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
-        """Returns the cost from the start of each cell to a goal (cells,) [m at 40 km/h]; inf without a route."""
-        edges = self._open(blocked, self._graph.arrivals(goal))
-        result: NDArray[np.float64] = dijkstra(self._matrix(edges).T, indices=np.array(self._graph.goal))
-        return result[: self._graph.cells]
+    def _stand(self, place: Place, source: int | None = None) -> RecordArray[RoutingEdge]:
+        """Returns the edges from a stop before a roadblock: the shortest lane change, and a U-turn on the spot.
 
-    def _open(self, blocked: Sequence[Place], extra: RoutingEdges) -> RoutingEdges:
-        """Returns the edges of the town and extra ones, without those blocked by roadblocks, sorted and unique."""
-        edges = RoutingEdges.join([self._graph.edges, extra.cheapest(self._graph.nodes)])
-        edges = self._clear(edges, blocked).cheapest(self._graph.nodes)
-        return edges.take(np.argsort(edges.source * self._graph.nodes + edges.target, kind="stable"))
+        Args:
+            place: place of the car. Room on its own lane is assumed; only the other lane is checked for obstacles.
+            source: node at which the edges begin; by default the cell before that of the car, because the road up to
+                the roadblock is closed. No edges if there is no such cell on the lane.
+        """
+        source = self.cell(*place) - 1 if source is None else source
+        if source < self._graph.lanes[place[0]].first:
+            return empty_records(RoutingEdge, 0)
+        edges = self._departures(place, ())
+        changes = (edges["entry"] == CHANGE_LEFT) | (edges["entry"] == CHANGE_RIGHT)
+        edges = joined(edges[changes & (edges["driven"] < SHORT_CHANGE)], self._departures(place, [place]))
+        edges["source"], edges["first"], edges["last"] = source, 0, NONE
+        return edges
 
-    def _clear(self, edges: RoutingEdges, blocked: Sequence[Place]) -> RoutingEdges:
-        """Returns the edges that no roadblock blocks."""
+    def _clear(self, edges: RecordArray[RoutingEdge], blocked: Sequence[Place]) -> RecordArray[RoutingEdge]:
+        """Returns the edges that neither end in nor traverse the cells of roadblocks."""
         if not blocked:
             return edges
         closed = np.zeros(self._graph.nodes, dtype=np.bool_)
         closed[sorted(self.cells_of(blocked))] = True
-        return edges.take(edges.clear_of(closed))
+        before = np.concatenate(([0], np.cumsum(closed)))
+        on_first = before[np.maximum(edges["last"] + 1, edges["first"])] - before[edges["first"]]
+        on_second = before[np.maximum(edges["until"] + 1, edges["onto"])] - before[edges["onto"]]
+        free: NDArray[np.bool_] = (on_first + on_second == 0) & ~closed[edges["target"]]
+        return edges[free]
 
-    def _matrix(self, edges: RoutingEdges) -> csr_matrix[np.float64]:
-        """Returns sorted edges as a matrix of costs."""
+    def _matrix(self, blocked: Sequence[Place], *extra: RecordArray[RoutingEdge]) -> csr_matrix[np.float64]:
+        """Returns the edges of the town and extra ones that are not blocked as a matrix of costs."""
+        edges = cheapest(self._clear(joined(self._graph.edges, cheapest(joined(*extra))), blocked))
         nodes = self._graph.nodes
-        rows = np.searchsorted(edges.source, np.arange(nodes + 1))
-        return csr_matrix((edges.cost, edges.target, rows), shape=(nodes, nodes))
+        cost, source, target = (np.ascontiguousarray(edges[name]) for name in ("cost", "source", "target"))
+        return csr_matrix((cost, target, np.searchsorted(source, np.arange(nodes + 1))), shape=(nodes, nodes))
 
-
-def _trace(previous: NDArray[np.int32], source: int, target: int) -> IntArray:
-    nodes = [target]
-    while nodes[-1] != source:
-        nodes.append(int(previous[nodes[-1]]))
-    return np.array(nodes[::-1], dtype=np.int64)
-
-
-def _lay(edges: RoutingEdges, start: Place, goal: Place, cost: float) -> Route:
-    """Returns the route along a sequence of edges."""
-    legs: list[Leg] = []
-    lane, entry, begin = start[0], LaneEntry.FOLLOW, start[1]
-    for k in range(len(edges)):
-        within = edges.entry[k] == _FOLLOW and edges.leave[k] == edges.land[k]
-        if within:
-            continue
-        legs.append(Leg(lane, entry, begin, float(edges.leave[k])))
-        lane, entry, begin = int(edges.lane[k]), LANE_ENTRIES[edges.entry[k]], float(edges.land[k])
-    legs.append(Leg(lane, entry, begin, goal[1]))
-    length = sum(max(leg.end - leg.start, 0.0) for leg in legs) + float(edges.driven.sum())
-    return Route(legs=tuple(legs), length=length, cost=cost)
+    def _reached(self, matrix: csr_matrix[np.float64], source: int) -> NDArray[np.bool_]:
+        """Returns which nodes are reached from one of them (nodes,)."""
+        found = np.zeros(self._graph.nodes, dtype=np.bool_)
+        found[breadth_first_order(matrix, source, directed=True, return_predecessors=False)] = True
+        return found
 
 
 @lru_cache(maxsize=16)

@@ -1,20 +1,23 @@
-"""Routing graph: cells of about 10 m and the edges between them, with their costs."""
+"""Routing graph of a town in arrays: cells of about 10 m and the edges between them, with their costs."""
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any, TypeAlias
+import math
+from functools import lru_cache
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps.lane_neighbours import OncomingLanes, oncoming_lanes
-from dorothie_gym.maps.model import Array, Lane, LinkType
+from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation.by_reference import by_reference
+from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray, empty_records, record_dtype
+from dorothie_gym.copying import shared
+from dorothie_gym.maps.lane_neighbours import across, oncoming_lanes
+from dorothie_gym.maps.model import Array, LinkType
+from dorothie_gym.maps.polyline import IntArray, LaneTable
 from dorothie_gym.maps.town import Town
-
-IntArray: TypeAlias = NDArray[np.int64]
 
 
 class LaneEntry(enum.StrEnum):
@@ -28,78 +31,11 @@ class LaneEntry(enum.StrEnum):
 
 LANE_ENTRIES = tuple(LaneEntry)
 
+FOLLOW, CHANGE_LEFT, CHANGE_RIGHT, U_TURN = (cast(int, np.int64(k)) for k in range(len(LANE_ENTRIES)))
+"""Codes of the manoeuvres: indices into `LANE_ENTRIES`."""
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RoutingEdges:
-    """Edges of the routing graph as columns; all arrays are (n,).
-
-    Attributes:
-        source, target: nodes.
-        cost: cost [m at 40 km/h].
-        entry: index into `LANE_ENTRIES`; FOLLOW within a lane and across its end.
-        lane: lane at the end of the edge.
-        leave: station on the previous lane at which the edge begins [m].
-        land: station on `lane` at which it ends [m].
-        driven: length of a lane change or U-turn [m], else 0.
-        first, last: range of traversed cells of the previous lane, both included; empty if `last` < `first`.
-        onto, until: the same for `lane`.
-    """
-
-    source: IntArray
-    target: IntArray
-    cost: Array
-    entry: IntArray
-    lane: IntArray
-    leave: Array
-    land: Array
-    driven: Array
-    first: IntArray
-    last: IntArray
-    onto: IntArray
-    until: IntArray
-
-    def __len__(self) -> int:
-        return len(self.source)
-
-    def take(self, rows: NDArray[np.bool_] | IntArray) -> RoutingEdges:
-        """Returns the selected edges."""
-        return RoutingEdges(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
-
-    @classmethod
-    def join(cls, tables: Sequence[RoutingEdges]) -> RoutingEdges:
-        """Concatenates several tables."""
-        return cls(**{f.name: np.concatenate([getattr(table, f.name) for table in tables]) for f in fields(cls)})
-
-    @classmethod
-    def make(cls, count: int, **columns: object) -> RoutingEdges:
-        """Builds edges from columns given as arrays or single values.
-
-        Missing columns are 0, and the ranges of traversed cells are empty.
-        """
-        table: dict[str, Any] = {}  # arrays of integers and of floats
-        for field in fields(cls):
-            value = columns.get(field.name, -1 if field.name in ("last", "until") else 0)
-            real = field.name in ("cost", "leave", "land", "driven")
-            table[field.name] = np.broadcast_to(np.asarray(value, dtype=np.float64 if real else np.int64), count)
-        return cls(**table)
-
-    def cheapest(self, nodes: int) -> RoutingEdges:
-        """Returns only the cheapest edge between each pair of nodes, sorted by source and target."""
-        key = self.source * nodes + self.target
-        order = np.lexsort((self.cost, key))
-        key = key[order]
-        return self.take(order[np.concatenate(([True], key[1:] != key[:-1]))] if len(key) else order)
-
-    def clear_of(self, blocked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Returns which edges neither end in nor traverse blocked cells (n,); `blocked` has an entry for each node."""
-        before = np.concatenate(([0], np.cumsum(blocked)))
-        on_first = before[np.maximum(self.last + 1, self.first)] - before[self.first]
-        on_second = before[np.maximum(self.until + 1, self.onto)] - before[self.onto]
-        result: NDArray[np.bool_] = (on_first + on_second == 0) & ~blocked[self.target]
-        return result
-
-
-# --- Cells of a town and the edges between them ----------------------------------------------------------------------
+NONE = cast(int, np.int64(-1))
+"""No lane, node or edge."""
 
 Place: TypeAlias = tuple[int, float]
 """Lane id and station [m]."""
@@ -145,6 +81,9 @@ U_TURN_REST = 6.0
 SLIGHTLY_BEHIND = 1.0
 """Distance by which a goal may lie behind the start without a detour [m]."""
 
+LEAST_COST = 1e-3
+"""Least cost of an edge [m]: searches of sparse graphs ignore edges without cost."""
+
 USUAL_SPEED = 40.0 / 3.6
 """Reference speed of costs [m/s]: a metre with this limit costs one metre, with a higher limit less."""
 
@@ -152,307 +91,347 @@ SPEEDS = (10.0 / 3.6, 60.0 / 3.6)
 """Range to which speed limits are clipped [m/s]: a Co-Wizard never cruises at more than 60 km/h."""
 
 
-_SIDES = ((LinkType.LANE_CHANGE_LEFT, LaneEntry.CHANGE_LEFT), (LinkType.LANE_CHANGE_RIGHT, LaneEntry.CHANGE_RIGHT))
+class RoutingLane:
+    """A lane of a town, divided into cells; indices are -1 where there is none."""
+
+    length: Float  # [m]
+    size: Float  # length of its cells [m]
+    weight: Float  # cost of a metre
+    offset: Float  # beginning of the lane where all lanes lie in one row with gaps of one metre [m]
+    first: Int32  # first cell, and number of cells
+    cells: Int32
+    left: Int32  # lanes that one may change to
+    right: Int32
+    junction: Flag  # whether it is a connector through a junction
 
 
-class CellGraph:
-    """Cells of a town and the edges between them.
+class RoutingEdge:
+    """An edge of the routing graph."""
+
+    cost: Float  # [m at 40 km/h]
+    leave: Float  # station on the previous lane at which the edge begins [m]
+    land: Float  # station on `lane` at which it ends [m]
+    driven: Float  # length of a lane change or U-turn [m], else 0
+    source: Int32  # nodes
+    target: Int32
+    entry: Int32  # index into `LANE_ENTRIES`; FOLLOW within a lane and across its end
+    lane: Int32  # lane at the end of the edge
+    first: Int32  # range of traversed cells of the previous lane, both included; empty if `last` < `first`
+    last: Int32
+    onto: Int32  # the same for `lane`
+    until: Int32
+
+
+@by_reference
+@shared
+class RoutingGraph(NamedTuple):
+    """Routing graph of a town; nodes are the starts of the cells in order, the tails of the lanes, start and goal.
 
     Attributes:
-        cells: number of cells; nodes are the cells, then the tails of the lanes, then `start` and `goal`.
-        start, goal: nodes of the start and the goal of a search.
-        edges: cheapest edge between each pair of cells and tails.
+        lanes: lanes by their ids.
+        points: (p, 6) points of the centre lines, see `polyline.LaneTable`.
+        offsets: (lanes + 1,) first point of each lane, and p.
+        ends: (lanes, 4) directions of their ends, see `polyline.LaneTable`.
+        near: lanes that may be oncoming somewhere along a lane, lane by lane.
+        near_rows: (lanes + 1,) their beginning for each lane.
+        edges: cheapest edge between each pair of cells and tails, sorted by source and target.
+        rows: (nodes + 1,) first edge of each source, and the number of edges.
+        incoming: edges sorted by target.
+        incoming_rows: (nodes + 1,) first entry of `incoming` for each target, and the number of edges.
         manoeuvres: lane changes and U-turns from the starts of cells to the exact place where they end, whose cell is
-            the target (in `edges` they lead to the start of the next cell instead).
+            the target (in `edges` they lead to the start of the next cell instead), sorted by target.
+        manoeuvre_rows: (nodes + 1,) the first of each target, and their number.
     """
 
-    def __init__(self, town: Town) -> None:
-        self._town = town
-        self._oncoming: OncomingLanes = oncoming_lanes(town)
-        lengths = np.array([lane.length for lane in town.lanes])
-        self._counts = np.maximum(1, np.round(lengths / CELL)).astype(np.int64)
-        self._sizes = lengths / self._counts
-        self._lengths = lengths
-        self.first = np.concatenate(([0], np.cumsum(self._counts))).astype(np.int64)
-        self.cells = int(self.first[-1])
-        self.start, self.goal = self.cells + len(town.lanes), self.cells + len(town.lanes) + 1
-        limits = np.clip([lane.speed_limit for lane in town.lanes], *SPEEDS)
-        self._weights = USUAL_SPEED / limits
-        # all lanes in one row with gaps of one metre, to interpolate on many lanes at once
-        self._offsets = np.concatenate(([0.0], np.cumsum(lengths + 1.0)))
-        self._stations = np.concatenate(
-            [lane.stations + offset for lane, offset in zip(town.lanes, self._offsets[:-1], strict=True)]
-        )
-        self._points = np.concatenate([lane.points for lane in town.lanes])
-        starts = {lane.id: self._starts(lane.id) for lane in town.lanes if not lane.in_junction}
-        self.manoeuvres = RoutingEdges.join([self._changes(starts), self._u_turns(starts)])
-        tables = [self._within_lanes(), self._across_ends(), self._onward(self.manoeuvres)]
-        self.edges = RoutingEdges.join(tables).cheapest(self.nodes)
+    lanes: RecordArray[RoutingLane]
+    points: Array
+    offsets: IntArray
+    ends: Array
+    near: IntArray
+    near_rows: IntArray
+    edges: RecordArray[RoutingEdge]
+    rows: IntArray
+    incoming: IntArray
+    incoming_rows: IntArray
+    manoeuvres: RecordArray[RoutingEdge]
+    manoeuvre_rows: IntArray
 
     @property
     def nodes(self) -> int:
         """Number of nodes."""
-        return self.goal + 1
+        return len(self.rows) - 1
 
-    def cell(self, lane: int, station: float) -> int:
-        """Returns the cell that contains a place."""
-        return int(self._cells_at(lane, np.array([station]))[0])
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return self.nodes - len(self.lanes) - 2
 
-    def cells_of(self, places: Iterable[Place]) -> set[int]:
-        """Returns the cells that contain the given places."""
-        return {self.cell(lane, station) for lane, station in places}
+    @property
+    def start(self) -> int:
+        """Node of the start of a search."""
+        return self.nodes - 2
 
-    # --- Edges between cells -----------------------------------------------------------------------------------------
-
-    def _cells_at(self, lane: int | IntArray, stations: Array) -> IntArray:
-        k = (stations / self._sizes[lane]).astype(np.int64)
-        result: IntArray = self.first[lane] + np.clip(k, 0, self._counts[lane] - 1)
-        return result
-
-    def _starts(self, lane: int) -> Array:
-        """Returns the stations at which the cells of a lane begin (n,) [m]."""
-        starts: Array = np.arange(self._counts[lane]) * self._sizes[lane]
-        return starts
-
-    def _within_lanes(self) -> RoutingEdges:
-        """Returns the edges between successive cells of each lane."""
-        owner = np.repeat(np.arange(len(self._counts)), self._counts)
-        inner = np.ones(self.cells, dtype=np.bool_)
-        inner[self.first[1:] - 1] = False
-        source = np.flatnonzero(inner)
-        lane = owner[source]
-        land = (source + 1 - self.first[lane]) * self._sizes[lane]
-        cost = self._sizes[lane] * self._weights[lane]
-        return RoutingEdges.make(
-            len(source), source=source, target=source + 1, cost=cost, lane=lane, leave=land, land=land
-        )
-
-    def _across_ends(self) -> RoutingEdges:
-        """Returns the edges from the last cell and the tail of each lane to the first cells of its successors."""
-        links = [link for link in self._town.links if not link.type.is_lane_change]
-        source = np.array([link.source for link in links], dtype=np.int64)
-        target = np.array([link.target for link in links], dtype=np.int64)
-        turn = np.array([TURN_COST[link.type] for link in links])
-        last = self.first[source + 1] - 1
-        common = {"target": self.first[target], "lane": target, "leave": self._lengths[source]}
-        along = self._sizes[source] * self._weights[source]
-        return RoutingEdges.join(
-            [
-                RoutingEdges.make(len(links), source=last, cost=along + turn, **common),
-                # the search ignores edges without cost
-                RoutingEdges.make(len(links), source=self.cells + source, cost=np.maximum(turn, 1e-3), **common),
-            ]
-        )
-
-    def _onward(self, manoeuvres: RoutingEdges) -> RoutingEdges:
-        """Extends lane changes and U-turns to the start of the next cell, or to the tail of the lane."""
-        lane, cell = manoeuvres.lane, manoeuvres.target
-        tail = cell + 1 == self.first[lane + 1]
-        ahead = np.where(tail, self._lengths[lane], (cell + 1 - self.first[lane]) * self._sizes[lane])
-        return replace(
-            manoeuvres,
-            target=np.where(tail, self.cells + lane, cell + 1),
-            cost=manoeuvres.cost + (ahead - manoeuvres.land) * self._weights[lane],
-        )
-
-    # --- Lane changes and U-turns ------------------------------------------------------------------------------------
-
-    def _changes(self, begins: Mapping[int, Array]) -> RoutingEdges:
-        """Returns lane changes of three lengths from the given stations (n,) [m] of each lane."""
-        pairs = [
-            (lane, beside, LANE_ENTRIES.index(entry))
-            for lane in begins
-            for side, entry in _SIDES
-            if (beside := self._town.neighbour(lane, side)) is not None
-        ]
-        if not pairs:
-            return _NONE
-        source, target, entry = np.repeat(
-            np.array(pairs, dtype=np.int64), [3 * len(begins[lane]) for lane, _, _ in pairs], axis=0
-        ).T
-        begin = np.concatenate([np.repeat(begins[lane], 3) for lane, _, _ in pairs])
-        room = self._lengths[source] - begin
-        wanted = np.tile((SHORT_CHANGE, (SHORT_CHANGE + CHANGE_LENGTH) / 2, CHANGE_LENGTH), len(begin) // 3)
-        # the longest is limited by the rest of the lane
-        road = np.where(wanted == CHANGE_LENGTH, np.minimum(wanted, room), wanted)
-        fits = (road >= SHORT_CHANGE) & (road <= room)
-        return self._change(source[fits], target[fits], entry[fits], begin[fits], road[fits])
-
-    def _change(self, source: IntArray, target: IntArray, entry: IntArray, begin: Array, road: Array) -> RoutingEdges:
-        """Returns lane changes of length `road` (n,) [m] from `begin` (n,) [m] where the lanes lie side by side."""
-        leave, end = begin + CHANGE_LEAD, begin + road
-        on, off = self._project(np.tile(target, 2), self._positions(np.tile(source, 2), np.concatenate((leave, end))))
-        on, off = on.reshape(2, -1), off.reshape(2, -1)
-        edges = RoutingEdges.make(
-            len(begin),
-            source=self._cells_at(source, begin),
-            target=self._cells_at(target, on[1]),
-            cost=road * self._weights[source] + CHANGE_COST + 2.0 * (CHANGE_LENGTH - road) + LATE_CHANGE * begin,
-            entry=entry,
-            lane=target,
-            leave=leave,
-            land=on[1],
-            driven=end - leave,
-            first=self._cells_at(source, begin),
-            last=self._cells_at(source, leave + SHARED * (end - leave)),
-            onto=self._cells_at(target, on[1] - SHARED * (on[1] - on[0])),
-            until=self._cells_at(target, on[1]),
-        )
-        near: NDArray[np.bool_] = np.all(off < MAX_ASIDE, axis=0)
-        return edges.take(near)
-
-    def _positions(self, lanes: IntArray, stations: Array) -> Array:
-        """Returns positions on centre lines (n, 2) [m]."""
-        at = self._offsets[lanes] + stations
-        return np.column_stack([np.interp(at, self._stations, self._points[:, k]) for k in (0, 1)])
-
-    def _project(self, lanes: IntArray, positions: Array) -> tuple[Array, Array]:
-        """Projects positions (n, 2) onto one lane each: station (n,) and distance (n,) [m]."""
-        along, away = np.empty(len(lanes)), np.empty(len(lanes))
-        order = np.argsort(lanes, kind="stable")
-        for rows in np.split(order, np.flatnonzero(np.diff(lanes[order])) + 1):
-            if len(rows):
-                along[rows], away[rows] = _project(self._town.lanes[lanes[rows[0]]], positions[rows])
-        return along, away
-
-    def _u_turns(self, starts: Mapping[int, Array]) -> RoutingEdges:
-        """Returns the U-turns from the middle of each cell; `starts` are the starts of the cells by lane (n,) [m]."""
-        rows = [
-            (lane, float(begin), float(begin + 0.5 * self._sizes[lane])) for lane in starts for begin in starts[lane]
-        ]
-        return self._turn_round(rows)
-
-    def _turn_round(self, rows: Iterable[tuple[int, float, float]]) -> RoutingEdges:
-        """Returns U-turns where there is an oncoming lane with sufficient length behind them.
-
-        Args:
-            rows: lane, station from which the cost counts, and station at which the U-turn begins [m].
-        """
-        found = []
-        for lane, begin, leave in rows:
-            oncoming = self._oncoming.at(lane, leave)
-            if oncoming is not None and self._lengths[oncoming.lane] - oncoming.station > CELL:
-                found.append((lane, begin, leave, oncoming.lane, oncoming.station))
-        lanes, begins, leaves, others, stations = np.array(found, dtype=np.float64).reshape(-1, 5).T
-        source, target = lanes.astype(np.int64), others.astype(np.int64)
-        landing = self._cells_at(target, stations + U_TURN_REST)
-        return RoutingEdges.make(
-            len(found),
-            source=self._cells_at(source, begins),
-            target=landing,
-            cost=(leaves - begins) * self._weights[source]
-            + U_TURN_LENGTH
-            + U_TURN_COST
-            + U_TURN_REST * self._weights[target],
-            entry=LANE_ENTRIES.index(LaneEntry.U_TURN),
-            lane=target,
-            leave=leaves,
-            land=stations + U_TURN_REST,
-            driven=U_TURN_LENGTH + U_TURN_REST,
-            onto=self._cells_at(target, stations),
-            until=landing,
-        )
-
-    # --- Start and goal of a search ----------------------------------------------------------------------------------
-
-    def arrivals(self, goal: Place) -> RoutingEdges:
-        """Returns the edges to a goal: along its cell, and lane changes and U-turns that end before it in its cell."""
-        lane, station = goal
-        cell = self.cell(lane, station)
-        begin = (cell - int(self.first[lane])) * self._sizes[lane]
-        along = RoutingEdges.make(
-            1, source=cell, cost=self._cost(lane, station - begin), lane=lane, leave=station, land=station
-        )
-        return self._up_to(goal, self.manoeuvres, along)
-
-    def departures(self, start: Place, goal: Place | None, obstacles: Iterable[Place]) -> RoutingEdges:
-        """Returns the edges from a start: along its lane, and lane changes and U-turns that begin there.
-
-        Args:
-            start: place of the car.
-            goal: goal, for edges that connect both directly.
-            obstacles: impassable places; in the cell of the start only those ahead count.
-        """
-        lane, station = self._town.lanes[start[0]], start[1]
-        cell = self.cell(*start)
-        ahead = (at for on, at in obstacles if on == start[0] and at >= station and self.cell(on, at) == cell)
-        nearest = min(ahead, default=np.inf)
-        manoeuvres = self._manoeuvres_from(lane, station, nearest)
-        tables = [self._onward(manoeuvres)]
-        if nearest == np.inf:
-            tables.append(self._following(lane, station, cell))
-        if goal is not None:
-            direct = _NONE
-            within = cell == self.cell(*goal) and goal[1] >= station - SLIGHTLY_BEHIND
-            if within and nearest > goal[1]:
-                cost = self._cost(lane.id, goal[1] - station)
-                direct = RoutingEdges.make(1, cost=cost, lane=lane.id, leave=goal[1], land=goal[1])
-            tables.append(self._up_to(goal, manoeuvres, direct))
-        edges = RoutingEdges.join(tables)
-        # obstacles in the cell of the start were already considered by position
-        return replace(edges, source=np.full(len(edges), self.start), first=np.full(len(edges), cell + 1))
-
-    def stand(self, place: Place, source: int | None = None) -> RoutingEdges:
-        """Returns the edges from a stop before a roadblock: the shortest lane change, and a U-turn on the spot.
-
-        Args:
-            place: place of the car. Room on its own lane is assumed; only the other lane is checked for obstacles.
-            source: node at which the edges begin; by default the cell before that of the car, because the road up to
-                the roadblock is closed. No edges if there is no such cell on the lane.
-        """
-        lane = place[0]
-        cell = self.cell(*place)
-        source = cell - 1 if source is None else source
-        if source < self.first[lane]:
-            return _NONE
-        switches = self.departures(place, None, ())
-        kind, shortest = switches.entry, switches.driven < SHORT_CHANGE
-        switches = switches.take(shortest & (kind != LANE_ENTRIES.index(LaneEntry.FOLLOW)) & (kind != _U_TURN))
-        edges = RoutingEdges.join([switches, self.departures(place, None, [place])])
-        count = len(edges)
-        return replace(edges, source=np.full(count, source), first=np.zeros(count, int), last=np.full(count, -1))
-
-    def _manoeuvres_from(self, lane: Lane, station: float, nearest: float) -> RoutingEdges:
-        """Returns the lane changes and U-turns from a station up to the nearest obstacle [m]."""
-        if lane.in_junction:
-            return _NONE
-        changes = self._changes({lane.id: np.array([station])})
-        changes = changes.take(changes.leave + SHARED * changes.driven < nearest)
-        # also from the middle of the cell: just behind a junction there may be no oncoming lane
-        middle = (self.cell(lane.id, station) - int(self.first[lane.id]) + 0.5) * float(self._sizes[lane.id])
-        leaves = [leave for leave in sorted({station, max(station, middle)}) if leave <= nearest]
-        return RoutingEdges.join([changes, self._turn_round((lane.id, station, leave) for leave in leaves)])
-
-    def _following(self, lane: Lane, station: float, cell: int) -> RoutingEdges:
-        """Returns the edges from a place along its lane."""
-        rows = self.edges.take((self.edges.source == cell) & (self.edges.entry == LANE_ENTRIES.index(LaneEntry.FOLLOW)))
-        gone = station - (cell - int(self.first[lane.id])) * self._sizes[lane.id]
-        return replace(rows, cost=np.maximum(rows.cost - gone * self._weights[lane.id], 1e-3))
-
-    def _up_to(self, goal: Place, manoeuvres: RoutingEdges, more: RoutingEdges) -> RoutingEdges:
-        """Returns the edges to a goal: lane changes and U-turns that end before it in its cell, and those in `more`."""
-        lane, station = goal
-        there = manoeuvres.take((manoeuvres.target == self.cell(*goal)) & (manoeuvres.land <= station))
-        edges = RoutingEdges.join([there, more])
-        cost = edges.cost + np.maximum(station - edges.land, 0.0) * self._weights[lane]
-        return replace(edges, cost=cost, target=np.full(len(edges), self.goal))
-
-    def _cost(self, lane: int, distance: float) -> float:
-        """Returns the cost of driving along a lane; always positive, because the search ignores edges without cost."""
-        return max(float(distance * self._weights[lane]), 1e-3)
+    @property
+    def goal(self) -> int:
+        """Node of the goal of a search."""
+        return self.nodes - 1
 
 
-_NONE = RoutingEdges.make(0)
-_U_TURN = LANE_ENTRIES.index(LaneEntry.U_TURN)
+@lru_cache(maxsize=16)
+def routing_graph(town: Town) -> RoutingGraph:
+    """Returns the routing graph of a town; built once for each town."""
+    table, oncoming = LaneTable.of(town.lanes), oncoming_lanes(town)
+    lanes = empty_records(RoutingLane, len(town.lanes))
+    lengths = np.array([lane.length for lane in town.lanes])
+    counts = np.maximum(1, np.round(lengths / CELL)).astype(np.int64)
+    first = np.concatenate(([0], np.cumsum(counts)))
+    lanes["length"], lanes["cells"], lanes["first"], lanes["size"] = lengths, counts, first[:-1], lengths / counts
+    lanes["weight"] = USUAL_SPEED / np.clip([lane.speed_limit for lane in town.lanes], *SPEEDS)
+    lanes["offset"] = np.concatenate(([0.0], np.cumsum(lengths + 1.0)))[:-1]
+    lanes["junction"] = [lane.in_junction for lane in town.lanes]
+    for name, side in (("left", LinkType.LANE_CHANGE_LEFT), ("right", LinkType.LANE_CHANGE_RIGHT)):
+        beside = [town.neighbour(lane.id, side) for lane in town.lanes]
+        lanes[name] = [NONE if lane is None else lane for lane in beside]
+    near = [oncoming.candidates(lane.id) for lane in town.lanes]
+    none, no_rows, no_edges = np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64), empty_records(RoutingEdge, 0)
+    bare = RoutingGraph(
+        lanes, table.points, table.offsets, table.ends, np.concatenate([none, *near]),
+        np.concatenate(([0], np.cumsum([len(each) for each in near]))),
+        no_edges, no_rows, none, no_rows, no_edges, no_rows,
+    )  # fmt: skip
+    cells = int(first[-1])
+    nodes = cells + len(lanes) + 2
+    manoeuvres = empty_records(RoutingEdge, 7 * cells)
+    manoeuvres = manoeuvres[: find_manoeuvres(bare, manoeuvres)]
+    following = _following(town, bare, cells)
+    edges = empty_records(RoutingEdge, len(following) + len(manoeuvres))
+    edges[: len(following)], edges[len(following) :] = following, manoeuvres
+    drive_on(bare, edges, len(following), len(edges), cells)
+    edges = cheapest(edges)
+    manoeuvres = manoeuvres[np.argsort(manoeuvres["target"], kind="stable")]
+    incoming = np.argsort(edges["target"], kind="stable")
+    return bare._replace(
+        edges=edges,
+        rows=_rows(edges["source"], nodes),
+        incoming=incoming,
+        incoming_rows=_rows(edges["target"][incoming], nodes),
+        manoeuvres=manoeuvres,
+        manoeuvre_rows=_rows(manoeuvres["target"], nodes),
+    )
 
 
-def _project(lane: Lane, positions: Array) -> tuple[Array, Array]:
-    """Projects positions (n, 2) onto a lane: station (n,) and distance (n,) [m]."""
-    a, d = lane.points[:-1, :2], np.diff(lane.points[:, :2], axis=0)
-    to = positions[:, None, :] - a  # (n, segments, 2)
-    t = np.clip(np.einsum("nsk,sk->ns", to, d) / np.einsum("sk,sk->s", d, d), 0.0, 1.0)
-    away = np.linalg.norm(to - t[..., None] * d, axis=2)
-    best = np.argmin(away, axis=1)
-    row = np.arange(len(positions))
-    along = lane.stations[best] + t[row, best] * np.diff(lane.stations)[best]
-    return along, away[row, best]
+def _following(town: Town, graph: RoutingGraph, cells: int) -> RecordArray[RoutingEdge]:
+    """Returns the edges between successive cells of each lane, and from the end of a lane to its successors.
+
+    The latter begin in the last cell and in the tail of the lane, and end in the first cells of the successors.
+    """
+    lanes = graph.lanes
+    owner = np.repeat(np.arange(len(lanes)), lanes["cells"])
+    inner = np.ones(cells, dtype=np.bool_)
+    inner[lanes["first"] + lanes["cells"] - 1] = False
+    within = np.flatnonzero(inner)
+    links = [link for link in town.links if not link.type.is_lane_change]
+    source = np.array([link.source for link in links], dtype=np.int64)
+    target = np.array([link.target for link in links], dtype=np.int64)
+    turn = np.array([TURN_COST[link.type] for link in links])
+    edges = empty_records(RoutingEdge, len(within) + 2 * len(links))
+    edges["last"] = edges["until"] = NONE
+    along, across_ends = edges[: len(within)], edges[len(within) :]
+    ends, tails = across_ends[: len(links)], across_ends[len(links) :]
+    lane = owner[within]
+    along["source"], along["target"], along["lane"] = within, within + 1, lane
+    along["leave"] = along["land"] = (within + 1 - lanes["first"][lane]) * lanes["size"][lane]
+    along["cost"] = lanes["size"][lane] * lanes["weight"][lane]
+    ends["source"] = lanes["first"][source] + lanes["cells"][source] - 1
+    ends["cost"] = lanes["size"][source] * lanes["weight"][source] + turn
+    tails["source"], tails["cost"] = cells + source, np.maximum(turn, LEAST_COST)
+    for crossing in (ends, tails):
+        crossing["target"], crossing["lane"] = lanes["first"][target], target
+        crossing["leave"] = lanes["length"][source]
+    return edges
+
+
+def cheapest(edges: RecordArray[RoutingEdge]) -> RecordArray[RoutingEdge]:
+    """Returns only the cheapest edge between each pair of nodes, the first of equal ones, by source and target."""
+    if not len(edges):
+        return edges
+    order = np.lexsort((edges["cost"], edges["target"], edges["source"]))
+    source, target = edges["source"][order], edges["target"][order]
+    new = (source[1:] != source[:-1]) | (target[1:] != target[:-1])
+    return edges[order[np.concatenate(([True], new))]]
+
+
+def joined(*tables: RecordArray[RoutingEdge]) -> RecordArray[RoutingEdge]:
+    """Concatenates tables of edges."""
+    edges = np.concatenate([empty_records(RoutingEdge, 0), *tables])
+    return cast("RecordArray[RoutingEdge]", edges.astype(record_dtype(RoutingEdge), copy=False).view(np.recarray))
+
+
+def _rows(keys: NDArray[np.int32], nodes: int) -> IntArray:
+    return np.searchsorted(keys, np.arange(nodes + 1)).astype(np.int64)
+
+
+# --- Geometry ---------------------------------------------------------------------------------------------------------
+
+
+@compiled
+def cell_at(graph: RoutingGraph, lane: int, station: float) -> int:
+    """Returns the cell that contains a place."""
+    row = graph.lanes[lane]
+    return int(row.first) + min(max(int(station / row.size), 0), int(row.cells) - 1)
+
+
+@compiled
+def oncoming_at(graph: RoutingGraph, lane: int, station: float) -> tuple[int, float, float]:
+    """Returns the opposite point on the oncoming lane: lane (-1: none), station [m] and distance [m]."""
+    near = graph.near[graph.near_rows[lane] : graph.near_rows[lane + 1]]
+    return across(graph.points, graph.offsets, graph.ends, lane, station, near)
+
+
+@compiled
+def _position(graph: RoutingGraph, lane: int, station: float) -> tuple[float, float]:
+    """Returns the position on a centre line [m], interpolated as by `np.interp` on all lanes in one row."""
+    points, offset = graph.points, graph.lanes[lane].offset
+    at = offset + station
+    low, high = graph.offsets[lane], graph.offsets[lane + 1]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if points[middle, 2] + offset <= at:
+            low = middle
+        else:
+            high = middle
+    begin = points[low, 2] + offset
+    if begin == at or high == len(points):
+        return points[low, 0], points[low, 1]
+    # rounded, a station may lie behind the end of the lane: in the gap before the next one
+    end = points[high, 2] + (offset if high < graph.offsets[lane + 1] else graph.lanes[lane + 1].offset)
+    width, ahead = end - begin, at - begin
+    x = (points[high, 0] - points[low, 0]) / width * ahead + points[low, 0]
+    y = (points[high, 1] - points[low, 1]) / width * ahead + points[low, 1]
+    return x, y
+
+
+@compiled
+def _project(graph: RoutingGraph, lane: int, x: float, y: float) -> tuple[float, float]:
+    """Returns station and distance of the point of a centre line that is closest to a position [m]."""
+    points = graph.points
+    along, away = 0.0, math.inf
+    for k in range(graph.offsets[lane], graph.offsets[lane + 1] - 1):
+        dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
+        tx, ty = x - points[k, 0], y - points[k, 1]
+        share = min(max((tx * dx + ty * dy) / (dx * dx + dy * dy), 0.0), 1.0)
+        ex, ey = tx - share * dx, ty - share * dy
+        gap = math.sqrt(ex * ex + ey * ey)
+        if gap < away:
+            away = gap
+            along = points[k, 2] + share * (points[k + 1, 2] - points[k, 2])
+    return along, away
+
+
+# --- Lane changes and U-turns -----------------------------------------------------------------------------------------
+
+
+@compiled
+def find_manoeuvres(graph: RoutingGraph, edges: RecordArray[RoutingEdge]) -> int:
+    """Writes the lane changes and U-turns from the starts of all cells outside junctions; returns their number.
+
+    A U-turn begins in the middle of its cell.
+    """
+    count = 0
+    for lane in range(len(graph.lanes)):
+        row = graph.lanes[lane]
+        for entry in (CHANGE_LEFT, CHANGE_RIGHT):
+            for k in range(0 if row.junction else row.cells):
+                count = add_changes(graph, lane, entry, k * row.size, edges, count)
+    for lane in range(len(graph.lanes)):
+        row = graph.lanes[lane]
+        for k in range(0 if row.junction else row.cells):
+            begin = k * row.size
+            count = add_u_turn(graph, lane, begin, begin + 0.5 * row.size, edges, count)
+    return count
+
+
+@compiled
+def add_changes(
+    graph: RoutingGraph, lane: int, entry: int, begin: float, edges: RecordArray[RoutingEdge], count: int
+) -> int:
+    """Adds lane changes of three lengths to one side from a station [m]; returns the number of edges."""
+    row = graph.lanes[lane]
+    beside = int(row.left) if entry == CHANGE_LEFT else int(row.right)
+    if beside == NONE:
+        return count
+    for k in range(3):
+        road, room = SHORT_CHANGE, row.length - begin
+        if k == 1:
+            road = (SHORT_CHANGE + CHANGE_LENGTH) / 2
+        elif k == 2:
+            road = min(CHANGE_LENGTH, room)  # the longest is limited by the rest of the lane
+        if SHORT_CHANGE <= road <= room:
+            count = _add_change(graph, lane, beside, entry, begin, road, edges, count)
+    return count
+
+
+@compiled
+def _add_change(
+    graph: RoutingGraph, lane: int, beside: int, entry: int, begin: float, road: float,
+    edges: RecordArray[RoutingEdge], count: int,
+) -> int:  # fmt: skip
+    """Adds a lane change of length `road` [m] if the lanes lie side by side there."""
+    leave, end = begin + CHANGE_LEAD, begin + road
+    x, y = _position(graph, lane, leave)
+    landing, first_gap = _project(graph, beside, x, y)
+    x, y = _position(graph, lane, end)
+    land, last_gap = _project(graph, beside, x, y)
+    if not (first_gap < MAX_ASIDE and last_gap < MAX_ASIDE):
+        return count
+    weight, edge = graph.lanes[lane].weight, edges[count]
+    edge.source, edge.target = cell_at(graph, lane, begin), cell_at(graph, beside, land)
+    edge.cost = road * weight + CHANGE_COST + 2.0 * (CHANGE_LENGTH - road) + LATE_CHANGE * begin
+    edge.entry, edge.lane, edge.leave, edge.land, edge.driven = entry, beside, leave, land, end - leave
+    edge.first, edge.last = edge.source, cell_at(graph, lane, leave + SHARED * (end - leave))
+    edge.onto, edge.until = cell_at(graph, beside, land - SHARED * (land - landing)), edge.target
+    return count + 1
+
+
+@compiled
+def add_u_turn(
+    graph: RoutingGraph, lane: int, begin: float, leave: float, edges: RecordArray[RoutingEdge], count: int
+) -> int:
+    """Adds a U-turn at a station `leave`, if there is an oncoming lane with sufficient length behind it.
+
+    Args:
+        graph: the routing graph.
+        lane: lane before the U-turn.
+        begin: station from which the cost counts [m].
+        leave: station at which the U-turn begins [m].
+        edges: where it is added.
+        count: number of edges there.
+
+    Returns:
+        The number of edges.
+    """
+    other, station, _ = oncoming_at(graph, lane, leave)
+    if other < 0 or not graph.lanes[other].length - station > CELL:
+        return count
+    edge, weight = edges[count], graph.lanes[other].weight
+    edge.source, edge.target = cell_at(graph, lane, begin), cell_at(graph, other, station + U_TURN_REST)
+    edge.cost = (leave - begin) * graph.lanes[lane].weight + U_TURN_LENGTH + U_TURN_COST + U_TURN_REST * weight
+    edge.entry, edge.lane, edge.leave, edge.land = U_TURN, other, leave, station + U_TURN_REST
+    edge.driven = U_TURN_LENGTH + U_TURN_REST
+    edge.first, edge.last = 0, NONE
+    edge.onto, edge.until = cell_at(graph, other, station), edge.target
+    return count + 1
+
+
+@compiled
+def drive_on(graph: RoutingGraph, edges: RecordArray[RoutingEdge], first: int, last: int, cells: int) -> None:
+    """Extends lane changes and U-turns to the start of the next cell, or to the tail of the lane."""
+    for k in range(first, last):
+        edge = edges[k]
+        lane = graph.lanes[edge.lane]
+        beyond = edge.target + 1 - lane.first
+        if beyond == lane.cells:
+            edge.target, ahead = cells + edge.lane, lane.length
+        else:
+            edge.target, ahead = edge.target + 1, beyond * lane.size
+        edge.cost += (ahead - edge.land) * lane.weight

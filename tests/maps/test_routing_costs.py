@@ -8,8 +8,9 @@ import pytest
 
 from dorothie_gym.maps import Lane, LinkType, Town
 from dorothie_gym.maps.routing import CHANGE_COST, TURN_COST, LaneEntry, Router, router
-from dorothie_gym.maps.routing_graph import SPEEDS, USUAL_SPEED, CellGraph, RoutingEdges
-from tests.maps.routes import Points, pairs, small_town, two_lanes
+from dorothie_gym.maps.routing_graph import SPEEDS, USUAL_SPEED
+from tests.maps.reference_routing import ReferenceGraph, ReferenceRouter, RoutingEdges
+from tests.maps.routes import Place, Points, pairs, small_town, two_lanes
 from tests.sim.driving import network
 
 
@@ -27,13 +28,42 @@ def bellman_ford(moves: RoutingEdges, source: int) -> dict[int, float]:
 
 def test_costs_are_those_of_a_plain_search() -> None:
     town = network("brookside").town
-    search, graph = Router(town), CellGraph(town)
+    search, graph = Router(town), ReferenceGraph(town)
     for start, goal in pairs(town, 6, seed=3):
         ends = [graph.departures(start, goal, ()), graph.arrivals(goal)]
         cost = bellman_ford(RoutingEdges.join([graph.edges, *ends]), graph.start)
         route = search.route(start, goal)
         assert route is not None
         assert route.cost == pytest.approx(cost[graph.goal])
+
+
+@pytest.mark.parametrize("name", ["brookside", "midtown", "Town05"])
+def test_routes_and_distances_are_those_of_scipy(name: str) -> None:
+    town = network(name).town
+    search, reference = Router(town), ReferenceRouter(town)
+    rng, sites = np.random.default_rng(4), [(site.lane, site.station) for site in town.sites]
+
+    def place() -> Place:
+        lane = town.lanes[int(rng.integers(len(town.lanes)))]
+        return lane.id, float(rng.choice([0.0, rng.uniform(0.0, lane.length), lane.length], p=[0.1, 0.8, 0.1]))
+
+    for k in range(150):
+        start, goal = place(), place() if k % 2 else sites[k % len(sites)]
+        blocked = [place() for _ in range(int(rng.choice([0, 0, 1, 3, 12])))]
+        if k % 3 == 0:  # in or just before the cell of the start, and a goal on its lane
+            length = town.lanes[start[0]].length
+            blocked.append((start[0], min(start[1] + float(rng.uniform(-5.0, 15.0)), length)))
+            goal = start[0], float(rng.uniform(0.0, length))
+        route, expected = search.route(start, goal, blocked), reference.route(start, goal, blocked)
+        assert (route is None) == (expected is None)
+        if route is not None and expected is not None:
+            assert [(leg.lane, leg.entry) for leg in route.legs] == [(leg.lane, leg.entry) for leg in expected.legs]
+            stations = [[(leg.start, leg.end) for leg in found.legs] for found in (route, expected)]
+            np.testing.assert_allclose(stations[0], stations[1], rtol=0, atol=1e-9)
+            assert (route.length, route.cost) == pytest.approx((expected.length, expected.cost), abs=1e-9)
+        if k % 5 == 0:
+            distances = search.distances_to(goal, blocked)
+            np.testing.assert_allclose(distances, reference.distances_to(goal, blocked), rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["brookside", "Town05"])
