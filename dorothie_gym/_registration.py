@@ -87,12 +87,14 @@ def environments() -> Iterator[RegisteredEnvironment]:
     yield RegisteredEnvironment(
         name="Navigation-v0",
         entry_point=f"{_ENVS}.navigation_v0:NavigationEnv",
+        vector_entry_point=f"{_ENVS}.navigation_vector_env:NavigationVectorEnv",
         description="Drive with given directions, by discrete actions.",
         reward_threshold=DRIVING_SOLVED,
     )
     yield RegisteredEnvironment(
         name="Navigation-continuous-v0",
         entry_point=f"{_ENVS}.navigation_continuous_v0:NavigationContinuousEnv",
+        vector_entry_point=f"{_ENVS}.navigation_continuous_vector_env:NavigationContinuousVectorEnv",
         description="Drive with given directions, by throttle, steering and brake.",
     )
     for name, verb in _TASKS:

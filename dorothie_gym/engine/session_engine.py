@@ -25,7 +25,7 @@ from dorothie_gym.ontology import AGENT_ROLES, NAVIGATION_ACTIONS, ExceptionKind
 from dorothie_gym.recording import Event, EventType, SessionHeader
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.infractions import INFRACTION_KINDS
-from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import (
     ActionDecoder,
@@ -322,7 +322,7 @@ class SessionEngine(Restorable):
         self.config = config or EnvConfig()
         self.max_cycles = max_cycles
         self.limits = SpaceLimits.for_town(self.town)
-        self._network = TownNetwork(self.town)
+        self._network = network_of(self.town)
         self._decoders = {str(role): (role, ActionDecoder(role, self.limits)) for role in AGENT_ROLES}
         self._seeds = np.random.default_rng()
         self._session: LiveSession | None = None

@@ -38,7 +38,7 @@ from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
-from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import (
     ActionDecoder,
@@ -276,7 +276,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
         self._shown: NavigationInstruction | None = None
         self.town = town if isinstance(town, Town) else load_town(town)
         self.template = template_option(storyboard)
-        self._network = TownNetwork(self.town)
+        self._network = network_of(self.town)
         self._drive: DrivingSession | None = None
         self._controls: NavigationMask | None = None
 

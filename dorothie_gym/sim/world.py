@@ -19,7 +19,7 @@ from dorothie_gym.sim.ego.obstacles import Hazard, PerceivedBody
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car, CarRecord
 from dorothie_gym.sim.infractions import WorldEvent, WorldEventLog
-from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.population import add_car
 from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.sensing.localizer import Localizer, switch_on
@@ -100,7 +100,7 @@ class World(Lookups, Restorable):
         """
         chance_seed, crowd_seed, locate_seed, perceive_seed, wind_seed = seed.spawn(5)
         self.town, self.config = town, config
-        self.network = network or TownNetwork(town)
+        self.network = network or network_of(town)
         self._arrays = town_arrays(self.network)
         lane, station = departure
         state = empty_world(

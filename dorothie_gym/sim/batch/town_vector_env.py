@@ -40,13 +40,14 @@ from dorothie_gym.sim.batch.egos import (
     play_share,
 )
 from dorothie_gym.sim.batch.worlds import VectorWorld
-from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.population import add_vehicle, free_places
 from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.records import RecordArray, empty_records
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.town_env import SEEDS, TownConfig, TownEnv, config_with_town, finite, populate_around
+from dorothie_gym.vector_infos import Infos, mask_of, masked_infos, seeds_of
 
 ActionArray: TypeAlias = "NDArray[np.int64] | NDArray[np.float32]"
 """Meta actions (n,), or continuous actions (n, 1 or 2) in [-1, 1]."""
@@ -243,7 +244,7 @@ class TownVectorEnv(Restorable, VectorEnv[NDArray[np.float32], ActionArray, NDAr
         self.single_observation_space = finite(self._kinematics.space)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._network = TownNetwork(load_town(self.config["town"]))
+        self._network = network_of(load_town(self.config["town"]))
         self._town = town_arrays(self._network)
         self._worlds = VectorWorld(self._town, self._empty(0), num_envs, threads=threads)
         self._egos = self._make_egos()
@@ -300,14 +301,10 @@ class TownVectorEnv(Restorable, VectorEnv[NDArray[np.float32], ActionArray, NDAr
             ValueError: not one seed for each environment, a mask of the wrong shape or type, or other options.
         """
         options = dict(options or {})
-        mask = options.pop("reset_mask", None)
+        mask = mask_of(options.pop("reset_mask", None), self.num_envs)
         if options:
             raise ValueError(f'options {sorted(options)} are understood with vectorization_mode="sync" only')
-        if mask is None:
-            mask = np.ones(self.num_envs, dtype=np.bool_)
-        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
-            raise ValueError(f"reset_mask must be a bool array of the shape ({self.num_envs},)")
-        seeds = self._seeds_of(seed)
+        seeds = seeds_of(seed, self.num_envs)
         for i in np.flatnonzero(mask):
             self._begin(int(i), seeds[int(i)])
         return self._observe(mask), self._infos(mask, np.zeros(self.action_space.shape or (), self.action_space.dtype))
@@ -345,15 +342,6 @@ class TownVectorEnv(Restorable, VectorEnv[NDArray[np.float32], ActionArray, NDAr
         if mode is AutoresetMode.SAME_STEP and self._over.any():
             observations, infos = self._begin_at_once(observations, actions)
         return observations, rewards, terminations, truncations, infos
-
-    def _seeds_of(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, (int, np.integer)):
-            return [int(seed) + i for i in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise ValueError(f"{len(seed)} seeds for {self.num_envs} environments")
-        return seed
 
     def _begin_at_once(
         self, last: NDArray[np.float32], actions: ActionArray
@@ -455,24 +443,12 @@ class TownVectorEnv(Restorable, VectorEnv[NDArray[np.float32], ActionArray, NDAr
     def _infos(self, mask: NDArray[np.bool_], actions: NDArray[np.generic]) -> dict[str, object]:
         """Returns the infos of `SyncVectorEnv`, for the environments of a mask."""
         outcomes = self._egos.outcomes
-        values: dict[str, NDArray[np.generic]] = {
+        values: dict[str, NDArray[np.generic] | Infos] = {
             "speed": outcomes["speed"],
             "crashed": outcomes["crashed"],
             "action": actions,
         }
-        infos: dict[str, object] = {"rewards": _with_masks(self._terms(), mask), "_rewards": mask.copy()}
-        return {**_with_masks(values, mask), **infos}
-
-
-def _with_masks(values: Mapping[str, NDArray[np.generic]], mask: NDArray[np.bool_]) -> dict[str, object]:
-    """Returns the values of the environments of a mask, zeros elsewhere, and under `_name` the mask of each."""
-    infos: dict[str, object] = {}
-    for name, value in values.items():
-        masked = np.zeros_like(value)
-        masked[mask] = value[mask]
-        infos[name] = masked
-        infos[f"_{name}"] = mask.copy()
-    return infos
+        return masked_infos({**values, "rewards": masked_infos(self._terms(), mask)}, mask)
 
 
 def _without(actions: ActionArray, mask: NDArray[np.bool_]) -> ActionArray:

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections import defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -340,3 +341,9 @@ def _line_types(town: Town, lane: Lane) -> list[int]:
         LineType.CONTINUOUS if left is None else LineType.STRIPED,
         LineType.CONTINUOUS if right is None else LineType.NONE,
     ]
+
+
+@lru_cache(maxsize=16)
+def network_of(town: Town) -> TownNetwork:
+    """Returns the network of a town; built once for each town."""
+    return TownNetwork(town)

@@ -1,0 +1,65 @@
+"""Vectorised `Navigation-continuous-v0`, the result of `gymnasium.make_vec`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from dorothie_gym.action_values import real_numbers
+from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv, Towns
+from dorothie_gym.envs.navigation_config import NavigationWeights
+from dorothie_gym.envs.navigation_continuous_v0 import CONTROL_SPECS, NavigationContinuousEnv
+from dorothie_gym.maps import Town
+from dorothie_gym.tasks import StoryboardTemplate
+
+
+class NavigationContinuousVectorEnv(DrivingVectorEnv[NavigationContinuousEnv]):
+    """Vectorised `NavigationContinuousEnv`: observations, rewards and infos are those of single environments.
+
+    ## Observation Space
+    `Box(-1, 1, (num_envs, n), float32)`, see `NavigationContinuousEnv`.
+
+    ## Action Space
+    `Box(-1, 1, (num_envs, 3), float32)`: throttle, steer and brake of each environment.
+
+    ## Episode End
+    As `NavigationContinuousEnv`, with the autoreset modes of `NavigationVectorEnv`.
+
+    ## Arguments
+    `num_envs`, `town`, `autoreset_mode` and `render_mode` as in `NavigationVectorEnv`, the others as in
+    `NavigationContinuousEnv`.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        town: Towns = "brookside",
+        storyboard: str | Path | StoryboardTemplate | None = None,
+        *,
+        traffic: str = "light",
+        exceptions: float = 0.0,
+        reward: str | NavigationWeights = "dense",
+        max_seconds: float = 600.0,
+        patience: float = 60.0,
+        decision_frequency: float = 10.0,
+        render_mode: str | None = None,
+        view: str = "role",
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    ) -> None:
+        def make(town: str | Path | Town) -> NavigationContinuousEnv:
+            return NavigationContinuousEnv(
+                town, storyboard, traffic=traffic, exceptions=exceptions, reward=reward, max_seconds=max_seconds,
+                patience=patience, decision_frequency=decision_frequency, render_mode=render_mode, view=view,
+            )  # fmt: skip
+
+        super().__init__(make, num_envs, town, render_mode, autoreset_mode)
+
+    def _checked(self, actions: object) -> NDArray[np.float64]:
+        shape = self.num_envs, len(CONTROL_SPECS)
+        return real_numbers("actions", actions, shape, f"finite numbers {shape}: throttle, steer, brake of each")

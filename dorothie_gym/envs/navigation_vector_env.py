@@ -1,0 +1,86 @@
+"""Vectorised `Navigation-v0`, the result of `gymnasium.make_vec`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from dorothie_gym.action_values import as_array
+from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv, Towns
+from dorothie_gym.envs.navigation_config import NavigationWeights
+from dorothie_gym.envs.navigation_v0 import NavigationEnv
+from dorothie_gym.errors import short_repr
+from dorothie_gym.maps import Town
+from dorothie_gym.policies.navigation.actions import ACTIONS
+from dorothie_gym.policies.navigation.instructor import Guidance
+from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.vector_infos import Infos, masked_infos
+
+
+class NavigationVectorEnv(DrivingVectorEnv[NavigationEnv]):
+    """Vectorised `NavigationEnv`: observations, rewards, masks and infos are those of single environments.
+
+    ## Observation Space
+    `Box(-1, 1, (num_envs, 161), float32)`, see `NavigationEnv`.
+
+    ## Action Space
+    `MultiDiscrete([18] * num_envs)`. `infos["action_mask"]` (num_envs, 18) marks the feasible actions, and so does
+    `action_masks()`, which sb3-contrib calls.
+
+    ## Episode End
+    As `NavigationEnv`. `metadata["autoreset_mode"]` selects the reset: by default an environment that ended is reset by
+    the next step, whose action it ignores.
+
+    ## Arguments
+    - `num_envs`: how many environments.
+    - `town`: a town as in `NavigationEnv`, or a sequence of them, which the environments play in turn.
+    - `autoreset_mode`: Gymnasium's. `options["reset_mask"]` of `reset` resets some environments only.
+    - `render_mode`: None or `"rgb_array"`; `render()` draws the first environment, `render_one(number)` any.
+    - The others as in `NavigationEnv`.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        town: Towns = "brookside",
+        storyboard: str | Path | StoryboardTemplate | None = None,
+        *,
+        guidance: Guidance | str = Guidance.TURNS,
+        traffic: str = "light",
+        exceptions: float = 0.0,
+        reward: str | NavigationWeights = "dense",
+        max_seconds: float = 600.0,
+        patience: float = 60.0,
+        render_mode: str | None = None,
+        view: str = "role",
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    ) -> None:
+        def make(town: str | Path | Town) -> NavigationEnv:
+            return NavigationEnv(
+                town, storyboard, guidance=guidance, traffic=traffic, exceptions=exceptions, reward=reward,
+                max_seconds=max_seconds, patience=patience, render_mode=render_mode, view=view,
+            )  # fmt: skip
+
+        super().__init__(make, num_envs, town, render_mode, autoreset_mode)
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Returns which actions are feasible now (num_envs, 18)."""
+        return np.stack([env.action_masks() for env in self._envs])
+
+    def _checked(self, actions: object) -> NDArray[np.int64]:
+        found = as_array("actions", actions)
+        if found.shape != (self.num_envs,) or found.dtype.kind not in "iu":
+            raise ValueError(f"actions is {short_repr(found)}; it must be {self.num_envs} whole numbers")
+        if found.min() < 0 or found.max() >= len(ACTIONS):
+            raise ValueError(f"actions is {short_repr(found)}; the numbers must be in 0..{len(ACTIONS) - 1}")
+        return found.astype(np.int64)
+
+    def _infos(self, mask: NDArray[np.bool_]) -> Infos:
+        masks = self.action_masks().astype(np.int8)
+        return {**masked_infos({"action_mask": masks}, mask), **super()._infos(mask)}

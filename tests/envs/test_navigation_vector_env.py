@@ -1,0 +1,171 @@
+"""Vectorised navigation environments against single ones that Gymnasium's `SyncVectorEnv` steps."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from dorothie_gym.envs.navigation_v0 import NavigationEnv
+from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
+from tests.envs.navigation_drivers import drive, obey
+
+NAVIGATION, CONTINUOUS = "dorothie_gym/Navigation-v0", "dorothie_gym/Navigation-continuous-v0"
+SHORT = {"max_seconds": 40.0, "patience": 20.0}
+
+
+def check_equal(found: Any, expected: Any, path: str = "") -> None:
+    """Compares values, types, shapes and dtypes."""
+    assert type(found) is type(expected), path
+    if isinstance(expected, dict):
+        assert found.keys() == expected.keys(), path
+        for name in expected:
+            check_equal(found[name], expected[name], f"{path}.{name}")
+    elif isinstance(expected, list | tuple) or (isinstance(expected, np.ndarray) and expected.dtype == np.object_):
+        for one, two in zip(found, expected, strict=True):
+            check_equal(one, two, path)
+    elif isinstance(expected, np.ndarray):
+        assert (found.dtype, found.shape) == (expected.dtype, expected.shape), path
+        np.testing.assert_array_equal(found, expected, err_msg=path)
+    else:
+        assert found == expected, path
+
+
+def play_both(name: str, mode: AutoresetMode, actions: Any, steps: int, **settings: Any) -> int:
+    """Plays the same actions in both kinds of batches of three; returns the number of episodes that ended."""
+    native = gym.make_vec(name, num_envs=3, autoreset_mode=mode, **settings)
+    plain = gym.make_vec(
+        name, num_envs=3, vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode}, **settings
+    )
+    check_equal(native.reset(seed=5), plain.reset(seed=5))
+    rng, ended = np.random.default_rng(3), 0
+    for _ in range(steps):
+        chosen = actions(rng)
+        outcome = native.step(chosen)
+        check_equal(outcome, plain.step(chosen))
+        over = outcome[2] | outcome[3]
+        ended += int(over.sum())
+        if mode is AutoresetMode.DISABLED and over.any():
+            options = {"reset_mask": over}
+            check_equal(native.reset(options=dict(options)), plain.reset(options=dict(options)))
+    native.close()
+    plain.close()
+    return ended
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_batch_is_equal_to_single_environments(mode: AutoresetMode) -> None:
+    assert play_both(NAVIGATION, mode, lambda rng: rng.integers(0, 18, 3), 160, **SHORT) >= 4
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_batch_with_pedals_is_equal_to_single_environments(mode: AutoresetMode) -> None:
+    def pedals(rng: np.random.Generator) -> np.ndarray:
+        return rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
+
+    assert play_both(CONTINUOUS, mode, pedals, 450, **SHORT) >= 3
+
+
+@pytest.mark.parametrize(
+    "settings", [{"guidance": "goals", "exceptions": 3.0}, {"town": "midtown", "traffic": "medium"}]
+)
+def test_settings_are_those_of_the_single_environment(settings: dict[str, Any]) -> None:
+    play_both(NAVIGATION, AutoresetMode.NEXT_STEP, lambda rng: rng.integers(0, 18, 3), 40, **SHORT, **settings)
+
+
+def test_environment_does_not_depend_on_its_place_in_the_batch() -> None:
+    alone = NavigationVectorEnv(1, max_seconds=20.0)
+    among = NavigationVectorEnv(7, max_seconds=20.0)
+    one, _ = alone.reset(seed=9)
+    all_of_them, _ = among.reset(seed=5)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        np.testing.assert_array_equal(one[0], all_of_them[4])
+        actions = rng.integers(0, 18, 7)
+        one, reward, *_ = alone.step(actions[4:5])
+        all_of_them, rewards, *_ = among.step(actions)
+        assert reward[0] == rewards[4]
+
+
+def test_several_towns_are_played_in_turn() -> None:
+    env = NavigationVectorEnv(5, ["brookside", "millbrook"])
+    observations, _ = env.reset(seed=3)
+    for number, town in enumerate(("brookside", "millbrook", "brookside", "millbrook", "brookside")):
+        alone, _ = NavigationEnv(town).reset(seed=3 + number)
+        np.testing.assert_array_equal(observations[number], alone)
+
+
+def test_masks_are_those_of_infos() -> None:
+    env = NavigationVectorEnv(4)
+    _, infos = env.reset(seed=1)
+    for _ in range(20):
+        np.testing.assert_array_equal(env.action_masks(), infos["action_mask"].astype(bool))
+        rng = np.random.default_rng(2)
+        _, _, _, _, infos = env.step(np.array([rng.choice(np.flatnonzero(mask)) for mask in env.action_masks()]))
+        assert not any(infos["refused"])
+
+
+def test_obedient_driver_succeeds_in_a_batch() -> None:
+    env = NavigationVectorEnv(2, autoreset_mode=AutoresetMode.DISABLED)
+    observations, infos = env.reset(seed=0)
+    outcomes: dict[int, bool] = {}
+    while len(outcomes) < 2:
+        actions = np.array([obey(*pair) for pair in zip(observations, infos["action_mask"], strict=True)])
+        observations, _, terminated, truncated, infos = env.step(actions)
+        for number in np.flatnonzero(terminated | truncated).tolist():
+            outcomes[number] = bool(infos["is_success"][number])
+            observations, infos = env.reset(seed=0, options={"reset_mask": terminated | truncated})
+            infos["action_mask"] = env.action_masks()
+    assert outcomes == {seed: drive(NavigationEnv(), obey, seed)["is_success"] for seed in (0, 1)}
+
+
+def test_states_of_a_batch_are_restored() -> None:
+    env = NavigationVectorEnv(2, max_seconds=30.0)
+    env.reset(seed=4)
+    rng = np.random.default_rng(1)
+    actions = rng.integers(0, 18, (90, 2))
+    for action in actions[:20]:
+        env.step(action)
+    state, twin = env.clone_state(), copy.deepcopy(env)
+    first = [env.step(action) for action in actions[20:]]
+    env.restore_state(state)
+    check_equal(first, [env.step(action) for action in actions[20:]])
+    check_equal(first, [twin.step(action) for action in actions[20:]])
+
+
+def test_any_environment_is_drawn() -> None:
+    env = NavigationVectorEnv(2, render_mode="rgb_array", view="session")
+    env.reset(seed=6)
+    (frame,) = env.render() or ()
+    other = env.render_one(1)
+    assert other is not None and frame.shape == other.shape == (800, 1280, 3)
+    assert (frame != other).any()
+
+
+def test_mistakes_are_explained() -> None:
+    with pytest.raises(ValueError, match="num_envs is 0"):
+        NavigationVectorEnv(0)
+    with pytest.raises(ValueError, match="town is an empty sequence"):
+        NavigationVectorEnv(2, [])
+    with pytest.raises(ValueError, match="None or 'rgb_array'"):
+        NavigationVectorEnv(2, render_mode="human")
+    env = NavigationVectorEnv(2, max_seconds=10.0, autoreset_mode="Disabled")
+    with pytest.raises(gym.error.ResetNeeded, match=r"environments \[0, 1\] wait for a reset"):
+        env.step(np.array([0, 0]))
+    env.reset(seed=1)
+    for actions, message in (([0], "2 whole numbers"), ([0.5, 1.0], "2 whole numbers"), ([0, 18], r"in 0\.\.17")):
+        with pytest.raises(ValueError, match=message):
+            env.step(np.array(actions))
+    with pytest.raises(ValueError, match="reset_mask"):
+        env.reset(options={"reset_mask": [True, False]})
+    with pytest.raises(ValueError, match="3 seeds for 2 environments"):
+        env.reset(seed=[1, 2, 3])
+    for _ in range(20):
+        _, _, _, truncated, _ = env.step(np.array([0, 0]))
+    assert truncated.all()
+    with pytest.raises(gym.error.ResetNeeded, match="wait for a reset"):
+        env.step(np.array([0, 0]))
