@@ -104,7 +104,7 @@ def _compile_rare() -> None:
         closest_walk.compile_for(town, Footway.STREET, 0.0, 0.0, 0.0)
     search = router(load_town(TOWN))
     search.reachable((0, 0.0))
-    search.distances_to((0, 0.0))
+    search.costs_to((0, 0.0))
     TownNetwork(load_town(TOWN)).lane_of(0).local_coordinates(np.zeros(2))
 
 

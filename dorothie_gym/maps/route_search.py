@@ -220,7 +220,18 @@ def find_costs(
     graph: RoutingGraph, search: RouteSearch, lane: int, station: float, blocked: RecordArray[PlaceRecord], count: int,
     costs: Array,
 ) -> None:  # fmt: skip
-    """Writes the cost from the start of each cell to a goal to `costs` (cells,) [m]; infinite without a route."""
+    """Writes the costs to a goal [m]; infinite without a route.
+
+    Args:
+        graph: the routing graph.
+        search: scratch space.
+        lane: lane of the goal.
+        station: station of the goal [m].
+        blocked: impassable places.
+        count: number of impassable places.
+        costs: (cells + lanes,) gets the costs from the starts of the cells; from the ends of the lanes, the costs from
+            the starts of the lanes behind, without the turn.
+    """
     _prepare(graph, search, blocked, count, True)
     search.result[0].extra = _add_arrivals(graph, search, 0, lane, station)
     _drop_closed(search, count)
@@ -238,9 +249,14 @@ def find_costs(
             if count == 0 or _is_clear(search.closed, graph.edges, k):
                 size = _reach(search, size, graph.edges[k].source, k, cost + graph.edges[k].cost)
     _prepare(graph, search, blocked, count, False)
-    for cell in range(len(costs)):
-        node = search.nodes[cell]
-        costs[cell] = node.cost if node.place == SETTLED else math.inf
+    cells = len(costs) - len(graph.lanes)
+    for cell in range(cells):
+        reached = search.nodes[cell]
+        costs[cell] = reached.cost if reached.place == SETTLED else math.inf
+    for tail in range(cells, len(costs)):
+        costs[tail] = math.inf
+        for k in range(graph.rows[tail], graph.rows[tail + 1]):
+            costs[tail] = min(costs[tail], costs[graph.edges[k].target])
 
 
 @compiled

@@ -219,7 +219,11 @@ class Router:
 
     def distances_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
         """Returns the cost from the start of each cell to a goal (cells,) [m at 40 km/h]; inf without a route."""
-        costs = np.empty(self._graph.cells)
+        return self.costs_to(goal, blocked)[: self._graph.cells]
+
+    def costs_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
+        """Returns `distances_to`, and the costs from the ends of the lanes without the turn there (cells + lanes,)."""
+        costs = np.empty(self._graph.cells + len(self._graph.lanes))
         find_costs(self._graph, self._searches.search, *goal, place_records(blocked), len(blocked), costs)
         return costs
 

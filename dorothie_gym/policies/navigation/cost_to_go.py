@@ -3,17 +3,106 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import cast
 
+import numpy as np
+
+from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation.records import RecordArray
+from dorothie_gym.copying import shared
 from dorothie_gym.maps import Town
+from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.routing import Place, router
+from dorothie_gym.maps.routing_graph import RoutingLane, routing_graph
 
 REACHED_BEHIND = 2.0
 """Largest distance behind the car at which a goal counts as reached instead of passed [m]."""
 
+ROWS = 512
+"""Rows of costs that a process keeps: one takes 4 to 30 KB."""
+
+
+@compiled
+def cost_from(
+    lanes: RecordArray[RoutingLane], costs: Array, goal_lane: int, goal_station: float, lane: int, station: float
+) -> float:
+    """Returns the cost from a place to a goal [m]; infinite where no route leads there.
+
+    Costs are known where the router's cells begin; in between they are interpolated.
+
+    Args:
+        lanes: lanes of the routing graph.
+        costs: (cells + lanes,) costs from the starts of the cells and the ends of the lanes, see `Router.costs_to`.
+        goal_lane: lane of the goal.
+        goal_station: station of the goal [m].
+        lane: lane of the place.
+        station: station of the place [m].
+    """
+    row = lanes[lane]
+    size, passed = row.size, False
+    if lane == goal_lane:
+        ahead = goal_station - station
+        if -REACHED_BEHIND <= ahead <= size:
+            return abs(ahead)
+        passed = ahead < 0.0 and int(station / size) == int(goal_station / size)
+    k = min(int(max(station, 0.0) / size), row.cells - 1)
+    share = min(max(station, 0.0) / size - k, 1.0)
+    # in the goal's own cell but behind the goal, the cost follows from the end of the cell
+    here = math.inf if passed else float(costs[row.first + k])
+    if k + 1 < row.cells:
+        after = float(costs[row.first + k + 1])
+        if math.isinf(here):
+            return after + (1.0 - share) * size
+        return here if math.isinf(after) else here + share * (after - here)
+    if math.isinf(here):
+        return float(costs[len(costs) - len(lanes) + lane]) + (1.0 - share) * size
+    return here - share * size
+
+
+@shared
+@dataclass(frozen=True, eq=False)
+class CostTable:
+    """Costs of the cheapest routes to a goal; costs are metres at 40 km/h, as computed by `Router.route`.
+
+    Attributes:
+        goal: lane and distance along it [m].
+        lanes: lanes of the routing graph.
+        costs: see `cost_from`.
+    """
+
+    goal: Place
+    lanes: RecordArray[RoutingLane]
+    costs: Array
+
+
+@lru_cache(maxsize=ROWS)
+def cost_table(town: Town, goal: Place, blocked: tuple[Place, ...] = ()) -> CostTable:
+    """Returns the costs to a goal, computed once for all in the process.
+
+    Args:
+        town: the map.
+        goal: lane and distance along it [m].
+        blocked: places that cannot be passed.
+    """
+    # an array without access by attribute, which a call from Python passes faster
+    lanes = cast("RecordArray[RoutingLane]", np.asarray(routing_graph(town).lanes))
+    return CostTable(goal, lanes, router(town).costs_to(goal, blocked))
+
+
+@lru_cache(maxsize=16)
+def site_costs(town: Town) -> Array:
+    """Returns the costs to all sites of a town (sites, cells + lanes): rows for `cost_from`, in the order of the sites.
+
+    The goals of tasks are sites; only roadblocks ask for other rows.
+    """
+    tables = [cost_table(town, (site.lane, site.station)) for site in town.sites]
+    return np.stack([table.costs for table in tables])
+
 
 class CostToGo:
-    """Cost of the cheapest route to a goal in metres at 40 km/h, as computed by `Router.route`.
+    """Cost of the cheapest route to a goal.
 
     Attributes:
         goal: lane and distance along it [m], or None.
@@ -22,61 +111,21 @@ class CostToGo:
 
     def __init__(self, town: Town) -> None:
         self._town = town
-        self._cells = _cells(town)
+        self._table: CostTable | None = None
         self.goal: Place | None = None
         self.blocked: tuple[Place, ...] = ()
-        self._costs: list[float] = []
 
     def aim(self, goal: Place | None, blocked: tuple[Place, ...] = ()) -> bool:
         """Sets the goal and the blocked places; returns whether anything changed."""
         if (goal, blocked) == (self.goal, self.blocked):
             return False
         self.goal, self.blocked = goal, blocked
-        if goal is not None:
-            costs = router(self._town).distances_to(goal, blocked)
-            if blocked and not any(map(math.isfinite, costs.tolist())):
-                costs = router(self._town).distances_to(goal)
-            self._costs = costs.tolist()
+        self._table = None if goal is None else cost_table(self._town, goal, blocked)
         return True
 
     def from_place(self, lane: int, station: float) -> float:
-        """Returns the cost from a place [m]; infinite where no route leads to the goal, or there is no goal.
-
-        Costs are known where the router's cells begin; in between they are interpolated.
-        """
-        if self.goal is None:
+        """Returns the cost from a place [m]; infinite where no route leads to the goal, or there is no goal."""
+        table = self._table
+        if table is None:
             return math.inf
-        goal_lane, goal_station = self.goal
-        first, count, size = self._cells[lane]
-        passed = False
-        if lane == goal_lane:
-            ahead = goal_station - station
-            if -REACHED_BEHIND <= ahead <= size:
-                return abs(ahead)
-            passed = ahead < 0.0 and int(station / size) == int(goal_station / size)
-        k = min(int(max(station, 0.0) / size), count - 1)
-        share = min(max(station, 0.0) / size - k, 1.0)
-        # in the goal's own cell but behind the goal, the cost follows from the end of the cell
-        here = math.inf if passed else self._costs[first + k]
-        if k + 1 < count:
-            ahead = self._costs[first + k + 1]
-            if math.isinf(here):
-                return ahead + (1.0 - share) * size
-            return here if math.isinf(ahead) else here + share * (ahead - here)
-        return self._after_lane(lane) + (1.0 - share) * size if math.isinf(here) else here - share * size
-
-    def _after_lane(self, lane: int) -> float:
-        """Returns the cost from the end of a lane."""
-        starts = [self._cells[way.connector][0] for way in self._town.exits(lane)]
-        return min((self._costs[start] for start in starts), default=math.inf)
-
-
-@lru_cache(maxsize=16)
-def _cells(town: Town) -> tuple[tuple[int, int, float], ...]:
-    """Returns for each lane: number of its first cell, number of cells, and length of each [m]."""
-    found = []
-    for lane in town.lanes:
-        first = router(town).cell(lane.id, 0.0)
-        count = router(town).cell(lane.id, lane.length) - first + 1
-        found.append((first, count, lane.length / count))
-    return tuple(found)
+        return cost_from(table.lanes, table.costs, *table.goal, lane, station)

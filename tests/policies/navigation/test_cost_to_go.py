@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from dorothie_gym.maps import load_town
 from dorothie_gym.maps.routing import router
-from dorothie_gym.policies.navigation.cost_to_go import CostToGo
+from dorothie_gym.policies.navigation.cost_to_go import CostToGo, cost_table, site_costs
 
 
 @pytest.mark.parametrize("town", ["brookside", "midtown"])
@@ -53,3 +54,28 @@ def test_roadblock_raises_cost() -> None:
 
 def test_cost_is_infinite_without_goal() -> None:
     assert math.isinf(CostToGo(load_town("brookside")).from_place(0, 0.0))
+
+
+def test_environments_share_the_costs_to_a_goal() -> None:
+    town = load_town("brookside")
+    lane = max((lane for lane in town.lanes if not lane.in_junction), key=lambda lane: lane.length)
+    goal, blocked = (lane.id, lane.length - 5.0), ((lane.id, lane.length / 2),)
+    assert cost_table(town, goal, blocked) is cost_table(town, goal, blocked)
+    way = CostToGo(town)
+    way.aim(goal, blocked)
+    twin = copy.deepcopy(way)
+    assert twin.from_place(lane.id, 2.0) == way.from_place(lane.id, 2.0)
+    twin.aim(goal)
+    assert twin.from_place(lane.id, 2.0) < way.from_place(lane.id, 2.0)
+
+
+def test_costs_to_sites_are_costs_of_routes() -> None:
+    town = load_town("midtown")
+    search, costs = router(town), site_costs(town)
+    assert len(costs) == len(town.sites)
+    for row, site in zip(costs[::5], town.sites[::5], strict=True):
+        goal = site.lane, site.station
+        np.testing.assert_array_equal(row[: -len(town.lanes)], search.distances_to(goal))
+        for lane in town.lanes[::11]:  # from the end of a lane without the turn: the lanes behind begin there
+            behind = [row[search.cell(link.target, 0.0)] for link in town.successors(lane.id)]
+            assert row[len(row) - len(town.lanes) + lane.id] == min(behind, default=math.inf)
