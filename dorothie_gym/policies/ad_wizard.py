@@ -128,9 +128,9 @@ class AdWizardState:
     roadblocks: int = 0
     last_at: float = -math.inf
 
-    def advanced(self) -> AdWizardState:
-        """Counts a decision."""
-        return replace(self, count=self.count + 1)
+    def advanced(self, decisions: int = 1) -> AdWizardState:
+        """Counts decisions."""
+        return replace(self, count=self.count + decisions)
 
     def is_due(self, now: float) -> bool:
         """Returns whether enough time has passed since the last trick."""
@@ -170,6 +170,9 @@ class ScriptedAdWizard(Policy[AdWizardState]):
 
     Every change of a task comes with a message that gives the participant a reason. Bad weather clears up, and
     roadblocks are removed after a while.
+
+    Attributes:
+        plays_tasks: whether it changes tasks.
     """
 
     def __init__(
@@ -198,7 +201,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
         if unknown:
             raise ValueError(f"kinds holds {unknown[0]!r}; the kinds are {', '.join(Trick)}")
         self._rate, self._kinds = rate, tuple(Trick(kind) for kind in kinds)
-        self._plays_tasks = rate > 0.0 and Trick.TASK in self._kinds
+        self.plays_tasks = rate > 0.0 and Trick.TASK in self._kinds
         self._config = AdWizardConfig() if config is None else config
 
     def initial_state(self, seed: int, town: Town) -> AdWizardState:
@@ -220,12 +223,29 @@ class ScriptedAdWizard(Policy[AdWizardState]):
         rng = np.random.default_rng((state.seed, state.count))
         now = scalar(observation, "time")
         action, state = _restore(state, observation, now)
-        if action is None and self._plays_tasks and plays_every_exception(observation["story"]):
+        if action is None and self.plays_tasks and plays_every_exception(observation["story"]):
             action = story_exception(observation, state.town, now, _story_is_due(state, now), rng)
             state = state if action is None else replace(state, last_at=now)
         if action is None:
             action, state = _play(state, observation, now, rng)
         return (action or AdWizardAction()).encode(self.limits), state
+
+
+def idle_until(policy: ScriptedAdWizard, state: AdWizardState, story: str) -> float:
+    """Returns the earliest time at which the next step may do more than count a decision [s].
+
+    Who knows that the time has not come need not observe: `state.advanced()` is the state after the step.
+
+    Args:
+        policy: the policy.
+        state: its state.
+        story: story of the session.
+    """
+    if policy.plays_tasks and plays_every_exception(story):
+        return -math.inf
+    earliest = state.last_at + state.config.spacing
+    times = (*(item.at for item in state.restorations), *(max(item.at, earliest) for item in state.planned))
+    return min(times, default=math.inf)
 
 
 def _story_is_due(state: AdWizardState, now: float) -> bool:

@@ -5,12 +5,14 @@ import pytest
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
+from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town
-from dorothie_gym.ontology import ExceptionKind, LandmarkName
+from dorothie_gym.ontology import ExceptionKind, LandmarkName, Role
 from dorothie_gym.policies import ScriptedAdWizard, Trick
+from dorothie_gym.policies.ad_wizard import idle_until
 from dorothie_gym.policies.task_exceptions import task_message
 from dorothie_gym.recording import EventType, Session
-from dorothie_gym.spaces import AdWizardAction, SpaceLimits
+from dorothie_gym.spaces import AdWizardAction, SpaceLimits, noop
 from dorothie_gym.tasks import TaskState, bind, parse_template
 from tests.policies.walk import play
 
@@ -51,6 +53,27 @@ def test_bad_weather_comes_and_clears_up():
     )
     values = [e.data["value"] for e in played.events if e.type == "Exception" and e.data["kind"] == "weather"]
     assert len(values) == 2 and values[0] != values[1]
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_idle_decisions_are_only_counted(seed):
+    engine = SessionEngine(TOWN)
+    observations = engine.reset(seed=seed)
+    wizard = ScriptedAdWizard(engine.limits, rate=4.0)
+    state, nothing, idle = wizard.initial_state(seed, TOWN), AdWizardAction().encode(engine.limits), 0
+    silent = {str(role): noop(role, engine.limits) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
+    for decision in range(600):
+        seen = observations["ad_wizard"]
+        waits = seen["time"][0] < idle_until(wizard, state, seen["story"])
+        action, after = wizard.step(seen, state)
+        if waits:
+            assert after == state.advanced()
+            assert all(np.array_equal(action[name], nothing[name]) for name in nothing), decision
+            idle += 1
+        state = after
+        engine.step({**silent, "ad_wizard": action})
+        observations = engine.observations
+    assert 200 < idle < 600
 
 
 ON_CALL = {
