@@ -39,6 +39,9 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
 
     Each environment has episodes of its own: they depend on its seed and actions, and neither on the other
     environments, nor on its place among them.
+
+    Attributes:
+        autoreset_mode: when environments that are over begin anew, as `SyncVectorEnv` has it.
     """
 
     metadata: dict[str, object] = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -60,7 +63,8 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         if not towns:
             raise ValueError("town is an empty sequence; it must name at least one town")
         self.num_envs = num_envs
-        self.metadata = {**self.metadata, "autoreset_mode": AutoresetMode(autoreset_mode)}
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self._envs = [make(towns[i % len(towns)]) for i in range(num_envs)]
         self.single_observation_space = self._envs[0].observation_space
@@ -121,7 +125,7 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         """
         actions = self._checked(actions)
         over = self._terminations | self._truncations
-        mode = self.metadata["autoreset_mode"]
+        mode = self.autoreset_mode
         if not self._begun.all() or (mode is AutoresetMode.DISABLED and over.any()):
             waiting = np.flatnonzero(~self._begun | over)
             raise gym.error.ResetNeeded(f"environments {short_repr(waiting.tolist())} wait for a reset: call reset()")
