@@ -12,41 +12,11 @@ from dorothie_gym.compilation import allocating
 from dorothie_gym.maps import Exit
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.path import Path
+from dorothie_gym.sim.ego.path_search import SEARCH, index_at, next_choice, progress_on_path
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.world import SensorArrays, World
 from dorothie_gym.spaces import ExitColumn
-
-
-@allocating
-def _index_at(s: Array, at: float) -> int:
-    """Returns the index of the point at or before a distance along the path."""
-    low, high = 0, len(s)
-    while low < high:
-        middle = (low + high) // 2
-        if at < s[middle]:
-            high = middle
-        else:
-            low = middle + 1
-    return max(low - 1, 0)
-
-
-@allocating
-def next_choice(lanes: NDArray[np.int64], here: int, chooses: NDArray[np.bool_]) -> int:
-    """Returns the index of the last path point on the next lane that ends at a choice of exits; -1 if there is none.
-
-    Args:
-        lanes: lanes of the path points (n,).
-        here: index of the first path point to look at.
-        chooses: whether the lane ends at a choice of exits, for each lane of the town.
-    """
-    for k in range(here, len(lanes)):
-        if chooses[lanes[k]]:
-            for last in range(len(lanes) - 1, k, -1):  # a path around a block may visit the lane twice
-                if lanes[last] == lanes[k]:
-                    return last
-            return k
-    return -1
 
 
 @allocating
@@ -60,35 +30,6 @@ def write_lanes(lanes: NDArray[np.int64], here: int, table: NDArray[np.int64]) -
             last = lanes[k]
             table[row] = last + 1
             row += 1
-
-
-@allocating
-def progress_on_path(s: Array, points: Array, x: float, y: float, near: float, window: float) -> float:
-    """Returns the distance along a path [m] of its point closest to a position, searched around a known distance.
-
-    The path is extended straight before its first and after its last point.
-
-    Args:
-        s: see above.
-        points: see above.
-        x: position [m].
-        y: position [m].
-        near: centre of the search along the path [m].
-        window: half width of the search [m].
-    """
-    end = len(s) - 1
-    best, answer = math.inf, near
-    for k in range(_index_at(s, near - window), min(_index_at(s, near + window) + 1, end)):
-        ax, ay = points[k, 0], points[k, 1]
-        dx, dy = points[k + 1, 0] - ax, points[k + 1, 1] - ay
-        t = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
-        if (t < 0.0 and k > 0) or (t > 1.0 and k < end - 1):
-            t = 0.0 if t < 0.0 else 1.0
-        ox, oy = x - ax - t * dx, y - ay - t * dy
-        distance = ox * ox + oy * oy
-        if distance < best:
-            best, answer = distance, s[k] + t * (s[k + 1] - s[k])
-    return answer
 
 
 @allocating
@@ -111,7 +52,7 @@ def write_waypoints(s: Array, points: Array, heading: float, start: float, spaci
             table[row, 1] = points[0, 1] + at * math.sin(heading)
             continue
         at = min(at, s[end])
-        k = min(_index_at(s, at), end - 1)
+        k = min(index_at(s, at), end - 1)
         t = min(max((at - s[k]) / (s[k + 1] - s[k]), 0.0), 1.0)
         table[row, 0] = points[k, 0] + t * (points[k + 1, 0] - points[k, 0])
         table[row, 1] = points[k, 1] + t * (points[k + 1, 1] - points[k, 1])
@@ -198,15 +139,12 @@ def write_path(
     """
     progress = progress_on_path(s, points, x, y, near, window)
     write_waypoints(s, points, heading, near, spacing, waypoints)
-    write_lanes(lanes, _index_at(s, near), path_lanes)
+    write_lanes(lanes, index_at(s, near), path_lanes)
     write_waypoints(s, points, heading, progress, spacing, believed_waypoints)
     return progress
 
 
 # --- measurements from the true and the estimated pose ----------------------------------------------------------------
-
-SEARCH = 6.0
-"""Half width of the search for a place on the path [m], to which twice the error of the pose estimate is added."""
 
 
 class EgoMeasurements:

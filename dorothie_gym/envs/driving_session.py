@@ -12,7 +12,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Restorable
+from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.path_measurements import UpcomingJunction
 from dorothie_gym.engine.scenario import (
     ResetOptions,
@@ -30,15 +32,17 @@ from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, UNDER_WAY, NavigationAction, prepares
+from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_arrays, look
 from dorothie_gym.policies.navigation.instructor import Guidance, Instructor, NavigationInstruction, words_of
-from dorothie_gym.policies.navigation.junction_exits import JunctionExits
-from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, NavigationEncoder, Vector
+from dorothie_gym.policies.navigation.junction_exits import JunctionExits, exit_arrays
+from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, RouteCosts, Vector, encode
 from dorothie_gym.policies.observation_parser import read_landmarks
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork, network_of
+from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import (
     ActionDecoder,
@@ -47,7 +51,6 @@ from dorothie_gym.spaces import (
     LanePosition,
     Mental,
     Observation,
-    ObservationMapping,
     ParticipantAction,
     RoleAction,
     SpaceLimits,
@@ -74,7 +77,9 @@ class DrivingSession:
         exits: exits of the town's junctions.
         instructor: built-in participant.
         heard: last instruction, as the Co-Wizard remembers it.
-        seen: present observations of the roles that act on them.
+        seen: present observations of the roles, each built when it is read.
+        driver: what the driver knows at the present decision, and its observation.
+        junction: next junction with a choice on the planned path.
         reward: reward of the last decision.
         terms: its terms.
         terminated: whether the destination was reached, or the participant gave up.
@@ -85,16 +90,18 @@ class DrivingSession:
         self.session, self.exits, self._config = session, exits, config
         town = session.world.town
         self.instructor = Instructor(town, exits, Guidance(config.guidance))
-        self._viewpoint = NavigationEncoder(town, exits, config.max_seconds)
+        streets = [name.value for name in session.scenario.street_names]
+        self.driver = driver_arrays(sum(FIELDS.values()), streets)
+        self.junction = UpcomingJunction(session.world)
+        self._town_arrays, self._exit_arrays = town_arrays(session.world.network), exit_arrays(town)
+        self._costs = RouteCosts(town)
         self._decoder = ActionDecoder(Role.AD_WIZARD, session.limits)
         self._adversary = ScriptedAdWizard(session.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
         seed = policy_seed(session.scenario.seed, Role.AD_WIZARD)
         self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
         self.heard, self._notes = HeardInstruction(), list[Mental]()
         self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # goal and roadblocks that `_nearest` refers to
-        observing = (Role.PARTICIPANT, Role.CO_WIZARD)
-        self._observing = observing if self._adversary is None else (*observing, Role.AD_WIZARD)
-        self.seen: Mapping[str, Observation] = session.observations(self._observing)
+        self.seen: Mapping[str, Observation] = LazyObservations(session)
         marks = read_landmarks(self.seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
         self._known = frozenset(mark.place for mark in marks)
         self._rules_broken, self._collisions = self._count_infractions(), 0
@@ -104,6 +111,7 @@ class DrivingSession:
         self.reason: str | None = None
         self._listen()
         self._left = self._cost_to_go()
+        self._look()
 
     @classmethod
     def begin(
@@ -135,20 +143,42 @@ class DrivingSession:
             raise ResetNeeded("the session is over: call reset() first")
         if self._notes:
             action = replace(action, mental=self._notes.pop(0))
-        reached = self._count_reached()
+        reached, before, speed = self._count_reached(), self.session.world.time, float(self.session.world.car.speed)
         self.session.step({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
-        before, self.seen = self.seen, self.session.observations(self._observing)
-        self.heard = self.heard.driven_on(before[Role.CO_WIZARD], self.seen[Role.CO_WIZARD])
+        self.seen = LazyObservations(self.session)
+        self.heard = self.heard.after(self.session.world.time - before, speed, float(self.session.world.car.speed))
         progress = self._progress()
         self._listen()
         self._left = self._cost_to_go()
         self._note_patience()
         self._end()
         self._reward(progress, self._count_reached() - reached, action.physical is not None)
+        self._look()
+
+    def observe_roles(self) -> None:
+        """Builds the observations that are read before the next decision, before the planned path changes."""
+        for role in (Role.CO_WIZARD, Role.AD_WIZARD) if self._adversary is not None else (Role.CO_WIZARD,):
+            self.seen[role]
+
+    def _look(self) -> None:
+        """Fills the driver's view."""
+        world, inputs = self.session.world, plain(self.driver.inputs)[0]
+        path, options = world.planner.path, self.junction.options()
+        manoeuvre, angle = world.planner.manoeuvre
+        inputs["cruise"], inputs["lights"], inputs["motion"] = world.ego.cruise, world.ego.lights, self.session.motion
+        inputs["manoeuvre"], inputs["angle"] = manoeuvre or 0, angle
+        inputs["weather"] = tuple(world.weather.values.values())
+        look(
+            self._town_arrays, self._exit_arrays, world.sensing_arrays, self.driver,
+            path.s, path.points, world.planner.s, options.lane, options.distance,
+        )  # fmt: skip
 
     def observe(self) -> Vector:
         """Returns the observation of the driver."""
-        return self._viewpoint.observe(self.seen[Role.CO_WIZARD], self.heard, self.instructor.blocked)
+        self.heard.write(self.exits.town, self.driver)
+        self._costs.write(self.heard.goal, self.instructor.blocked, self.driver)
+        encode(self.driver, self._config.max_seconds)
+        return self.driver.vector.copy()
 
     def info(self) -> StepInfo:
         """Returns the info of the last decision, as a new dictionary."""
@@ -326,7 +356,8 @@ class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
         if instruction is not None and instruction is not self._shown:
             self._view.note_instruction(instruction.time, words_of(instruction), str(instruction.act))
         self._shown = instruction
-        self._view.note(drive.seen[Role.CO_WIZARD])
+        if self.render_mode is not None:
+            self._view.note(drive.seen[Role.CO_WIZARD])
         if self.render_mode == "human":
             self.render()
 
@@ -349,9 +380,8 @@ class NavigationMask:
         exits: exits of the town's junctions.
     """
 
-    def __init__(self, world: World, exits: JunctionExits) -> None:
-        self._world, self.exits = world, exits
-        self._junction = UpcomingJunction(world)
+    def __init__(self, world: World, exits: JunctionExits, junction: UpcomingJunction) -> None:
+        self._world, self.exits, self._junction = world, exits, junction
 
     @property
     def choice(self) -> tuple[int, float] | None:
@@ -359,8 +389,8 @@ class NavigationMask:
         options = self._junction.options()
         return (options.lane, options.distance) if options.exits else None
 
-    def mask(self, seen: ObservationMapping) -> NDArray[np.int8]:
-        """Returns the mask (18,), 1 for feasible actions; `seen` is the observation of the Co-Wizard."""
+    def mask(self, driver: DriverArrays) -> NDArray[np.int8]:
+        """Returns the mask (18,), 1 for feasible actions; `driver` has the view of the present decision."""
         world, planner = self._world, self._world.planner
         speed, cruise = float(world.car.speed), world.ego.cruise
         mask = np.zeros(len(ACTIONS), dtype=np.int8)
@@ -374,7 +404,7 @@ class NavigationMask:
         mask[NavigationAction.U_TURN] = feasible.u_turn
         mask[NavigationAction.LANE_FOLLOW] = feasible.lane_follow
         for action in UNDER_WAY:
-            mask[action] |= prepares(action, seen, self.exits)
+            mask[action] |= prepares(driver, action)
         choice = self.choice if feasible.j_turn else None
         if choice is not None:
             mask[FIRST_TURN:] = [way is not None for way in self.exits.by_sector(choice[0])]

@@ -240,7 +240,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
     def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
         """Begins a session; see `NavigationEnv.reset`."""
         drive = self.begin(seed, options)
-        self._controls = NavigationMask(drive.session.world, drive.exits)
+        self._controls = NavigationMask(drive.session.world, drive.exits, drive.junction)
         drive.session.world.ego.manual = VehicleControl(throttle=0.0, steer=0.0, brake=0.0)
         return self._observe(drive), drive.info()
 
@@ -256,6 +256,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         drive = self.drive
         drive.session.world.ego.manual = VehicleControl(throttle=throttle, steer=steer, brake=brake)
         drive.play(CoWizardAction(physical=self._prepare(drive)))
+        drive.observe_roles()  # on the path that was driven
         self._keep_path(drive)
         self.show()
         return self._observe(drive), drive.reward, drive.terminated, drive.truncated, drive.info()

@@ -16,7 +16,6 @@ from dorothie_gym.envs.driving_session import DrivingEnv, NavigationMask
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation.actions import ACTIONS, NavigationAction, physical_of
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, Vector, navigation_space
@@ -106,7 +105,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
             options: `scenario` plays a given `Scenario`; other options cause a warning.
         """
         drive = self.begin(seed, options)
-        self._controls = NavigationMask(drive.session.world, drive.exits)
+        self._controls = NavigationMask(drive.session.world, drive.exits, drive.junction)
         return self._observe(), self._info()
 
     def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, StepInfo]:
@@ -118,7 +117,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
         """
         drive = self.drive
         number = whole_number("action", action, 0, len(ACTIONS) - 1)
-        physical = physical_of(NavigationAction(number), drive.seen[Role.CO_WIZARD], drive.exits)
+        physical = physical_of(NavigationAction(number), drive.driver)
         drive.play(CoWizardAction(physical=physical))
         self.show()
         return self._observe(), drive.reward, drive.terminated, drive.truncated, self._info()
@@ -129,7 +128,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
 
     def _observe(self) -> Vector:
         assert self._controls is not None
-        self._mask = self._controls.mask(self.drive.seen[Role.CO_WIZARD])
+        self._mask = self._controls.mask(self.drive.driver)
         return self.drive.observe()
 
     def _info(self) -> StepInfo:

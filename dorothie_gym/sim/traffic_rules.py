@@ -17,7 +17,7 @@ from dorothie_gym.sim.network.lane_lookup import LOOKUP_CELL, closest_segment, c
 from dorothie_gym.sim.state.codes import COLLISION, NOBODY, OFF_ROAD, RED_LIGHT, STOP_SIGN, WRONG_WAY, Colour, EventCode
 from dorothie_gym.sim.state.records import POSE, LaneRecord, StopLineRecord
 from dorothie_gym.sim.state.town_arrays import OFF_ROAD_MARGIN
-from dorothie_gym.sim.traffic.junctions import phase_at
+from dorothie_gym.sim.traffic.junctions import colour_at
 from dorothie_gym.sim.traffic.parameters import AT_LINE, TRAFFIC_STANDING
 
 if TYPE_CHECKING:
@@ -145,20 +145,11 @@ def _look_at_lines(town: TownArrays, world: WorldArrays, k: int, frame: int, nea
     if line.is_stop:
         if not mark.stood:
             _list(world, k, frame, STOP_SIGN, int(line.lane), station, int(line.signal))
-    elif _is_red(town, line.lane, (frame - 1) / FRAME_RATE):  # when the frame began: so the car was let in
+    elif (
+        colour_at(town, line.lane, (frame - 1) / FRAME_RATE) == Colour.RED
+    ):  # when the frame began: so the car was let in
         _list(world, k, frame, RED_LIGHT, int(line.lane), station, int(line.signal))
     mark.stood = False
-
-
-@inlined
-def _is_red(town: TownArrays, number: int, time: float) -> bool:
-    """Returns whether the light at the end of a lane is red; a light without a programme never is."""
-    lane = town.lanes[number]
-    if lane.programme < 0:
-        return False
-    programme = town.programmes[lane.programme]
-    phase, _ = phase_at(town, lane.programme, time)
-    return bool(town.colours[programme.colour + phase * programme.slots + lane.slot] == Colour.RED)
 
 
 @inlined

@@ -231,16 +231,21 @@ class World(Lookups, Restorable):
         ]  # fmt: skip
 
     @property
-    def senses(self) -> SensorArrays:
-        """Arrays for perception: bodies, visibility, and room for the result."""
+    def sensing_arrays(self) -> WorldArrays:
+        """Arrays of the world, with the present visibility."""
         arrays = self.actors.arrays
         self._tell_weather(arrays)
+        return arrays
+
+    @property
+    def senses(self) -> SensorArrays:
+        """Arrays for perception: bodies, visibility, and room for the result."""
+        arrays = self.sensing_arrays
         return SensorArrays(arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye)
 
     def seen(self) -> Array:
         """Returns the perceived bodies as numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
-        arrays = self.actors.arrays
-        self._tell_weather(arrays)
+        arrays = self.sensing_arrays
         table = np.empty((len(arrays.seen), len(BODY)))
         return table[: look_around(arrays, self.frame, table)]
 

@@ -29,9 +29,9 @@ from dorothie_gym.policies.navigation.actions import (
     EstimatedActionMask,
     NavigationAction,
     physical_of,
-    prepares,
 )
 from dorothie_gym.policies.navigation.demonstrations import action_of
+from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, nearest_sector
 from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, NavigationEncoder
@@ -99,7 +99,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory, CoWizardAction]):
     def __init__(self, town: Town, limits: SpaceLimits) -> None:
         super().__init__(town, limits)
         self._exits = JunctionExits(town)
-        self._feasible = EstimatedActionMask(town, self._exits)
+        self._feasible = EstimatedActionMask(town)
         self._encoder = NavigationEncoder(town, self._exits, EnvConfig.max_seconds)
 
     def initial_memory(self) -> CoWizardMemory:
@@ -132,7 +132,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory, CoWizardAction]):
     def mask(self, observation: ObservationMapping, memory: CoWizardMemory) -> Mask:
         """Returns the actions that the car would probably carry out and that change something."""
         mask = np.zeros(self.actions, dtype=np.bool_)
-        mask[: len(ACTIONS)] = self._feasible.mask(observation)
+        mask[: len(ACTIONS)] = self._feasible.mask(driver_of(observation, self._exits))
         mask[ExtraAction.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
         mask[list(_SPEECH)] = scalar(observation, "speaking") <= 0.0
         return mask
@@ -140,11 +140,11 @@ class CoWizardInterface(RoleInterface[CoWizardMemory, CoWizardAction]):
     def permitted(self, observation: ObservationMapping, masks: ActionMapping) -> Mask:
         """Returns the actions that the car would carry out, or already prepares."""
         permitted = np.ones(self.actions, dtype=np.bool_)
+        driver = driver_of(observation, self._exits)
         for action in ACTIONS[1:]:
-            if prepares(action, observation, self._exits):
+            physical = physical_of(action, driver)
+            if physical is None:
                 continue
-            physical = physical_of(action, observation, self._exits)
-            assert physical is not None
             permitted[action] = bool(masks["physical"][physical.action])
             if physical.action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH):
                 permitted[action] &= bool(masks["angle"][physical.angle + 180])
@@ -159,7 +159,9 @@ class CoWizardInterface(RoleInterface[CoWizardMemory, CoWizardAction]):
             return CoWizardAction(mental=note), replace(memory, noted=memory.named)
         if choice in _SPEECH:
             return CoWizardAction(speech=_SPEECH[choice]), memory
-        return CoWizardAction(physical=physical_of(NavigationAction(choice), observation, self._exits)), memory
+        return CoWizardAction(
+            physical=physical_of(NavigationAction(choice), driver_of(observation, self._exits))
+        ), memory
 
     def choice_of(self, action: CoWizardAction, observation: ObservationMapping, memory: CoWizardMemory) -> int:
         """Returns the number of the driving action, else of the goal that is set, else of the utterance."""

@@ -9,13 +9,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
-from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits
+from dorothie_gym.policies.navigation.driver_view import DriverArrays
+from dorothie_gym.policies.navigation.junction_exits import SECTORS
 from dorothie_gym.sim.ego.feasibility import is_past_stopping
 from dorothie_gym.sim.ego.limits import HALF_LENGTH, LEAD, MAX_CRUISE, MIN_CRUISE, MIN_SWITCH, U_TURN_SPEED
-from dorothie_gym.spaces import ExitColumn, Motion, ObservationMapping, Physical
+from dorothie_gym.spaces import Motion, Physical
 
 LEFT, RIGHT = 90, -90
 """Angles of a lane switch [degrees]."""
@@ -72,15 +75,20 @@ PLAIN_ACTIONS: Final[Mapping[int, Physical]] = {
 """Physical actions of the actions that do not depend on the observation."""
 
 
-UNDER_WAY = {
-    NavigationAction.SWITCH_LEFT: (PhysicalAction.LANE_SWITCH, LEFT),
-    NavigationAction.SWITCH_RIGHT: (PhysicalAction.LANE_SWITCH, RIGHT),
-    NavigationAction.U_TURN: (PhysicalAction.U_TURN, 0),
-}
-"""Manoeuvres, and the value of `LocalPlanner.manoeuvre` while they are prepared or driven."""
+_LANE_SWITCH, _U_TURN, _J_TURN, _LIGHTS = (
+    int(action.value)
+    for action in (
+        PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN, PhysicalAction.J_TURN, PhysicalAction.LIGHT_CHANGE,
+    )
+)  # fmt: skip
+_SWITCH_LEFT, _SWITCH_RIGHT = int(NavigationAction.SWITCH_LEFT), int(NavigationAction.SWITCH_RIGHT)
+_ROUND, _STOPPED = int(NavigationAction.U_TURN), int(Motion.STOPPED)
+
+UNDER_WAY = (_SWITCH_LEFT, _SWITCH_RIGHT, _ROUND)
+"""Actions, turns apart, that start a manoeuvre."""
 
 
-def physical_of(action: NavigationAction, observation: ObservationMapping, exits: JunctionExits) -> Physical | None:
+def physical_of(action: NavigationAction, driver: DriverArrays) -> Physical | None:
     """Maps an action to a physical action; None for no action.
 
     A manoeuvre that is being prepared continues when it is chosen again, so a driver may repeat an action until it
@@ -89,36 +97,37 @@ def physical_of(action: NavigationAction, observation: ObservationMapping, exits
 
     Args:
         action: action chosen.
-        observation: observation of the Co-Wizard.
-        exits: exits of the town's junctions.
+        driver: arrays of the driver, with its view.
     """
-    if action is NavigationAction.NOTHING or prepares(action, observation, exits):
+    if action is NavigationAction.NOTHING or prepares(driver, int(action)):
         return None
     if action is NavigationAction.LIGHTS:
-        return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not observation["lights"])
-    sector = action.sector
-    if sector is None:
+        return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not plain(driver.inputs)[0]["lights"])
+    if action.sector is None:
         return PLAIN_ACTIONS[action]
-    angle = _angle_of(sector, observation, exits)
-    return Physical(action=PhysicalAction.J_TURN, angle=SECTORS[sector] if angle is None else angle)
+    return Physical(action=PhysicalAction.J_TURN, angle=turn_angle(driver, action.sector))
 
 
-def prepares(action: NavigationAction, observation: ObservationMapping, exits: JunctionExits) -> bool:
-    """Returns whether the car prepares or carries out an action already."""
-    if int(observation["motion"]) == Motion.STOPPED:
+@compiled
+def prepares(driver: DriverArrays, action: int) -> bool:
+    """Returns whether the car prepares or carries out a `NavigationAction` already."""
+    view = driver.inputs[0]
+    if view.motion == _STOPPED:
         return False
-    manoeuvre = UNDER_WAY.get(action)
-    if action.sector is not None:
-        angle = _angle_of(action.sector, observation, exits)
-        manoeuvre = None if angle is None else (PhysicalAction.J_TURN, angle)
-    return manoeuvre == (int(observation["manoeuvre"]), int(observation["manoeuvre_angle"][0]))
+    if action >= FIRST_TURN:
+        sector = action - FIRST_TURN
+        own = view.exit_lane[sector] >= 0 and view.exit_angle[sector] == view.angle
+        return bool(own and view.manoeuvre == _J_TURN)
+    if action == _SWITCH_LEFT or action == _SWITCH_RIGHT:
+        return bool(view.manoeuvre == _LANE_SWITCH and view.angle == (LEFT if action == _SWITCH_LEFT else RIGHT))
+    return bool(action == _ROUND and view.manoeuvre == _U_TURN)
 
 
-def _angle_of(sector: int, observation: ObservationMapping, exits: JunctionExits) -> int | None:
-    """Returns the angle of the exit in a sector of the next junction [degrees]; None where the sector has none."""
-    choice = exits.choice_ahead(observation)
-    way = exits.by_sector(choice)[sector] if choice is not None else None
-    return None if way is None else way.angle
+@compiled
+def turn_angle(driver: DriverArrays, sector: int) -> int:
+    """Returns the angle of the exit in a sector of the next junction, or that of the sector [degrees]."""
+    view = driver.inputs[0]
+    return int(view.exit_angle[sector]) if view.exit_lane[sector] >= 0 else SECTORS[sector]
 
 
 # --- estimated mask ---------------------------------------------------------------------------------------------------
@@ -140,20 +149,22 @@ class EstimatedActionMask:
     switch or U-turn, nor whether a roadblock leaves too little room for one, and it shares the errors of the pose.
     """
 
-    def __init__(self, town: Town, exits: JunctionExits) -> None:
-        self._town, self._exits = town, exits
+    def __init__(self, town: Town) -> None:
+        self._town = town
 
-    def mask(self, observation: ObservationMapping) -> NDArray[np.bool_]:
-        """Returns which actions would be carried out now (18,)."""
-        town, held = self._town, int(observation["motion"]) == Motion.STOPPED
-        lane, station = town.lanes[int(observation["lane"])], float(observation["station"][0])
-        speed, cruise = float(observation["speed"][0]), float(observation["cruise_speed"][0])
-        manoeuvre = int(observation["manoeuvre"])
+    def mask(self, driver: DriverArrays) -> NDArray[np.bool_]:
+        """Returns which actions would be carried out now (18,), by a driver's view."""
+        town, view = self._town, plain(driver.inputs)[0]
+        held, manoeuvre = view["motion"] == Motion.STOPPED, int(view["manoeuvre"])
+        lane, station = town.lanes[int(view["lane"])], float(view["station"])
+        speed, cruise = float(view["speed"]), float(view["cruise"])
         mask = np.zeros(len(ACTIONS), dtype=np.bool_)
         mask[NavigationAction.NOTHING] = mask[NavigationAction.LIGHTS] = True
         mask[NavigationAction.STOP], mask[NavigationAction.START] = not held, held
         mask[NavigationAction.FASTER], mask[NavigationAction.SLOWER] = cruise < MAX_CRUISE, cruise > MIN_CRUISE
-        committed = self._is_committed(observation, speed)
+        # whether the car can no longer stop before the junction at which it is about to turn
+        turning = manoeuvre == PhysicalAction.J_TURN and view["junction_ahead"] and not lane.in_junction
+        committed = turning and is_past_stopping(speed, float(view["junction_distance"]) - HALF_LENGTH)
         if not lane.in_junction and manoeuvre not in _OFF_LINE:
             for action, side in _SIDES.items():
                 mask[action] = can_switch_lane(town, lane.id, station, side, MIN_SWITCH + LEAD)
@@ -162,19 +173,8 @@ class EstimatedActionMask:
             mask[NavigationAction.U_TURN] = on_lane and can_turn_round(town, lane.id, start)
         if not lane.in_junction and not committed:
             mask[NavigationAction.LANE_FOLLOW] = held or manoeuvre > 0
-        for action in UNDER_WAY:
-            mask[action] |= prepares(action, observation, self._exits)
-        choice = None if committed else self._exits.choice_ahead(observation)
-        if choice is not None:
-            mask[FIRST_TURN:] = [way is not None for way in self._exits.by_sector(choice)]
+        for number in UNDER_WAY:
+            mask[number] |= prepares(driver, number)
+        if not committed:
+            mask[FIRST_TURN:] = view["exit_lane"] >= 0
         return mask
-
-    def _is_committed(self, observation: ObservationMapping, speed: float) -> bool:
-        """Returns whether the car can no longer stop before the junction at which it is about to turn."""
-        first = observation["exits"][0]
-        if int(observation["manoeuvre"]) != PhysicalAction.J_TURN or not first[ExitColumn.PRESENT]:
-            return False
-        if self._town.lanes[int(observation["lane"])].in_junction:
-            return False
-        left = float(first[ExitColumn.DISTANCE]) - HALF_LENGTH
-        return is_past_stopping(speed, left)

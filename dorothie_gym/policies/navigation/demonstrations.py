@@ -15,6 +15,7 @@ from dorothie_gym.policies.co_wizard.driving import distance_ahead
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.navigation.actions import LEFT, NavigationAction, prepares
+from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.navigation_policy import (
     PLAIN_STYLE,
@@ -109,7 +110,7 @@ def action_of(physical: Physical | None, observation: ObservationMapping, exits:
         action = NavigationAction.SWITCH_LEFT if left else NavigationAction.SWITCH_RIGHT
     else:
         action = _PLAIN_ACTIONS.get(physical.action, NavigationAction.NOTHING)
-    return NavigationAction.NOTHING if prepares(action, observation, exits) else action
+    return NavigationAction.NOTHING if prepares(driver_of(observation, exits), int(action)) else action
 
 
 def _turn_of(angle: int, observation: ObservationMapping, exits: JunctionExits) -> NavigationAction:

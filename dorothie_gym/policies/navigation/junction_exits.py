@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps import Exit, Town
 from dorothie_gym.policies.route_progress import is_choice, lanes_beside, next_choice
-from dorothie_gym.spaces import ExitColumn, ObservationMapping
+from dorothie_gym.spaces import ExitColumn, ObservationMapping, SpaceLimits
 
 SECTORS = tuple(range(-180, 180, 45))
 """Middles of the sectors [degrees, positive left]: back, sharp right, right, half right, straight, ..."""
@@ -98,6 +104,58 @@ class JunctionExits:
             connectors = frozenset(way.connector for _, way in exits)
             table[sector] = SectorExit(angle=chosen.angle, lane=chosen.lane, own=bool(own), connectors=connectors)
         return tuple(table)
+
+
+@by_reference
+@shared
+class ExitArrays(NamedTuple):
+    """Exits of a town's junctions in arrays.
+
+    Attributes:
+        lane: (lanes, 8) int32 lane behind the exit in each sector behind a lane, -1 for none.
+        angle: (lanes, 8) int32 its angle [degrees, positive left].
+        street: (lanes,) int32 number of each lane's street.
+        ahead: (lanes,) int32 lane before the next junction with a choice on the default lanes, -1 for none.
+        first: (lanes,) int32 first of the lanes before a junction whose observed exits are the same as those of a lane;
+            -1 for lanes that no observed exits tell.
+        alone: (lanes,) whether there is no other such lane.
+    """
+
+    lane: NDArray[np.int32]
+    angle: NDArray[np.int32]
+    street: NDArray[np.int32]
+    ahead: NDArray[np.int32]
+    first: NDArray[np.int32]
+    alone: NDArray[np.bool_]
+
+
+@lru_cache(maxsize=16)
+def exit_arrays(town: Town) -> ExitArrays:
+    """Returns the exits of a town's junctions in arrays; built once for each town."""
+    exits, count = JunctionExits(town), len(town.lanes)
+    lanes_by_sector = np.full((count, len(SECTORS)), -1, dtype=np.int32)
+    numbers = np.full(count, -1, dtype=np.int32)
+    arrays = ExitArrays(
+        lanes_by_sector,
+        lanes_by_sector.copy(),
+        numbers,
+        numbers.copy(),
+        numbers.copy(),
+        np.zeros(count, dtype=np.bool_),
+    )
+    for lane in town.lanes:
+        choice = next_choice(town, lane.id, 0.0)
+        arrays.street[lane.id] = lane.street
+        if choice is not None:
+            arrays.ahead[lane.id] = choice.lane
+        if is_choice(town, lane.id):
+            for sector, way in enumerate(exits.by_sector(lane.id)):
+                if way is not None:
+                    arrays.lane[lane.id, sector], arrays.angle[lane.id, sector] = way.lane, way.angle
+    for options, lanes in _lanes_by_exits(town).items():
+        if len(options) <= SpaceLimits.exits:  # no more are observed
+            arrays.first[lanes], arrays.alone[lanes] = lanes[0], len(lanes) == 1
+    return arrays
 
 
 def nearest_sector(angle: float) -> int:

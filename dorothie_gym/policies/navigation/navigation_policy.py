@@ -18,6 +18,7 @@ from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, GuidanceConfig
 from dorothie_gym.policies.navigation.actions import EstimatedActionMask, NavigationAction, physical_of
+from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.navigation.instructor import GuidanceStep, NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, nearest_sector
 from dorothie_gym.policies.navigation.observation_vector import (
@@ -189,7 +190,7 @@ class DriverInputs:
     def __init__(self, town: Town, max_seconds: float) -> None:
         self.exits = JunctionExits(town)
         self._encoder = NavigationEncoder(town, self.exits, max_seconds)
-        self._mask = EstimatedActionMask(town, self.exits)
+        self._mask = EstimatedActionMask(town)
 
     def update(
         self,
@@ -214,7 +215,7 @@ class DriverInputs:
         """Returns observation (161,) and mask (18,) of the driver."""
         assert state.observation is not None
         vector = self._encoder.observe(state.observation, state.instructions.heard, state.co_wizard.route.blocked)
-        return vector, self._mask.mask(state.observation)
+        return vector, self._mask.mask(driver_of(state.observation, self.exits))
 
 
 def has_nothing_to_do(state: NavigationPolicyState) -> bool:
@@ -278,7 +279,7 @@ class NavigationPolicy(Policy[NavigationPolicyState]):
             return None
         assert state.observation is not None
         action = NavigationAction(self._choose(*inputs.observe(state)))
-        return physical_of(action, state.observation, inputs.exits)
+        return physical_of(action, driver_of(state.observation, inputs.exits))
 
     def _inputs_of(self, town: Town) -> DriverInputs:
         """Returns the conversion for a town; each is made once."""

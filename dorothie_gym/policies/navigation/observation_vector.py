@@ -1,4 +1,4 @@
-"""Observation vector of `Navigation-v0`: numbers in [-1, 1] computed from the observation of the Co-Wizard."""
+"""Observation vector of `Navigation-v0`: numbers in [-1, 1] computed from what the Co-Wizard knows."""
 
 from __future__ import annotations
 
@@ -11,26 +11,35 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
     LandmarkName,
     ObjectClass,
     PhysicalAction,
-    StreetName,
     WeatherParameter,
 )
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
+from dorothie_gym.policies.navigation.driver_view import (
+    COLOURS,
+    OBJECTS,
+    CostRecord,
+    DriverArrays,
+    DriverView,
+    HeardRecord,
+    driver_arrays,
+    read_view,
+)
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
-from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits, SectorExit
-from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.sim.ego.limits import MAX_CRUISE
-from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn, ObservationMapping
+from dorothie_gym.spaces import Motion, ObservationMapping
 from dorothie_gym.spaces.fields import share, signal, sizes
 
 Vector: TypeAlias = NDArray[np.float32]
@@ -40,9 +49,6 @@ MAX_SECONDS = 600.0
 
 DECISION_FREQUENCY = 2.0
 """Default number of driving decisions per second [Hz]."""
-
-OBJECTS = 6
-"""Number of objects in the vector, the nearest first."""
 
 KINDS = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
 """Classes of objects that the vector distinguishes; all others count as the first."""
@@ -66,8 +72,10 @@ AGE_UNIT = 10.0
 """Unit of the age of an instruction [s]."""
 
 _WEATHER = tuple((parameter.low, parameter.high - parameter.low) for parameter in WeatherParameter)
-_MANOEUVRES = (PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN, PhysicalAction.J_TURN)
-_COLOURS = tuple(LightColour)
+_TURN = int(PhysicalAction.J_TURN.value)
+_MANOEUVRES = (int(PhysicalAction.LANE_SWITCH.value), int(PhysicalAction.U_TURN.value), _TURN)
+_KINDS = tuple(int(kind.value) for kind in KINDS)
+_MOTIONS, _MOVES, _ACTIONS, _LANDMARKS = len(Motion), len(DialogueMove), len(ActionValue), len(LandmarkName)
 
 FIELD_SPECS = (
     signal("speed", 1, unit="25 m/s", meaning="speed of the car"),
@@ -91,7 +99,7 @@ FIELD_SPECS = (
     ),
     signal(
         "traffic_light",
-        1 + len(_COLOURS),
+        1 + len(COLOURS),
         unit="100 m, 1",
         meaning="distance to the light at the end of the lane; one-hot colour (green, yellow, red)",
     ),
@@ -166,14 +174,163 @@ class HeardInstruction:
     driven: float = 0.0
     goal: Place | None = None
 
+    def write(self, town: Town, driver: DriverArrays) -> None:
+        """Writes the instruction into the arrays of a driver in a town."""
+        record, given = plain(driver.heard)[0], self.instruction
+        record["driven"] = self.driven
+        if given is not None:
+            record["distance"], record["time"], record["move"] = given.distance, given.time, given.act.move.value
+            record["sector"] = -1 if given.sector is None else given.sector
+            for name, value in (("action", given.action), ("landmark", given.landmark), ("street", given.street)):
+                record[name] = -1 if value is None else value.value
+        record["goal_lane"] = -1
+        if self.goal is not None:
+            record["goal_lane"], record["goal_station"] = self.goal
+            record["goal_x"], record["goal_y"] = town.lanes[self.goal[0]].position(self.goal[1])
+
     def driven_on(self, before: ObservationMapping, now: ObservationMapping) -> HeardInstruction:
         """Adds the distance driven between two observations, computed from the speeds in both."""
         seconds = float(now["time"][0] - before["time"][0])
-        return replace(self, driven=self.driven + seconds * float(before["speed"][0] + now["speed"][0]) / 2.0)
+        return self.after(seconds, float(before["speed"][0]), float(now["speed"][0]))
+
+    def after(self, seconds: float, before: float, now: float) -> HeardInstruction:
+        """Adds the distance driven in some time [s] between two speeds [m/s]."""
+        return replace(self, driven=self.driven + seconds * (before + now) / 2.0)
+
+
+@compiled
+def encode(driver: DriverArrays, max_seconds: float) -> None:
+    """Writes the observation vector of a driver from its view, the last instruction and the costs of routes.
+
+    Args:
+        driver: arrays of the driver; `vector` is written.
+        max_seconds: time limit of the session [s].
+    """
+    view, heard, vector = driver.inputs[0], driver.heard[0], driver.vector
+    vector[:] = 0.0
+    k = _encode_car(view, vector)
+    k = _encode_junction(view, heard, vector, k)
+    if view.light >= 0:
+        _put(vector, k, view.light_distance / DISTANCE_UNIT)
+        vector[k + 1 + view.light] = 1.0
+    k = _encode_instruction(view, heard, vector, k + 1 + len(COLOURS))
+    k = _encode_goal(view, heard, driver.costs[0], vector, k)
+    k = _encode_objects(view, vector, k)
+    for n in range(len(_WEATHER)):
+        low, span = _WEATHER[n]
+        k = _put(vector, k, (view.weather[n] - low) / span)
+    _put(vector, k, view.time / max_seconds)
+
+
+@inlined
+def _put(vector: Vector, k: int, value: float) -> int:
+    """Writes a value, clipped to its range; returns the next index."""
+    vector[k] = min(max(value, -1.0), 1.0)
+    return k + 1
+
+
+@inlined
+def _encode_car(view: DriverView, vector: Vector) -> int:
+    k = _put(vector, 0, view.speed / SPEED_UNIT)
+    k = _put(vector, k, view.cruise / MAX_CRUISE)
+    vector[k + view.motion] = 1.0
+    k += _MOTIONS
+    for n in range(len(_MANOEUVRES)):
+        k = _put(vector, k, 1.0 if view.manoeuvre == _MANOEUVRES[n] else 0.0)
+    if view.hazard > 0:
+        vector[k] = 1.0
+        _put(vector, k + 1, view.hazard_distance / DISTANCE_UNIT)
+    k += 2
+    for flag in (view.lights, view.in_junction, view.has_left, view.has_right):
+        k = _put(vector, k, 1.0 if flag else 0.0)
+    k = _put(vector, k, view.limit / SPEED_UNIT)
+    k = _put(vector, k, math.sqrt(view.place_variance) / 10.0)
+    return _put(vector, k, math.sqrt(view.heading_variance) / 0.1)
+
+
+@inlined
+def _encode_junction(view: DriverView, heard: HeardRecord, vector: Vector, k: int) -> int:
+    if view.junction >= 0:
+        vector[k] = 1.0
+        _put(vector, k + 1, view.junction_distance / DISTANCE_UNIT)
+        for n in range(len(SECTORS)):
+            if view.exit_lane[n] >= 0:
+                at = k + 2 + 3 * n
+                vector[at] = 1.0
+                if view.manoeuvre == _TURN and view.exit_angle[n] == view.angle:
+                    vector[at + 1] = 1.0
+                if heard.street > 0 and view.exit_street[n] == heard.street:
+                    vector[at + 2] = 1.0
+    return k + 2 + 3 * len(SECTORS)
+
+
+@inlined
+def _encode_instruction(view: DriverView, heard: HeardRecord, vector: Vector, k: int) -> int:
+    if heard.move >= 0:
+        vector[k] = 1.0
+        vector[k + 1 + heard.move] = 1.0
+        at = k + 1 + _MOVES
+        if heard.action >= 0:
+            vector[at + heard.action] = 1.0
+        at += _ACTIONS
+        if heard.sector >= 0:
+            vector[at + heard.sector] = 1.0
+        at += len(SECTORS)
+        if heard.landmark >= 0:
+            vector[at + heard.landmark] = 1.0
+        left = heard.distance - heard.driven
+        at = _put(vector, at + _LANDMARKS, left / DISTANCE_UNIT)
+        at = _put(vector, at, left / CLOSE_UNIT)
+        _put(vector, at, (view.time - heard.time) / AGE_UNIT)
+    return k + 4 + _MOVES + _ACTIONS + len(SECTORS) + _LANDMARKS
+
+
+@inlined
+def _encode_goal(view: DriverView, heard: HeardRecord, costs: CostRecord, vector: Vector, k: int) -> int:
+    """Writes the place of the goal, and by how much each manoeuvre and exit lengthens the route to it."""
+    if heard.goal_lane >= 0:
+        dx, dy = heard.goal_x - view.x, heard.goal_y - view.y
+        sine, cosine = math.sin(view.heading), math.cos(view.heading)
+        vector[k] = 1.0
+        at = _put(vector, k + 1, (dx * cosine + dy * sine) / TOWN_UNIT)
+        at = _put(vector, at, (dy * cosine - dx * sine) / TOWN_UNIT)
+        at = _put(vector, at, costs.here / TOWN_UNIT)
+        ahead = heard.goal_station - view.station if view.lane == heard.goal_lane else math.inf
+        at = _put(vector, at, ahead / DISTANCE_UNIT)
+        at = _put(vector, at, ahead / CLOSE_UNIT)
+        for other in (costs.back, costs.left, costs.right):
+            at = _put(vector, at, _added_cost(other, costs.here))
+        best = math.inf
+        for n in range(len(SECTORS)):
+            best = min(best, costs.exits[n])
+        for n in range(len(SECTORS)):
+            at = _put(vector, at, _added_cost(costs.exits[n], best))
+    return k + 9 + len(SECTORS)
+
+
+@inlined
+def _added_cost(cost: float, than: float) -> float:
+    """Returns by how much a cost exceeds another, of `DETOUR_UNIT`; 1 for an infinite cost."""
+    if cost == math.inf:
+        return 1.0
+    return (cost - than) / DETOUR_UNIT if than < math.inf else -1.0
+
+
+@inlined
+def _encode_objects(view: DriverView, vector: Vector, k: int) -> int:
+    for n in range(OBJECTS):
+        kind, at = view.object_kind[n], k + n * (3 + len(_KINDS))
+        if kind == 0:
+            break
+        at = _put(vector, at, view.object_distance[n] / 50.0)
+        at = _put(vector, at, math.sin(view.object_bearing[n]))
+        at = _put(vector, at, math.cos(view.object_bearing[n]))
+        vector[at + (1 if kind == _KINDS[1] else 2 if kind == _KINDS[2] else 0)] = 1.0
+    return k + OBJECTS * (3 + len(_KINDS))
 
 
 class NavigationEncoder:
-    """Encoder of observations for a driver in a town, in `NavigationEnv` as in `DuoWizardEnv`.
+    """Encoder of observations for a driver in a town, in `DuoWizardEnv`.
 
     The vector depends only on the Co-Wizard's observation in `DuoWizardEnv`, the map, and the instructions: it holds
     nothing that the Co-Wizard does not know.
@@ -181,8 +338,7 @@ class NavigationEncoder:
 
     def __init__(self, town: Town, exits: JunctionExits, max_seconds: float) -> None:
         self._town, self._exits, self._max_seconds = town, exits, max_seconds
-        self._oncoming = oncoming_lanes(town)
-        self._cost_to_go = CostToGo(town)
+        self._costs = RouteCosts(town)
 
     def observe(self, seen: ObservationMapping, heard: HeardInstruction, blocked: tuple[Place, ...]) -> Vector:
         """Encodes an observation.
@@ -195,146 +351,41 @@ class NavigationEncoder:
         Returns:
             Vector (n,) of `navigation_space`.
         """
-        lane, station = int(seen["lane"]), float(seen["station"][0])
-        choice = self._exits.choice_ahead(seen)
-        ways = self._exits.by_sector(choice) if choice is not None else (None,) * len(SECTORS)
-        self._cost_to_go.aim(heard.goal, blocked if heard.goal is not None else ())
-        values = [
-            *self._car(seen, lane),
-            *self._junction(seen, heard, ways, choice),
-            *self._light(lane, station, float(seen["time"][0])),
-            *_instruction(heard, float(seen["time"][0])),
-            *self._goal(seen, heard, lane, station),
-            *self._detours(heard, ways, lane, station),
-            *_objects(seen),
-            *((float(value) - low) / span for value, (low, span) in zip(seen["weather"], _WEATHER, strict=True)),
-            float(seen["time"][0]) / self._max_seconds,
-        ]
-        observation = np.array(values, dtype=np.float32)
-        return np.minimum(np.maximum(observation, -1.0, out=observation), 1.0, out=observation)
+        driver = driver_arrays(sum(FIELDS.values()))
+        read_view(seen, self._exits, plain(driver.inputs)[0])
+        heard.write(self._town, driver)
+        self._costs.write(heard.goal, blocked, driver)
+        encode(driver, self._max_seconds)
+        return driver.vector
 
-    def _car(self, seen: ObservationMapping, lane: int) -> list[float]:
-        town = self._town
-        manoeuvre, covariance = int(seen["manoeuvre"]), seen["pose_covariance"]
-        hazard = bool(seen["hazard"])
-        return [
-            float(seen["speed"][0]) / SPEED_UNIT,
-            float(seen["cruise_speed"][0]) / MAX_CRUISE,
-            *_one_hot(int(seen["motion"]), len(Motion)),
-            *(float(manoeuvre == action.value) for action in _MANOEUVRES),
-            float(hazard),
-            float(seen["hazard_distance"][0]) / DISTANCE_UNIT if hazard else 0.0,
-            float(seen["lights"]),
-            float(town.lanes[lane].in_junction),
-            float(town.neighbour(lane, LinkType.LANE_CHANGE_LEFT) is not None),
-            float(town.neighbour(lane, LinkType.LANE_CHANGE_RIGHT) is not None),
-            town.lanes[lane].speed_limit / SPEED_UNIT,
-            math.sqrt(float(covariance[0, 0] + covariance[1, 1])) / 10.0,
-            math.sqrt(float(covariance[2, 2])) / 0.1,
-        ]
 
-    def _junction(
-        self, seen: ObservationMapping, heard: HeardInstruction, ways: tuple[SectorExit | None, ...], choice: int | None
-    ) -> list[float]:  # fmt: skip
-        if choice is None:
-            return [0.0] * (2 + 3 * len(SECTORS))
-        distance = float(seen["exits"][0, ExitColumn.DISTANCE])
-        turning = int(seen["manoeuvre"]) == PhysicalAction.J_TURN
-        angle = int(seen["manoeuvre_angle"][0])
-        street = heard.instruction.street if heard.instruction is not None else None
-        values = [1.0, distance / DISTANCE_UNIT]
-        for way in ways:
-            if way is None:
-                values += (0.0, 0.0, 0.0)
-                continue
-            named = street is not None and street_of(seen, self._town, way.lane) is street
-            values += (1.0, float(turning and way.angle == angle), float(named and street is not StreetName.UNKNOWN))
-        return values
+class RouteCosts:
+    """Costs of the routes to a driver's goal."""
 
-    def _light(self, lane: int, station: float, time: float) -> list[float]:
-        colour = self._town.light(lane, time)
-        if colour is None:
-            return [0.0] * (1 + len(_COLOURS))
-        left = self._town.lanes[lane].length - station
-        return [left / DISTANCE_UNIT, *_one_hot(_COLOURS.index(colour), len(_COLOURS))]
+    def __init__(self, town: Town) -> None:
+        self._town, self._oncoming, self._cost_to_go = town, oncoming_lanes(town), CostToGo(town)
 
-    def _goal(self, seen: ObservationMapping, heard: HeardInstruction, lane: int, station: float) -> list[float]:
-        if heard.goal is None:
-            return [0.0] * 6
-        x, y = self._town.lanes[heard.goal[0]].position(heard.goal[1])
-        here_x, here_y, heading = (float(value) for value in seen["pose"])
-        dx, dy = float(x) - here_x, float(y) - here_y
-        sine, cosine = math.sin(heading), math.cos(heading)
-        left = self._cost_to_go.from_place(lane, station)
-        ahead = heard.goal[1] - station if lane == heard.goal[0] else math.inf
-        return [
-            1.0,
-            (dx * cosine + dy * sine) / TOWN_UNIT,
-            (dy * cosine - dx * sine) / TOWN_UNIT,
-            min(left / TOWN_UNIT, 1.0),
-            min(ahead / DISTANCE_UNIT, 1.0),
-            min(ahead / CLOSE_UNIT, 1.0),
-        ]
+    def write(self, goal: Place | None, blocked: tuple[Place, ...], driver: DriverArrays) -> None:
+        """Writes the costs from where a driver believes to be; nothing where no goal is known.
 
-    def _detours(
-        self, heard: HeardInstruction, ways: tuple[SectorExit | None, ...], lane: int, station: float
-    ) -> list[float]:
-        """Returns by how much each manoeuvre and exit lengthens the route to the goal; zeros where no goal is known."""
-        if heard.goal is None:
-            return [0.0] * (3 + len(SECTORS))
+        Args:
+            goal: lane and distance along it [m].
+            blocked: places behind the roadblocks known.
+            driver: arrays of the driver; the view is read, the costs are written.
+        """
+        self._cost_to_go.aim(goal, blocked if goal is not None else ())
+        if goal is None:
+            return
         town, left = self._town, self._cost_to_go.from_place
-        stay = left(lane, station)
+        view, costs = plain(driver.inputs)[0], plain(driver.costs)[0]
+        lane, station = int(view["lane"]), float(view["station"])
         oncoming = self._oncoming.at(lane, station)
-        others = [math.inf if oncoming is None else left(oncoming.lane, oncoming.station)]
-        for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
+        costs["here"] = left(lane, station)
+        costs["back"] = math.inf if oncoming is None else left(oncoming.lane, oncoming.station)
+        for name, side in (("left", LinkType.LANE_CHANGE_LEFT), ("right", LinkType.LANE_CHANGE_RIGHT)):
             beside = town.neighbour(lane, side)
             position = town.lanes[lane].position(station)
-            others.append(math.inf if beside is None else left(beside, float(town.lanes[beside].project(position)[0])))
-        costs = [math.inf if way is None else left(way.lane, 0.0) for way in ways]
-        best = min(costs)
-        return [*(_added_cost(other, stay) for other in others), *(_added_cost(cost, best) for cost in costs)]
-
-
-def _added_cost(cost: float, than: float) -> float:
-    """Returns by how much a cost exceeds another, of `DETOUR_UNIT`, from -1 to 1; 1 for an infinite cost."""
-    if not math.isfinite(cost):
-        return 1.0
-    return max(min((cost - than) / DETOUR_UNIT, 1.0), -1.0) if math.isfinite(than) else -1.0
-
-
-def _instruction(heard: HeardInstruction, time: float) -> list[float]:
-    given = heard.instruction
-    if given is None:
-        count = ("said", "said_action", "said_sector", "said_landmark", "said_distance", "said_age")
-        return [0.0] * sum(FIELDS[name] for name in count)
-    left = given.distance - heard.driven
-    return [
-        1.0,
-        *_one_hot(int(given.act.move), len(DialogueMove)),
-        *_one_hot(-1 if given.action is None else given.action.value, len(ActionValue)),
-        *_one_hot(-1 if given.sector is None else given.sector, len(SECTORS)),
-        *_one_hot(-1 if given.landmark is None else given.landmark.value, len(LandmarkName)),
-        left / DISTANCE_UNIT,
-        left / CLOSE_UNIT,
-        (time - given.time) / AGE_UNIT,
-    ]
-
-
-def _objects(seen: ObservationMapping) -> list[float]:
-    values: list[float] = []
-    for row in seen["objects"][:OBJECTS].tolist():
-        kind = int(row[ObjectColumn.KIND])
-        if kind == 0:
-            break
-        bearing = row[ObjectColumn.BEARING]
-        place = next((k for k, known in enumerate(KINDS) if known.value == kind), 0)
-        values += (row[ObjectColumn.DISTANCE] / 50.0, math.sin(bearing), math.cos(bearing))
-        values += _one_hot(place, len(KINDS))
-    return values + [0.0] * (FIELDS["objects"] - len(values))
-
-
-def _one_hot(at: int, size: int) -> list[float]:
-    values = [0.0] * size
-    if at >= 0:
-        values[at] = 1.0
-    return values
+            costs[name] = math.inf if beside is None else left(beside, float(town.lanes[beside].project(position)[0]))
+        costs["exits"] = [
+            math.inf if way < 0 or view["junction"] < 0 else left(way, 0.0) for way in view["exit_lane"].tolist()
+        ]

@@ -56,6 +56,17 @@ def phase_at(town: TownArrays, number: int, time: float) -> tuple[int, float]:
 
 
 @compiled
+def colour_at(town: TownArrays, number: int, time: float) -> int:
+    """Returns the `Colour` of the light at the end of a lane at any time [s]; -1 where there is none."""
+    lane = town.lanes[number]
+    if lane.programme < 0:
+        return -1
+    programme = town.programmes[lane.programme]
+    phase, _ = phase_at(town, lane.programme, time)
+    return int(town.colours[programme.colour + phase * programme.slots + lane.slot])
+
+
+@compiled
 def light(town: TownArrays, world: WorldArrays, number: int, time: float) -> int:
     """Returns the `Colour` of the light at the end of a lane at a time from now on; green where there is none."""
     lane = town.lanes[number]

@@ -13,6 +13,7 @@ from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation import NavigationAction, NavigationPolicy
 from dorothie_gym.policies.navigation.actions import physical_of
 from dorothie_gym.policies.navigation.demonstrations import DemonstrationRecorder, action_of
+from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.spaces import CoWizardAction, Physical, noop
 from tests.envs.navigation_drivers import obey
@@ -61,7 +62,7 @@ def test_action_of_inverts_physical_of(env: NavigationEnv) -> None:
         for _ in range(60):
             action = NavigationAction(rng.choice(np.flatnonzero(info["action_mask"])))
             seen = env.drive.seen[Role.CO_WIZARD]
-            physical = physical_of(action, seen, env.drive.exits)
+            physical = physical_of(action, driver_of(seen, env.drive.exits))
             set_as_asked = action in (NavigationAction.FASTER, NavigationAction.SLOWER, NavigationAction.LIGHTS)
             expected = NavigationAction.NOTHING if set_as_asked or physical is None else action
             assert action_of(physical, seen, env.drive.exits) is expected
