@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, SupportsFloat
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import VecMonitor
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
 import dorothie_gym
+from dorothie_gym.baselines.rl.repeatable_batch import RepeatableVecEnv
+from dorothie_gym.baselines.rl.sb3_vec_env import unrelated_seeds
 from dorothie_gym.baselines.rl.settings import Arguments, Page, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import AnyEnv, make_vector_env
 from dorothie_gym.errors import ModelFileError, SettingsError, short_repr
@@ -167,10 +171,42 @@ class RepeatableEnvFactory(EnvFactory):
         return RepeatableEpisodes(super().__call__())
 
 
+def has_batch(name: str) -> bool:
+    """Returns whether all environments of an id can be stepped as one batch, see `gymnasium.make_vec`."""
+    return name in gym.registry and gym.registry[name].vector_entry_point is not None and name in ENVIRONMENTS_OF_MODELS
+
+
+def make_batch(name: str, settings: Arguments, environments: int, mode: AutoresetMode) -> VectorEnv[Any, Any, Any]:
+    """Makes environments of an id with a batch; raises `SettingsError` if it does not accept the arguments."""
+    try:
+        return gym.make_vec(name, num_envs=environments, autoreset_mode=mode, **settings)
+    except (TypeError, ValueError) as error:
+        raise SettingsError(f"env {name}: {error}") from error
+
+
 def make_training_env(settings: TrainingSettings, ray: str | None = None) -> VecMonitor:
-    """Returns the vector environment of a training with stable-baselines3; see `make_vector_env`."""
+    """Returns the vector environment of a training with stable-baselines3.
+
+    Without worker processes the environments are one batch if their id has one; else see `make_vector_env`.
+    """
     make = RepeatableEnvFactory(settings.env, settings.env_settings)
     make().close()  # reports invalid settings in this process
-    vector = make_vector_env(make, settings.environments, settings.workers, ray)
-    vector.seed(settings.seed * 10_000)
-    return VecMonitor(vector)
+    vector: VecEnv
+    if has_batch(settings.env) and not settings.workers and ray is None:
+        batch = make_batch(settings.env, settings.env_settings, settings.environments, AutoresetMode.SAME_STEP)
+        vector = RepeatableVecEnv(batch)
+    else:
+        vector = make_vector_env(make, settings.environments, settings.workers, ray)
+    monitor = _Monitor(vector)
+    monitor.seed(settings.seed)
+    return monitor
+
+
+class _Monitor(VecMonitor):
+    """Monitor that sets the same seeds for batches, processes and single environments, see `unrelated_seeds`."""
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Sets the seeds of the next reset; the algorithms call it with the seed of the run."""
+        seeds = unrelated_seeds(seed, self.num_envs)
+        self.unwrapped._seeds = seeds
+        return seeds

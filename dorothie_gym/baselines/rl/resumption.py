@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -19,9 +19,10 @@ import torch
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
-from stable_baselines3.common.vec_env import VecMonitor
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
 from dorothie_gym.baselines.rl.checkpoint import Model, parameters_of, refusing_misfits, set_parameters
+from dorothie_gym.baselines.rl.repeatable_batch import Episode, RepeatableVecEnv
 from dorothie_gym.baselines.rl.settings import Page
 from dorothie_gym.baselines.tensor_files import save_tensors
 from dorothie_gym.errors import InputFileError, ModelFileError, one_line, short_repr
@@ -108,7 +109,7 @@ def state_of(model: Model) -> tuple[Page, Tensors]:
     parameters, tensors = parameters_of(model)
     vector: VecMonitor = model.env
     legacy: Any = np.random.get_state(legacy=False)
-    episodes = vector.env_method("recorded_episode")
+    episodes = vector.env_method("recorded_episodes" if is_batch(vector) else "recorded_episode")
     logged = model.logger.name_to_value
     page: Page = {
         "parameters": parameters,
@@ -147,15 +148,27 @@ def restore_state(model: Model, checkpoint: Checkpoint) -> None:
     """
     with refusing_misfits(checkpoint.path):
         _restore(model, checkpoint.page, checkpoint.tensors)
-        repeated = [
-            model.env.env_method("repeat_episode", start, checkpoint.tensors[f"actions/{k}"].numpy(), indices=[k])[0]
-            for k, start in enumerate(checkpoint.page["episodes"])
+        episodes = [
+            (start, checkpoint.tensors[f"actions/{k}"].numpy()) for k, start in enumerate(checkpoint.page["episodes"])
         ]
+        repeated = _repeat(model.env, episodes)
     if not np.array_equal(np.asarray(repeated, dtype=model._last_obs.dtype), model._last_obs, equal_nan=True):
         raise ModelFileError(
             f"{checkpoint.path}: the environments do not repeat their episodes exactly; they are of another version or "
             "depend on more than their seed and the actions. Start the run in another folder"
         )
+
+
+def is_batch(vector: VecEnv) -> bool:
+    """Returns whether the environments are one batch, see `RepeatableVecEnv`."""
+    return isinstance(vector.unwrapped, RepeatableVecEnv)
+
+
+def _repeat(vector: VecEnv, episodes: Sequence[Episode]) -> Sequence[Any]:
+    """Repeats recorded episodes, one in each environment; returns their last observations."""
+    if is_batch(vector):
+        return vector.env_method("repeat_episodes", episodes)
+    return [vector.env_method("repeat_episode", *episode, indices=[k])[0] for k, episode in enumerate(episodes)]
 
 
 def _restore(model: Model, page: Page, tensors: Mapping[str, torch.Tensor]) -> None:

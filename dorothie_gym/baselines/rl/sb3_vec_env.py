@@ -65,8 +65,7 @@ class NativeVecEnv(VecEnv):
 
         stable-baselines3 gives environment k the seed `seed + k`, so that two runs share most of their episodes.
         """
-        source = np.random.SeedSequence(seed)
-        self._seeds = [int(number) for number in source.generate_state(self.num_envs)]
+        self._seeds = unrelated_seeds(seed, self.num_envs)
         return self._seeds
 
     def reset(self) -> VecEnvObs:
@@ -139,6 +138,11 @@ class NativeVecEnv(VecEnv):
         frames = self.env.render()
         drawn = [np.asarray(frame) for frame in frames] if isinstance(frames, tuple) else []
         return [*drawn, *[None] * (self.num_envs - len(drawn))]
+
+
+def unrelated_seeds(seed: int | None, count: int) -> list[int | None]:
+    """Returns the seeds of some environments of a run; those of runs whose seeds lie next to each other differ."""
+    return [int(number) for number in np.random.SeedSequence(seed).generate_state(count)]
 
 
 def _of_one(infos: Mapping[str, Any], number: int) -> dict[str, Any]:
