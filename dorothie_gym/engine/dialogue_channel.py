@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -13,6 +14,7 @@ from dorothie_gym.dialogue import (
     Conversation,
     Recogniser,
     Span,
+    SpeakerStyle,
     Utterance,
     draw_style,
     guess_spans,
@@ -80,11 +82,24 @@ class DialogueChannel:
         self._observe_acts, self._misheard = config.observe_acts, bool(config.word_error_rate)
         self._conversation = Conversation(config.words_per_second, spans)
         self._annotator = Annotator(storyboard.landmarks[subgoal.landmark].name for subgoal in storyboard.subgoals)
-        self._words, rng = np.random.default_rng(words), np.random.default_rng(styles)
-        self._styles = {role: draw_style(role, rng) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
-        self._recogniser = Recogniser(
-            AsrChannel(rate=config.word_error_rate), np.random.default_rng(ears), classify=config.observe_acts
-        )
+        self._seeds = words, ears, styles
+        self._rate = config.word_error_rate
+
+    # made when the first utterance needs them: there are sessions without words
+
+    @cached_property
+    def _words(self) -> np.random.Generator:
+        return np.random.default_rng(self._seeds[0])
+
+    @cached_property
+    def _recogniser(self) -> Recogniser:
+        ears = np.random.default_rng(self._seeds[1])
+        return Recogniser(AsrChannel(rate=self._rate), ears, classify=self._observe_acts)
+
+    @cached_property
+    def _styles(self) -> dict[Role, SpeakerStyle]:
+        rng = np.random.default_rng(self._seeds[2])
+        return {role: draw_style(role, rng) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
 
     @property
     def exchanges(self) -> int:

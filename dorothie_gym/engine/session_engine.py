@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
@@ -56,7 +57,6 @@ class LiveSession:
         world: simulated world.
         task: progress in the storyboard.
         beliefs: goals and places of hidden landmarks as the Co-Wizard has stated them.
-        masks: masks of the actions that would be carried out now.
         messages: messages of the Ad-Wizard so far, with their times [s].
         exceptions: times [s] of the exceptions so far, positions of the ego [m], and data of their events.
         trail: positions of the ego [m], one for each decision.
@@ -77,11 +77,7 @@ class LiveSession:
         self._dialogue = DialogueChannel(
             scenario, config, limits.spans, words=word_seed, ears=ear_seed, styles=style_seed
         )
-        junction = UpcomingJunction(self.world)
-        self._observations = ObservationBuilder(
-            self.world, scenario, self.task, self.beliefs, limits, config.observe_acts, junction
-        )
-        self.masks = ActionMasks(self.world, self.task, limits, junction)
+        self._junction = UpcomingJunction(self.world)
         self._log = EventLog(self.world)
         self._subgoals = SubgoalTracker(scenario, self.task, self._dialogue, self._log)
         self.decisions = 0
@@ -92,6 +88,19 @@ class LiveSession:
         self._end_reason = ""
         self._infractions: dict[str, int] | None = None
         self._delivered = self._deliver("")
+
+    # made when they are first used: not all sessions observe by dicts, or ask for masks
+
+    @cached_property
+    def _observations(self) -> ObservationBuilder:
+        return ObservationBuilder(
+            self.world, self.scenario, self.task, self.beliefs, self.limits, self.config.observe_acts, self._junction
+        )
+
+    @cached_property
+    def masks(self) -> ActionMasks:
+        """Masks of the actions that would be carried out now."""
+        return ActionMasks(self.world, self.task, self.limits, self._junction)
 
     # --- one decision -----------------------------------------------------------------------------------------------
 
