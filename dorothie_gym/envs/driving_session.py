@@ -25,12 +25,13 @@ from dorothie_gym.engine.scenario import (
     template_option,
 )
 from dorothie_gym.engine.session_engine import LiveSession
+from dorothie_gym.envs.episode import TERMS, Ending, episode_arrays, judge
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
-from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
+from dorothie_gym.policies.ad_wizard import ScriptedAdWizard, idle_until
 from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, UNDER_WAY, NavigationAction, prepares
 from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_arrays, look
 from dorothie_gym.policies.navigation.instructor import Guidance, Instructor, NavigationInstruction, words_of
@@ -40,7 +41,6 @@ from dorothie_gym.policies.observation_parser import read_landmarks
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.limits import EGO_STANDING
-from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.world import World
@@ -55,17 +55,12 @@ from dorothie_gym.spaces import (
     RoleAction,
     SpaceLimits,
     StepInfo,
+    plain_text,
 )
+from dorothie_gym.spaces.limits import STORY_LENGTH
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
-NEARER = 1.0
-"""Decrease of the cost to go that counts as progress for `patience` [m]."""
-
-LEFT_ROAD_DISTANCE = 15.0
-"""Distance from the path beyond which the ego counts as having left the road [m]."""
-
-_RULES = tuple(kind.value for kind in INFRACTION_KINDS if kind is not WorldEventKind.COLLISION)
 _SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
 
 
@@ -80,10 +75,7 @@ class DrivingSession:
         seen: present observations of the roles, each built when it is read.
         driver: what the driver knows at the present decision, and its observation.
         junction: next junction with a choice on the planned path.
-        reward: reward of the last decision.
-        terms: its terms.
-        terminated: whether the destination was reached, or the participant gave up.
-        truncated: whether time is up.
+        episode: rewards and end of the episode.
     """
 
     def __init__(self, session: LiveSession, config: NavigationConfig, exits: JunctionExits) -> None:
@@ -99,18 +91,16 @@ class DrivingSession:
         self._adversary = ScriptedAdWizard(session.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
         seed = policy_seed(session.scenario.seed, Role.AD_WIZARD)
         self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
+        self._story = plain_text(session.scenario.storyboard.story, STORY_LENGTH)
         self.heard, self._notes = HeardInstruction(), list[Mental]()
-        self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # goal and roadblocks that `_nearest` refers to
+        self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # goal and roadblocks of the last decision
         self.seen: Mapping[str, Observation] = LazyObservations(session)
         marks = read_landmarks(self.seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
         self._known = frozenset(mark.place for mark in marks)
-        self._rules_broken, self._collisions = self._count_infractions(), 0
-        self._nearest, self._nearest_at = math.inf, 0.0
-        self.reward, self.terms = 0.0, dict.fromkeys(vars(config.weights), 0.0)
-        self.terminated = self.truncated = False
-        self.reason: str | None = None
+        self.episode, self._task_version = episode_arrays(config), -1
         self._listen()
-        self._left = self._cost_to_go()
+        self._note_task()
+        self._state["left"], self._state["counted"] = self._cost_to_go(), self._state["reached"]
         self._look()
 
     @classmethod
@@ -137,27 +127,32 @@ class DrivingSession:
 
     def play(self, action: CoWizardAction) -> None:
         """Plays one decision; the next belief update of the Co-Wizard is sent with its action."""
-        if self.terminated or self.truncated:
+        if self.reason is not None:
             from gymnasium.error import ResetNeeded
 
             raise ResetNeeded("the session is over: call reset() first")
         if self._notes:
             action = replace(action, mental=self._notes.pop(0))
-        reached, before, speed = self._count_reached(), self.session.world.time, float(self.session.world.car.speed)
+        before, speed = self.session.world.time, float(self.session.world.car.speed)
         self.session.step({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
         self.seen = LazyObservations(self.session)
         self.heard = self.heard.after(self.session.world.time - before, speed, float(self.session.world.car.speed))
-        progress = self._progress()
+        state, left = self._state, self._cost_to_go()  # to the goal of the last decision
+        last = float(state["left"])
+        state["progress"] = last - left if math.isfinite(left) and math.isfinite(last) else 0.0
         self._listen()
-        self._left = self._cost_to_go()
-        self._note_patience()
-        self._end()
-        self._reward(progress, self._count_reached() - reached, action.physical is not None)
+        state["left"] = self._cost_to_go()
+        state["acted"] = action.physical is not None
+        state["refusals"] = len(self.session.refused[Role.CO_WIZARD])
+        self._note_task()
+        judge(self.session.world.actors.arrays, self.episode)
+        if self.reason is not None:
+            self.session.end(self.reason)
         self._look()
 
     def observe_roles(self) -> None:
         """Builds the observations that are read before the next decision, before the planned path changes."""
-        for role in (Role.CO_WIZARD, Role.AD_WIZARD) if self._adversary is not None else (Role.CO_WIZARD,):
+        for role in (Role.CO_WIZARD,) if self._is_idle else (Role.CO_WIZARD, Role.AD_WIZARD):
             self.seen[role]
 
     def _look(self) -> None:
@@ -183,13 +178,13 @@ class DrivingSession:
     def info(self) -> StepInfo:
         """Returns the info of the last decision, as a new dictionary."""
         info: StepInfo = {
-            "reward_terms": dict(self.terms),
+            "reward_terms": self.terms,
             "refused": list(self.session.refused[Role.CO_WIZARD]),
             "infractions": dict(self.session.infractions),
         }
-        if self.terminated or self.truncated:
+        if self.reason is not None:
             info["is_success"], info["reason"] = self.session.success, self.reason
-            info["subgoals"] = {"live": len(self.session.task.live), "reached": self._count_reached()}
+            info["subgoals"] = {"live": len(self.session.task.live), "reached": int(self._state["reached"])}
         return info
 
     # --- other roles -------------------------------------------------------------------------------------------------
@@ -198,8 +193,20 @@ class DrivingSession:
         """Returns the present action of the Ad-Wizard."""
         if self._adversary is None or self._plans is None:
             return _INTACT
+        if self._is_idle:
+            self._plans = self._plans.advanced()
+            return _INTACT
         action, self._plans = self._adversary.step(self.seen[Role.AD_WIZARD], self._plans)
         return self._decoder(action)
+
+    @property
+    def _is_idle(self) -> bool:
+        """Whether the Ad-Wizard does nothing at this decision."""
+        if self._adversary is None or self._plans is None:
+            return True
+        return self.session.world.time < idle_until(
+            self._adversary, self._plans, self.session.scenario.storyboard.story
+        )
 
     def _listen(self) -> None:
         """Lets the instructor speak, and updates the goal."""
@@ -238,53 +245,48 @@ class DrivingSession:
         planner = self.session.world.planner
         return self.instructor.cost_to_go.from_place(planner.lane, planner.station)
 
-    def _progress(self) -> float:
-        """Returns the decrease of the cost to go [m]; to be called before the goal changes."""
-        left = self._cost_to_go()
-        return self._left - left if math.isfinite(left) and math.isfinite(self._left) else 0.0
-
-    def _note_patience(self) -> None:
-        now = self.session.world.time
-        way = self.instructor.cost_to_go
+    def _note_task(self) -> None:
+        """Notes the state of the task, and whether the goal or the known roadblocks have changed."""
+        task, way, state = self.session.task, self.instructor.cost_to_go, self._state
+        if task.version != self._task_version:
+            self._task_version = task.version
+            state["reached"] = sum(task.reached(i) for i in task.live)
+            state["done"], state["succeeded"] = task.done, task.success
         aim = way.goal, way.blocked
-        if aim != self._aim or self._left < self._nearest - NEARER:
-            self._aim, self._nearest, self._nearest_at = aim, self._left, now
+        if aim != self._aim:
+            self._aim, state["renewed"] = aim, True
 
-    def _end(self) -> None:
-        session, now = self.session, self.session.world.time
-        arrived = session.task.done
-        left_road = abs(session.world.planner.offset) > LEFT_ROAD_DISTANCE
-        gave_up = now - self._nearest_at >= self._config.patience - 1e-9
-        self.terminated = arrived or left_road or gave_up
-        self.truncated = not self.terminated and now >= self._config.max_seconds - 1e-9
-        if self.terminated or self.truncated:
-            reasons = {"arrived": arrived, "left the road": left_road, "gave up": gave_up, "out of time": True}
-            self.reason = next(reason for reason, holds in reasons.items() if holds)
-            session.end(self.reason)
+    @property
+    def _state(self) -> np.void:
+        """Record of the episode."""
+        state: np.void = plain(self.episode.state)[0]
+        return state
 
-    def _reward(self, progress: float, reached: int, physical: bool) -> None:
-        weights, session = self._config.weights, self.session
-        rules, collisions = self._count_infractions(), session.world.collisions
-        self.terms = {
-            "progress": weights.progress * progress,
-            "subgoal": weights.subgoal * reached,
-            "success": weights.success * session.success,
-            "collision": weights.collision * (collisions - self._collisions),
-            "infraction": weights.infraction * (rules - self._rules_broken),
-            "gave_up": weights.gave_up * (self.terminated and self.reason != "arrived"),
-            "time": weights.time / self._config.decision_frequency,
-            "action": weights.action * (physical and not session.refused[Role.CO_WIZARD]),
-            "refusal": weights.refusal * len(session.refused[Role.CO_WIZARD]),
-        }
-        self._rules_broken, self._collisions = rules, collisions
-        self.reward = float(sum(self.terms.values()))
+    @property
+    def reward(self) -> float:
+        """Reward of the last decision."""
+        return float(self._state["reward"])
 
-    def _count_reached(self) -> int:
-        return sum(self.session.task.reached(i) for i in self.session.task.live)
+    @property
+    def terms(self) -> dict[str, float]:
+        """Terms of the reward, by name."""
+        return dict(zip(TERMS, self._state["terms"].tolist(), strict=True))
 
-    def _count_infractions(self) -> int:
-        infractions = self.session.infractions
-        return sum(infractions[name] for name in _RULES)
+    @property
+    def reason(self) -> str | None:
+        """Reason for the end of the episode; None while it goes on."""
+        ending = int(self._state["ending"])
+        return Ending(ending).label if ending else None
+
+    @property
+    def truncated(self) -> bool:
+        """Whether time is up."""
+        return bool(self._state["ending"] == Ending.OUT_OF_TIME)
+
+    @property
+    def terminated(self) -> bool:
+        """Whether the destination was reached, the ego has left the road, or the participant gave up."""
+        return not self.truncated and bool(self._state["ending"])
 
 
 Action = TypeVar("Action")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.copying import Restorable
 from dorothie_gym.envs.driving_session import DrivingEnv
-from dorothie_gym.envs.navigation_config import NavigationWeights
+from dorothie_gym.envs.episode import TERMS
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import Town
 from dorothie_gym.policies.navigation.observation_vector import Vector
@@ -26,9 +26,6 @@ Env = TypeVar("Env", bound=DrivingEnv[Any])
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
 """A town, or several that the environments of a batch play in turn."""
-
-TERMS: Final = tuple(vars(NavigationWeights()))
-"""Names of the reward terms."""
 
 INFRACTIONS: Final = tuple(kind.value for kind in INFRACTION_KINDS)
 """Names of the infractions that infos count."""
