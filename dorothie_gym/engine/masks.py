@@ -80,9 +80,7 @@ class ActionMasks:
     def _update_physical(self) -> None:
         """Updates the masks of physical actions and their angles if the state of the ego has changed."""
         planner, speed, cruise = self._world.planner, float(self._world.car.speed), self._world.ego.cruise
-        state = (
-            planner.path, planner.s, planner.held, planner.manoeuvre, planner.roadblock, planner.props, speed, cruise
-        )  # fmt: skip
+        state = *planner.state, speed, cruise
         if state == self._state:
             return
         self._state = state

@@ -28,7 +28,7 @@ from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.egos import play_share
 from dorothie_gym.sim.batch.town_vector_env import TownVectorEnv
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
-from dorothie_gym.sim.ego.path import find_sides
+from dorothie_gym.sim.ego.briefing import note_props
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import closest_walk
 from dorothie_gym.sim.sensing.perception import look_around
@@ -37,7 +37,6 @@ from dorothie_gym.sim.state.town_arrays import TownArrays, empty_town
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step
 from dorothie_gym.sim.town_env import TownEnv
-from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import noop
 
@@ -111,7 +110,8 @@ def _compile_rare() -> None:
 def _call_what_follows_a_step(world: World) -> None:
     """Calls the functions that read a step of a world, while the second process compiles the step."""
     world.visibility.signal(1.0)
-    find_sides(world.actors.arrays.path, 0, CAR_LENGTH, CAR_WIDTH)
+    world.planner.feasible(0.0)
+    note_props(world.actors.arrays, 0)
 
 
 def _play(env: TownEnv | TownVectorEnv) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from dorothie_gym.compilation import allocating
+from dorothie_gym.compilation import allocating, compiled
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.maps.polyline import (
@@ -113,24 +113,34 @@ def across(
     x, y = position(points, offsets, ends, lane, station, 0.0)
     heading = value_at(points, offsets, lane, HEADING, station)
     height = value_at(points, offsets, lane, HEIGHT, station)
-    c, n = math.cos(heading), math.sin(heading)
     found, at, least = -1, 0.0, math.inf
     for other in candidates:
         there, _ = local_coordinates(points, offsets, ends, other, x, y)
         there = min(max(there, 0.0), points[offsets[other + 1] - 1, STATION])
-        turn = value_at(points, offsets, other, HEADING, there) - heading
-        if abs((turn + math.pi) % (2 * math.pi) - math.pi) < MIN_OPPOSITION:
-            continue
-        dx = value_at(points, offsets, other, X, there) - x
-        dy = value_at(points, offsets, other, Y, there) - y
-        across, along = dy * c - dx * n, dx * c + dy * n  # positive right
-        if not -WIDEST_MEDIAN <= across < -MIN_GAP or abs(along) > MAX_OFFSET:
-            continue
-        if abs(value_at(points, offsets, other, HEIGHT, there) - height) > MAX_HEIGHT:
-            continue
-        if -across < least:
-            found, at, least = other, there, -across
+        gap = opposite_gap(
+            x, y, heading, height,
+            value_at(points, offsets, other, X, there), value_at(points, offsets, other, Y, there),
+            value_at(points, offsets, other, HEADING, there), value_at(points, offsets, other, HEIGHT, there),
+        )  # fmt: skip
+        if gap < least:
+            found, at, least = other, there, gap
     return found, at, least
+
+
+@compiled
+def opposite_gap(
+    x: float, y: float, heading: float, height: float, other_x: float, other_y: float, other_heading: float,
+    other_height: float,
+) -> float:  # fmt: skip
+    """Returns the distance to a point on another lane, infinite if that is not opposite and oncoming [m]."""
+    if abs((other_heading - heading + math.pi) % (2 * math.pi) - math.pi) < MIN_OPPOSITION:
+        return math.inf
+    c, n = math.cos(heading), math.sin(heading)
+    dx, dy = other_x - x, other_y - y
+    across, along = dy * c - dx * n, dx * c + dy * n  # positive right
+    if not -WIDEST_MEDIAN <= across < -MIN_GAP or abs(along) > MAX_OFFSET:
+        return math.inf
+    return -across if abs(other_height - height) <= MAX_HEIGHT else math.inf
 
 
 @lru_cache(maxsize=16)

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.collisions import collide
+from dorothie_gym.sim.ego.briefing import prepare
+from dorothie_gym.sim.ego.manoeuvres import note_place
 from dorothie_gym.sim.ego.motion_control import guide
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
 from dorothie_gym.sim.sensing.localizer import localize
-from dorothie_gym.sim.state.codes import Kind, Wait
+from dorothie_gym.sim.state.codes import Kind, Refusal, Wait
 from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.world_arrays import note_pose, trace
 from dorothie_gym.sim.traffic.idm_traffic import drive
@@ -34,10 +36,11 @@ if TYPE_CHECKING:
 @compiled
 def step(
     town: TownArrays, world: WorldArrays, substeps: int, dt: float, acceleration: float = 0.0, steering: float = 0.0
-) -> None:
+) -> int:
     """Steps a world; then localizes the ego that follows a path, if there is one, and watches over its driving.
 
-    As on a highway-env road, all bodies decide on the state at the beginning of a substep, then all move.
+    As on a highway-env road, all bodies decide on the state at the beginning of a substep, then all move. The path of
+    an ego with a plan is lengthened before.
 
     Args:
         town: arrays of the town.
@@ -46,9 +49,15 @@ def step(
         dt: time of each [s].
         acceleration: of vehicles of the kind `Kind.EGO` [m/s^2].
         steering: angle of their front wheels, positive to the right [rad].
+
+    Returns:
+        `Refusal.NONE`, or `Refusal.NO_SPACE` where the arrays have no room for the path; then nothing has changed.
     """
     vehicles, slip = world.vehicles, slip_of(steering)
     driven = len(vehicles) > 0 and vehicles[0].kind == Kind.DRIVEN
+    planned = driven and world.plan[0].version > 0
+    if planned and prepare(town, world) != Refusal.NONE:
+        return Refusal.NO_SPACE
     world.car[0].events = world.car[0].breaches = world.car[0].frames = 0
     if driven:
         note_pose(world, 0)
@@ -62,9 +71,12 @@ def step(
         world.clock[0].time = world.clock[0].frame * dt
         if driven:
             trace(world)
+    if planned:
+        note_place(town, world)
     if driven:
         localize(world, dt)
         watch(town, world)
+    return Refusal.NONE
 
 
 # Each phase is compiled on its own: inlined into one function they would take the compiler twice as long.

@@ -14,6 +14,7 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
+from dorothie_gym.sim.ego.briefing import note_props
 from dorothie_gym.sim.ego.ego_controller import EgoController
 from dorothie_gym.sim.ego.obstacles import Hazard, PerceivedBody
 from dorothie_gym.sim.ego.planner import LocalPlanner
@@ -25,6 +26,7 @@ from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.sensing.localizer import Localizer, switch_on
 from dorothie_gym.sim.sensing.perception import BODY, Perception, look_around
 from dorothie_gym.sim.sensing.visibility import Visibility
+from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.state.records import (
     EyeRecord,
     PedestrianRecord,
@@ -35,7 +37,7 @@ from dorothie_gym.sim.state.records import (
     plain,
 )
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
+from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world, lengthened
 from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import FRAMES
 from dorothie_gym.sim.weather import Weather, Wind
@@ -113,8 +115,8 @@ class World(Lookups, Restorable):
         self.actors = Actors(self.road, self._arrays, state, seed=crowd_seed)
         self.car = Car(self.road, self.actors)
         self.road.vehicles.append(self.car)
-        self.planner = LocalPlanner(town, lane, station)
-        self.ego = EgoController(self.planner, self.car, cruise=config.cruise_speed)
+        self.planner = LocalPlanner(town, self._arrays, self.actors, lane, station)
+        self.ego = EgoController(self.planner, self.car, self.actors, cruise=config.cruise_speed)
         self.weather = Weather()
         self.wind = Wind(np.random.default_rng(wind_seed))
         self._perception = Perception(np.random.default_rng(perceive_seed))
@@ -155,23 +157,20 @@ class World(Lookups, Restorable):
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
         if self.faults:
             self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
-        self.planner.props = self._props_seen()
+        self._note_props()
         return self.reports.take()
 
     def _run(self, frames: int) -> Array:
         """Steps all bodies by no more than `FRAMES` substeps; returns the ego's trace, see `WorldArrays`."""
-        arrays, record = self.actors.arrays, self._record
-        self.planner.extend(self.car.speed)
-        self.ego.brief(arrays, record)
-        self._tell_weather(arrays)
-        step(self._arrays, arrays, frames, 1.0 / FRAME_RATE)
-        self.ego.debrief(record)
+        self._tell_weather(self.actors.arrays)
+        while step(self._arrays, self.actors.arrays, frames, 1.0 / FRAME_RATE) == Refusal.NO_SPACE:
+            self.actors.arrays = lengthened(self.actors.arrays)
         self.car.refresh()
         self.frame += frames
-        events, breaches, _ = record.outcome.item()
+        events, breaches, _ = self._record.outcome.item()
         if events or breaches:
             self.reports.note(events, breaches)
-        return arrays.trace[:frames].copy()
+        return self.actors.arrays.trace[:frames].copy()
 
     @property
     def _record(self) -> CarRecord:
@@ -249,11 +248,14 @@ class World(Lookups, Restorable):
         table = np.empty((len(arrays.seen), len(BODY)))
         return table[: look_around(arrays, self.frame, table)]
 
-    def _props_seen(self) -> tuple[tuple[float, float, float], ...]:
-        """Returns places of the perceived props: x, y and height [m]."""
-        if not self.actors.has_props:
-            return ()
-        return tuple((body.x, body.y, body.height) for body in self.perceived() if body.kind is ObjectClass.STATIC)
+    def _note_props(self) -> None:
+        """Notes the perceived props for the planner."""
+        arrays = self.actors.arrays
+        if self.actors.has_props:
+            self._tell_weather(arrays)
+            note_props(arrays, self.frame)
+        else:
+            self._record.props[()] = 0
 
     # --- Faults -------------------------------------------------------------------------------------------------------
 

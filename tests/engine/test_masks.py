@@ -44,11 +44,11 @@ def test_each_allowed_physical_action_is_accepted(name: str) -> None:
         speed = float(world.car.speed)
         for action in allowed:
             for angle in fitting_angles(world, action, angles):
-                planner = copy.copy(world.planner)
+                planner = copy.deepcopy(world).planner
                 assert planner.command(action, angle, speed) is None, (action, angle)
                 tried[action] += 1
         for action in set(NAVIGATION_ACTIONS) - set(allowed) - {PhysicalAction.LANE_FOLLOW, PhysicalAction.J_TURN}:
-            assert copy.copy(world.planner).command(action, 90, speed) is not None or action is PhysicalAction.STOP
+            assert copy.deepcopy(world).planner.command(action, 90, speed) is not None or action is PhysicalAction.STOP
         choice = allowed[int(rng.integers(len(allowed)))]
         fitting = fitting_angles(world, choice, angles)
         if fitting and rng.random() < 0.4:

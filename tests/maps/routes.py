@@ -11,7 +11,7 @@ from dorothie_gym.maps import Junction, Lane, LaneLink, LinkType, Town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.maps.routing import CHANGE_LENGTH, SHORT_CHANGE, LaneEntry, Leg, Route, router
 from dorothie_gym.maps.routing_graph import CHANGE_LEAD, SHARED, U_TURN_LENGTH, U_TURN_REST
-from dorothie_gym.sim.ego.planner import LocalPlanner
+from tests.sim.driving import planner_on
 
 NAMES = ["brookside", "Town02", "Town05"]
 Place = tuple[int, float]
@@ -108,7 +108,7 @@ def check_drivable(town: Town, route: Route, start: Place, goal: Place) -> None:
             oncoming = oncoming_lanes(town).at(one.lane, one.end)
             assert oncoming is not None
             assert (oncoming.lane, oncoming.station + U_TURN_REST) == (two.lane, pytest.approx(two.start))
-            assert LocalPlanner(town, one.lane, one.end).may_turn_round(0.0)
+            assert planner_on(town, one.lane, one.end).may_turn_round(0.0)
             driven += U_TURN_LENGTH + U_TURN_REST
         else:
             assert town.neighbour(one.lane, SIDE[two.entry]) == two.lane

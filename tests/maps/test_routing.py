@@ -13,7 +13,6 @@ from dorothie_gym.maps.routing import SHORT_CHANGE, LaneEntry, Router, router
 from dorothie_gym.maps.routing_graph import CHANGE_LEAD
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH
-from dorothie_gym.sim.ego.planner import LocalPlanner
 from tests.maps.opendrive_text import shared_map
 from tests.maps.routes import (
     NAMES,
@@ -27,7 +26,7 @@ from tests.maps.routes import (
     turn_lane,
     two_lanes,
 )
-from tests.sim.driving import network
+from tests.sim.driving import network, planner_on
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -138,7 +137,7 @@ def test_a_turn_lane_is_reached_by_a_change_that_the_planner_makes(pocket: float
     check_drivable(town, route, start, goal)
     change, turn = route.turns(town)
     assert (change.type, turn.type, turn.angle) == (LinkType.LANE_CHANGE_LEFT, LinkType.LEFT, 90)
-    planner = LocalPlanner(town, 1, route.legs[1].end - CHANGE_LEAD)
+    planner = planner_on(town, 1, route.legs[1].end - CHANGE_LEAD)
     assert planner.command(PhysicalAction.LANE_SWITCH, change.angle, 0.0) is None
     assert planner.lanes_ahead == [1, 2, 4, 6]
 

@@ -17,7 +17,7 @@ from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car
 from dorothie_gym.sim.infractions import WorldEvent
-from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.world import World
 
 MAPS = Path(__file__).resolve().parents[2] / "../shared/maps"
@@ -63,6 +63,11 @@ def on_lane(town: TownNetwork, lane: int, station: float) -> World:
     """A car alone on a lane of a town where no light and no sign stops it."""
     roads = without_signs(town)
     return World(roads.town, ALONE, seed=np.random.SeedSequence(1), departure=(lane, station), network=roads)
+
+
+def planner_on(town: Town, lane: int, station: float) -> LocalPlanner:
+    """The planner of a car that stands on a lane of a town."""
+    return on_lane(network_of(town), lane, station).planner
 
 
 def drive(world: World, until: Callable[[], bool], seconds: float = 60.0) -> Trip:

@@ -13,9 +13,9 @@ from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.ego_controller import GoalAhead
 from dorothie_gym.sim.ego.feasibility import u_turn_braking
 from dorothie_gym.sim.ego.limits import LEAD
-from dorothie_gym.sim.ego.manoeuvre_lanes import LaneChooser
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.network.network import TownNetwork
+from dorothie_gym.sim.state.town_arrays import town_arrays
 from tests.sim.driving import Trip, on_lane
 
 Instruction = tuple[PhysicalAction, int]
@@ -37,7 +37,6 @@ def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 12
         goal: destination.
         most: longest duration [s].
     """
-    town = roads.town
     world = on_lane(roads, start.lane, start.station)
     car, ego, planner = world.car, world.ego, world.planner
     ego.cruise = 60.0
@@ -45,12 +44,11 @@ def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 12
     worst = 0.0
     for _ in range(round(most / DECISION)):
         speed = float(car.speed)
-        planner.extend(speed)
         if planner.held and speed < 0.1:
             if math.dist(car.position, goal.waypoint) <= ARRIVAL_DISTANCE:
                 return Trip(world, worst, True)
             planner.command(PhysicalAction.START, 0, speed)
-        instruction = _next(town, planner, goal, speed)
+        instruction = _next(roads, planner, goal, speed)
         if instruction is not None:
             planner.command(*instruction, speed)
         world.step(FRAMES)
@@ -58,8 +56,9 @@ def guided_trip(roads: TownNetwork, start: Site, goal: Site, *, most: float = 12
     return Trip(world, worst, False)
 
 
-def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instruction | None:
+def _next(roads: TownNetwork, planner: LocalPlanner, goal: Site, speed: float) -> Instruction | None:
     """Returns the next instruction, if there is one."""
+    town, ways = roads.town, town_arrays(roads).ways
     if planner.held or town.lanes[planner.lane].in_junction:
         return None
     left = goal.station - planner.station
@@ -71,7 +70,7 @@ def _next(town: Town, planner: LocalPlanner, goal: Site, speed: float) -> Instru
     for before, leg in zip(route.legs, route.legs[1:], strict=False):
         if leg.entry is not LaneEntry.FOLLOW:
             return _aside(planner, before, leg, speed)
-        if town.lanes[leg.lane].in_junction and LaneChooser(town).offers_turns(before.lane):
+        if town.lanes[leg.lane].in_junction and ways[before.lane].offers:
             (angle,) = (way.angle for way in town.exits(before.lane) if way.connector == leg.lane)
             return None if planner.turn_ahead == angle else (PhysicalAction.J_TURN, angle)
     return None

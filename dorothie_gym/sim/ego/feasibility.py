@@ -6,31 +6,19 @@ policies that know an observation only.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
-import numpy as np
-
-from dorothie_gym.maps.model import LEVEL_HEIGHT, Lane
 from dorothie_gym.ontology import SPEED_STEP
 from dorothie_gym.sim.ego.limits import (
     EGO_MOVING,
-    HALF_LENGTH,
     HARD_STOP,
-    LANDING,
     LEAD,
-    MANOEUVRE_PROP_GAP,
     MAX_CRUISE,
     MIN_CRUISE,
     MIN_SWITCH,
     PLANNED_BRAKING,
-    SWITCH_TIME,
-    U_TURN_REACH,
     U_TURN_SPEED,
 )
-
-PropPlaces = Iterable[tuple[float, float, float]]
-"""Middles of props and the height of the road there (x, y, height) [m]."""
 
 
 class FeasibleManoeuvres(NamedTuple):
@@ -76,35 +64,3 @@ def u_turn_braking(speed: float, squared_speed: float = U_TURN_SPEED**2) -> floa
         squared_speed: square of the speed of a U-turn [m^2/s^2]; the scripted roles count on 12.0.
     """
     return max(0.0, speed * speed - squared_speed) / (2 * PLANNED_BRAKING)
-
-
-def u_turn_start(station: float, speed: float) -> float:
-    """Returns the station at which a U-turn begins that is requested at a station [m] and speed [m/s]."""
-    return station + LEAD * (speed > EGO_MOVING) + u_turn_braking(speed)
-
-
-def switch_is_blocked(props: PropPlaces, lane: Lane, station: float, speed: float) -> bool:
-    """Returns whether a prop is too close on the lane to switch to.
-
-    Args:
-        props: props that the ego sees.
-        lane: the lane to switch to.
-        station: place of the ego along it [m].
-        speed: of the ego [m/s].
-    """
-    way = LEAD + max(MIN_SWITCH, SWITCH_TIME * speed) + speed * speed / (2 * PLANNED_BRAKING)
-    return _is_blocked(props, lane, station - HALF_LENGTH, station + way + MANOEUVRE_PROP_GAP)
-
-
-def landing_is_blocked(props: PropPlaces, lane: Lane, station: float) -> bool:
-    """Returns whether a prop is too close on an oncoming lane for a U-turn that ends at a station [m]."""
-    return _is_blocked(props, lane, station - U_TURN_REACH, station + LANDING + MANOEUVRE_PROP_GAP)
-
-
-def _is_blocked(props: PropPlaces, lane: Lane, begin: float, end: float) -> bool:
-    for x, y, height in props:
-        station, lateral = lane.project(np.array((x, y)))
-        level = abs(lane.height_at(station) - height) < LEVEL_HEIGHT
-        if level and abs(lateral) < lane.width_at(station) / 2 and begin < station < end:
-            return True
-    return False

@@ -1,17 +1,23 @@
-"""Lanes of a manoeuvre, and the pieces of path along them."""
+"""Lanes of a manoeuvre, and the pieces of path along them (compiled).
+
+The lanes of a plan are the first `PlanRecord.steps` rows of `WorldArrays.steps`. A search for a turn notes what it has
+seen behind them. Where the rows do not suffice, functions return False or -1 and set `PlanRecord.needed` to 0.
+"""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from typing import TYPE_CHECKING
 
-from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.copying import shared
-from dorothie_gym.maps.model import Exit, LinkType
-from dorothie_gym.maps.town import Town
+from dorothie_gym.compilation import compiled
+from dorothie_gym.sim.ego.course import follow, keep, switch, u_turn
 from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, PLANNED_BRAKING, SWITCH_TIME
-from dorothie_gym.sim.ego.path import PathPiece, follow, switch
+from dorothie_gym.sim.network.lane_exits import ANOTHER_WAY
+from dorothie_gym.sim.state.codes import NOBODY
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 LEAST_PATH = 120.0
 """Least length of path ahead [m]."""
@@ -28,197 +34,313 @@ SETTLE = 15.0
 EXACT = 5.0
 """Misfit within which an exit is the one that was asked for [degrees]."""
 
-ANOTHER_WAY = 15.0
-"""Difference of angle from which on exits are different turns [degrees]."""
-
 WAITING_ROOM = 4.5
 """Distance between the end of a lane switch and a lane's end at which the ego may have to wait [m]."""
 
 MOST_CHANGES = 3
 """Most lane changes before a turn."""
 
-SIDES = (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT)
+ALMOST = 1e-3
+"""Shortest piece of path [m]."""
 
 
-@dataclass(frozen=True)
-class LaneStep:
-    """A lane of a plan, and whether it is entered from the side."""
-
-    lane: int
-    change: bool = False
+# --- Lists of lanes ---------------------------------------------------------------------------------------------------
 
 
-@shared
-class LaneChooser:
-    """Choice of lanes for plans: side lanes, successors, ways to an exit."""
-
-    def __init__(self, town: Town) -> None:
-        self._town = town
-        self._choices: dict[int, bool] = {}
-
-    def is_choice(self, lane: int) -> bool:
-        """Returns whether a turn has to be chosen at the end of a lane."""
-        exits = self._town.exits(lane)
-        return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
-
-    def offers_turns(self, lane: int) -> bool:
-        """Returns whether the junction at the end of a lane offers a turn, from this lane or from one beside it."""
-        if lane not in self._choices:
-            ways = [way for beside in self.side_by_side(lane) for way in self._town.exits(beside)]
-            turns = [way.angle for way in ways if way.junction_id >= 0]
-            apart = max((abs(wrap_degrees(turn - turns[0])) for turn in turns), default=0.0)
-            self._choices[lane] = self.is_choice(lane) or (bool(self._town.exits(lane)) and apart > ANOTHER_WAY)
-        return self._choices[lane]
-
-    def side_by_side(self, lane: int) -> list[int]:
-        """Returns a lane and all that are reached from it by lane changes."""
-        found = [lane]
-        for known in found:
-            for side in SIDES:
-                beside = self._town.neighbour(known, side)
-                if beside is not None and beside not in found:
-                    found.append(beside)
-        return found
-
-    def default_successor(self, lane: int) -> int | None:
-        """Returns the lane that follows by default: the only one, or outside junctions the straightest."""
-        exits = self._town.exits(lane)
-        if not exits or self.is_choice(lane):
-            return None
-        return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
-
-    def through_junction(self, lane: int) -> list[LaneStep]:
-        """Returns the lane, and inside a junction those up to the lane behind it."""
-        steps = [LaneStep(lane)]
-        while self._town.lanes[steps[-1].lane].in_junction:
-            on = self.default_successor(steps[-1].lane)
-            if on is None:
-                break
-            steps.append(LaneStep(on))
-        return steps
-
-    def steps_along(self, lanes: Sequence[int]) -> list[LaneStep]:
-        """Returns the steps along lanes that follow, or lie beside, one another."""
-        steps = [LaneStep(lane) for lane in lanes]
-        for k in range(1, len(steps)):
-            beside = [self._town.neighbour(steps[k - 1].lane, side) for side in SIDES]
-            if steps[k].lane in beside:
-                steps[k] = LaneStep(steps[k].lane, change=True)
-        return steps
-
-    def find_turn(self, first: list[LaneStep], station: float, angle: int) -> tuple[list[LaneStep], Exit] | None:
-        """Returns the steps to the exit that fits an angle best, with lane changes if that fits much better.
-
-        Args:
-            first: steps that are taken in any case.
-            station: place of the ego on the first of them [m].
-            angle: degrees, positive left.
-        """
-        town = self._town
-        own = first[-1].lane
-        if not self.offers_turns(own):
-            # a lane that itself leads on as asked is kept to its end; lanes are changed further on, if at all
-            fits = [way for way in town.exits(own) if abs(wrap_degrees(way.angle - angle)) <= EXACT]
-            if fits:
-                first = [*first, LaneStep(fits[0].connector), *self._onward(fits[0])]
-                if fits[0].junction_id >= 0 and abs(fits[0].angle) > ANOTHER_WAY:
-                    return first, fits[0]  # the only way on there: it is the turn that was asked for
-        best: tuple[float, list[LaneStep], Exit] | None = None
-        # successors come before lanes beside, so that lanes are changed as late as there is room
-        queue: deque[tuple[list[LaneStep], int]] = deque([(first, 0)])
-        seen = {first[-1].lane}
-        while queue:
-            steps, changes = queue.popleft()
-            lane = steps[-1].lane
-            if self.offers_turns(lane):
-                for way in town.exits(lane):
-                    misfit = abs(wrap_degrees(way.angle - angle)) + SWITCH_COST * changes
-                    if best is None or misfit < best[0]:
-                        best = (misfit, [*steps, LaneStep(way.connector), *self._onward(way)], way)
-            else:
-                on = self.default_successor(lane)
-                if on is not None and on not in seen:
-                    seen.add(on)
-                    queue.appendleft(([*steps, LaneStep(on)], changes))
-            for side in SIDES:
-                beside = town.neighbour(lane, side)
-                if beside is None or beside in seen or changes == MOST_CHANGES:
-                    continue
-                if self._room_to_switch(steps, station):
-                    seen.add(beside)
-                    queue.append(([*steps, LaneStep(beside, change=True)], changes + 1))
-        return None if best is None else (best[1], best[2])
-
-    def _onward(self, way: Exit) -> list[LaneStep]:
-        """Returns connectors and lane from the entered one to the exit's lane."""
-        steps, lane = [], way.connector
-        while lane != way.lane:
-            lane = self._town.successors(lane)[0].target
-            steps.append(LaneStep(lane))
-        return steps
-
-    def _room_to_switch(self, steps: list[LaneStep], station: float) -> bool:
-        lane = self._town.lanes[steps[-1].lane]
-        changes = 1
-        for step in reversed(steps):
-            if not step.change:
-                break
-            changes += 1
-        first = len(steps) - changes  # where the lanes that lie beside one another begin
-        start = station if first <= 0 else 0.0
-        return lane.length - start >= changes * (MIN_SWITCH + LEAD) and not lane.in_junction
-
-    # --- Pieces of path -----------------------------------------------------------------------------------------------
-
-    def lay(self, steps: list[LaneStep], station: float, speed: float) -> tuple[list[PathPiece], bool]:
-        """Lays pieces of path along steps, and on from there up to the next choice.
-
-        Args:
-            steps: the lanes.
-            station: beginning of the path on the first of them [m].
-            speed: of the ego [m/s], which the length of lane switches depends on.
-
-        Returns:
-            The pieces (none at the very end of a lane), and whether the path ends where a turn has to be chosen.
-        """
-        steps = list(steps)
-        lengths = [self._town.lanes[step.lane].length for step in steps if not step.change]
-        open_end = self._grow(steps, sum(lengths) - station)
-        pieces: list[PathPiece] = []
-        at = station
-        for k, step in enumerate(steps):
-            lane = self._town.lanes[step.lane]
-            following = steps[k + 1] if k + 1 < len(steps) else None
-            if following is None or not following.change:
-                if at < lane.length - 1e-3:
-                    pieces.append(follow(lane, at))
-                at = 0.0
-                continue
-            changes = 1
-            while k + 1 + changes < len(steps) and steps[k + 1 + changes].change:
-                changes += 1
-            end = lane.length - WAITING_ROOM * self.is_choice(following.lane)
-            room = max((end - at) / changes - LEAD, 2.0)
-            distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
-            spare = (lane.length - at) - changes * (distance + LEAD)
-            if k == 0:  # begins late enough to stop before it if others are beside the ego
-                most = max(end - at - changes * (distance + LEAD), 0.0)
-                lead = LEAD + min(speed * speed / (2 * PLANNED_BRAKING), most)
-            else:
-                lead = min(max(spare, LEAD), SETTLE)
-            begin = min(at + lead, lane.length - distance)
-            if begin > at + 1e-3:
-                pieces.append(follow(lane, at, begin))
-            pieces.append(switch(lane, self._town.lanes[following.lane], max(begin, at), distance))
-            at = float(pieces[-1].stations[-1])
-        return pieces, open_end
-
-    def _grow(self, steps: list[LaneStep], ahead: float) -> bool:
-        """Adds the lanes that follow until the path is long enough; returns whether it has an open end."""
-        while ahead < LAID:
-            on = self.default_successor(steps[-1].lane)
-            if on is None:
-                return True
-            steps.append(LaneStep(on))
-            ahead += self._town.lanes[on].length
+@compiled
+def add_step(world: WorldArrays, lane: int, change: bool) -> bool:
+    """Adds a lane to the plan; returns whether there was room."""
+    plan = world.plan[0]
+    if plan.steps == len(world.steps):
+        plan.needed = 0
         return False
+    step = world.steps[plan.steps]
+    step.lane, step.before, step.changes, step.change = lane, plan.steps - 1, 0, change
+    plan.steps += 1
+    return True
+
+
+@compiled
+def begin_steps(world: WorldArrays, lane: int) -> bool:
+    """Begins a plan with a lane; returns whether there was room."""
+    world.plan[0].steps = 0
+    return add_step(world, lane, False)
+
+
+@compiled
+def cross_junction(town: TownArrays, world: WorldArrays, lane: int) -> bool:
+    """Begins a plan with a lane, and inside a junction with those up to the lane behind it."""
+    fits = begin_steps(world, lane)
+    while fits and lane >= 0 and town.lanes[lane].junction >= 0:
+        lane = town.ways[lane].onward
+        fits = lane < 0 or add_step(world, lane, False)
+    return fits
+
+
+@compiled
+def take_course(town: TownArrays, world: WorldArrays) -> bool:
+    """Begins a plan with the lanes of the present path from the ego's place on."""
+    plan, course, last = world.plan[0], world.course, NOBODY
+    plan.steps, fits = 0, True
+    for k in range(plan.at, plan.points):
+        lane = course[k].lane
+        if fits and (k == plan.at or lane != last):
+            beside = k > plan.at and (town.lanes[last].left == lane or town.lanes[last].right == lane)
+            fits, last = add_step(world, lane, beside), lane
+    return fits
+
+
+@compiled
+def enter_exit(town: TownArrays, world: WorldArrays, number: int) -> bool:
+    """Adds the connectors of an exit, a row of `TownArrays.exits`, and the lane behind the junction."""
+    way = town.exits[number]
+    lane = way.connector
+    fits = add_step(world, lane, False)
+    while fits and lane != way.lane:
+        lane = town.neighbours[town.lanes[lane].successor]
+        fits = add_step(world, lane, False)
+    return fits
+
+
+@compiled
+def misfit_of(town: TownArrays, number: int, angle: int) -> int:
+    """Returns the difference between the angle of an exit and another one [degrees]."""
+    return abs((town.exits[number].angle - angle + 180) % 360 - 180)
+
+
+# --- Search for a turn ------------------------------------------------------------------------------------------------
+
+
+@compiled
+def find_turn(town: TownArrays, world: WorldArrays, station: float, angle: int) -> int:
+    """Adds to the plan the lanes to the exit that fits an angle best, with lane changes if that fits much better.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world; the steps of the plan are taken in any case.
+        station: place of the ego on the first of them [m].
+        angle: degrees, positive left.
+
+    Returns:
+        Row of the exit in `TownArrays.exits`, -1 if there is none, and -2 if a list is too long.
+    """
+    plan, steps = world.plan[0], world.steps
+    known = _keep_lane(town, world, angle)
+    if known != -1:
+        return known
+    root = int(plan.steps) - 1
+    best, best_row, best_exit = math.inf, -1, -1
+    # successors come before lanes beside, so that lanes are changed as late as there is room
+    row, waiting = root, root + 1
+    while row < plan.steps:
+        lane, changes, follows = steps[row].lane, steps[row].changes, -1
+        onward = town.ways[lane].onward
+        if town.ways[lane].offers:
+            number = _closest_exit(town, lane, angle)
+            misfit = misfit_of(town, number, angle) + SWITCH_COST * changes if number >= 0 else math.inf
+            if misfit < best:
+                best, best_row, best_exit = misfit, row, number
+        elif onward >= 0 and not _is_seen(world, root, onward):
+            follows = int(plan.steps)
+            if not _reach(world, onward, row, changes, False):
+                return -2
+        if not _reach_beside(town, world, root, row, station):
+            return -2
+        if follows >= 0:
+            row = follows
+            continue
+        while waiting < plan.steps and not steps[waiting].change:
+            waiting += 1
+        row, waiting = waiting, waiting + 1
+    if best_exit < 0:
+        return -1
+    if not _trace_back(world, root, best_row) or not enter_exit(town, world, best_exit):
+        return -2
+    return best_exit
+
+
+@compiled
+def _keep_lane(town: TownArrays, world: WorldArrays, angle: int) -> int:
+    """Keeps a lane that itself leads on as asked to its end; lanes are changed further on, if at all.
+
+    Returns:
+        Row of the exit if it is the only way on there and thus the turn that was asked for, else -1; -2 if a list is
+        too long.
+    """
+    own = town.ways[world.steps[world.plan[0].steps - 1].lane]
+    for number in range(own.exit, own.exit + (0 if own.offers else own.exits)):
+        if misfit_of(town, number, angle) <= EXACT:
+            if not enter_exit(town, world, number):
+                return -2
+            way = town.exits[number]
+            return number if way.junction >= 0 and abs(way.angle) > ANOTHER_WAY else -1
+    return -1
+
+
+@compiled
+def _closest_exit(town: TownArrays, lane: int, angle: int) -> int:
+    """Returns the row of the exit of a lane that fits an angle best, the first of several; -1 if there is none."""
+    ways, found = town.ways[lane], -1
+    for number in range(ways.exit, ways.exit + ways.exits):
+        if found < 0 or misfit_of(town, number, angle) < misfit_of(town, found, angle):
+            found = number
+    return found
+
+
+@compiled
+def _reach_beside(town: TownArrays, world: WorldArrays, root: int, row: int, station: float) -> bool:
+    """Notes the lanes beside a row of the search to which there is room to switch; returns whether they fit in."""
+    step = world.steps[row]
+    lane, changes = town.lanes[step.lane], step.changes
+    if changes == MOST_CHANGES or not _has_room(town, world, row, station):
+        return True
+    if lane.left >= 0 and not _is_seen(world, root, lane.left):
+        if not _reach(world, lane.left, row, changes + 1, True):
+            return False
+    if lane.right >= 0 and not _is_seen(world, root, lane.right):
+        return _reach(world, lane.right, row, changes + 1, True)
+    return True
+
+
+@compiled
+def _is_seen(world: WorldArrays, root: int, lane: int) -> bool:
+    for row in range(root, world.plan[0].steps):
+        if world.steps[row].lane == lane:
+            return True
+    return False
+
+
+@compiled
+def _reach(world: WorldArrays, lane: int, before: int, changes: int, change: bool) -> bool:
+    """Notes a lane that the search has reached from another row."""
+    if not add_step(world, lane, change):
+        return False
+    step = world.steps[world.plan[0].steps - 1]
+    step.before, step.changes = before, changes
+    return True
+
+
+@compiled
+def _has_room(town: TownArrays, world: WorldArrays, row: int, station: float) -> bool:
+    """Returns whether there is room for one more lane change after those that lead to a row of the search."""
+    steps = world.steps
+    lane, changes = town.lanes[steps[row].lane], 1
+    while steps[row].change:
+        row, changes = steps[row].before, changes + 1
+    # where the lanes that lie beside one another begin
+    start = station if steps[row].before < 0 else 0.0
+    return lane.length - start >= changes * (MIN_SWITCH + LEAD) and lane.junction < 0
+
+
+@compiled
+def _trace_back(world: WorldArrays, root: int, row: int) -> bool:
+    """Makes the lanes that lead to a row of the search the steps after its root; the other rows are dropped."""
+    plan, steps = world.plan[0], world.steps
+    count, at = 0, row
+    while at != root:
+        at, count = steps[at].before, count + 1
+    if plan.steps + count > len(steps):
+        plan.needed = 0
+        return False
+    spare, at = int(plan.steps), row
+    for k in range(spare + count - 1, spare - 1, -1):
+        steps[k].lane, steps[k].change = steps[at].lane, steps[at].change
+        at = steps[at].before
+    for k in range(count):
+        target, source = steps[root + 1 + k], steps[spare + k]
+        target.lane, target.change = source.lane, source.change
+    plan.steps = root + 1 + count
+    return True
+
+
+# --- Pieces of path ---------------------------------------------------------------------------------------------------
+
+
+@compiled
+def grow(town: TownArrays, world: WorldArrays, station: float) -> int:
+    """Adds the lanes that follow until the path is long enough.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        station: beginning of the path on the first lane [m].
+
+    Returns:
+        0, 1 if the path ends where a turn has to be chosen or at the end of the map, and -1 if there is no room.
+    """
+    plan, steps, ahead = world.plan[0], world.steps, 0.0
+    for k in range(plan.steps):
+        if not steps[k].change:
+            ahead += town.lanes[steps[k].lane].length
+    ahead -= station
+    while ahead < LAID:
+        on = town.ways[steps[plan.steps - 1].lane].onward
+        if on < 0:
+            return 1
+        if not add_step(world, on, False):
+            return -1
+        ahead += town.lanes[on].length
+    return 0
+
+
+@compiled
+def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: float, write: bool) -> None:
+    """Lays the pieces of path along the steps of the plan; none at the very end of a lane.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world.
+        station: beginning of the path on the first lane [m].
+        speed: of the ego [m/s], which the length of lane switches depends on.
+        write: whether the points are written or only counted.
+    """
+    count, steps, at = int(world.plan[0].steps), world.steps, station
+    for k in range(count):
+        number = steps[k].lane
+        lane = town.lanes[number]
+        changes = 0
+        while k + 1 + changes < count and steps[k + 1 + changes].change:
+            changes += 1
+        if changes == 0:
+            if at < lane.length - ALMOST:
+                follow(town, world, number, at, lane.length, write)
+            at = 0.0
+            continue
+        beside = steps[k + 1].lane
+        end = lane.length - (WAITING_ROOM if town.ways[beside].chooses else 0.0)
+        room = max((end - at) / changes - LEAD, 2.0)
+        distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
+        spare = (lane.length - at) - changes * (distance + LEAD)
+        if k == 0:  # begins late enough to stop before it if others are beside the ego
+            most = max(end - at - changes * (distance + LEAD), 0.0)
+            lead = LEAD + min(speed * speed / (2.0 * PLANNED_BRAKING), most)
+        else:
+            lead = min(max(spare, LEAD), SETTLE)
+        begin = min(at + lead, lane.length - distance)
+        if begin > at + ALMOST:
+            follow(town, world, number, at, begin, write)
+        at = switch(town, world, number, beside, max(begin, at), distance, write)
+
+
+@compiled
+def lay_head(
+    town: TownArrays, world: WorldArrays, first: int, end: int, oncoming: int, begin: float, write: bool
+) -> None:
+    """Lays what comes before the steps of the plan: the rest of the manoeuvre under way, or a U-turn.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world; lane and station of the ego are those on the present path.
+        first: first point of the present path that is kept.
+        end: the point after the last one that is kept.
+        oncoming: lane on which a U-turn ends, or -1.
+        begin: distance along the ego's lane at which the U-turn begins [m].
+        write: whether the points are written or only counted.
+    """
+    plan = world.plan[0]
+    if end > first:
+        keep(world, first, end, write)
+    if oncoming >= 0:
+        if begin > plan.station + ALMOST:
+            follow(town, world, plan.lane, plan.station, begin, write)
+        u_turn(town, world, plan.lane, oncoming, begin, write)

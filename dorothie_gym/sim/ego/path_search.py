@@ -1,11 +1,8 @@
-"""Searches along a path: the point at a distance, the next lane with a choice, and the closest place to a position."""
+"""Searches along a path: the point at a distance, and the closest place to a position."""
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled
 from dorothie_gym.maps.model import Array
@@ -25,24 +22,6 @@ def index_at(s: Array, at: float) -> int:
         else:
             low = middle + 1
     return max(low - 1, 0)
-
-
-@compiled
-def next_choice(lanes: NDArray[np.int64], here: int, chooses: NDArray[np.bool_]) -> int:
-    """Returns the index of the last path point on the next lane that ends at a choice of exits; -1 if there is none.
-
-    Args:
-        lanes: lanes of the path points (n,).
-        here: index of the first path point to look at.
-        chooses: whether the lane ends at a choice of exits, for each lane of the town.
-    """
-    for k in range(here, len(lanes)):
-        if chooses[lanes[k]]:
-            for last in range(len(lanes) - 1, k, -1):  # a path around a block may visit the lane twice
-                if lanes[last] == lanes[k]:
-                    return last
-            return k
-    return -1
 
 
 @compiled

@@ -113,19 +113,15 @@ class CarRecord:
     """Groups of fields of the ego's record; ``.item()`` reads one as a tuple, ``[()] = numbers`` writes one (`fields`).
 
     Attributes:
-        orders: action, action_end, cruise, held and manual: the ego's task.
-        pedals: throttle, steer and brake of an outside driver.
-        place: s, offset and roadblock: its place on the path, and the distance of a roadblock.
         hazard: hazard and hazard_gap: the cause of a hazard stop.
         outcome: numbers of events, breaches of rules and collisions.
+        props: number of props that it sees.
         air: friction, wind, wind_heading and wind_phase: effects of the weather.
     """
 
     def __init__(self, arrays: WorldArrays) -> None:
         """Shows the record in the arrays of a world."""
-        self.orders = fields(arrays.car, "action", "action_end", "cruise", "held", "manual")
-        self.pedals = fields(arrays.car, "throttle", "steer", "brake")
-        self.place = fields(arrays.car, "s", "offset", "roadblock")
         self.hazard = fields(arrays.car, "hazard", "hazard_gap")
         self.outcome = fields(arrays.car, "events", "breaches", "collisions")
+        self.props = fields(arrays.plan, "props")
         self.air = fields(arrays.car, "friction", "wind", "wind_heading", "wind_phase")

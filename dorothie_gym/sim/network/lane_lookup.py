@@ -216,8 +216,16 @@ def coordinates(
 @inlined
 def project(town: TownArrays, number: int, x: float, y: float) -> tuple[float, float, int]:
     """Returns station, lateral distance [m] and closest segment of a place on a lane."""
-    lane = town.lanes[number]
-    first, last = lane.first, lane.last - 1
+    first, last = stretch_near(town, number, x, y)
+    at, share, gap = closest_segment(town.points, first, last, x, y)
+    station, lateral = coordinates(town.points, town.lanes[number], at, share, gap, x, y)
+    return station, lateral, at
+
+
+@inlined
+def stretch_near(town: TownArrays, number: int, x: float, y: float) -> tuple[int, int]:
+    """Returns the first and last segment of a lane that may be the closest one to a place."""
+    first, last = town.lanes[number].first, town.lanes[number].last - 1
     if last - first > 3:
         column, row = (x - town.origin[0]) / LOOKUP_CELL, (y - town.origin[1]) / LOOKUP_CELL
         if 0.0 <= column < town.cells.shape[1] and 0.0 <= row < town.cells.shape[0]:
@@ -227,9 +235,7 @@ def project(town: TownArrays, number: int, x: float, y: float) -> tuple[float, f
                 if entry.lane == number:
                     first, last = entry.first, entry.last
                     break
-    at, share, gap = closest_segment(town.points, first, last, x, y)
-    station, lateral = coordinates(town.points, lane, at, share, gap, x, y)
-    return station, lateral, at
+    return first, last
 
 
 @inlined

@@ -14,8 +14,14 @@ VEHICLES, PEDESTRIAN_CLASS, STATIC = (
 )
 """Object classes of bodies, as plain numbers."""
 
-U_TURN = int(PhysicalAction.U_TURN.value)
-"""The manoeuvre U-turn, as a plain number."""
+LANE_FOLLOW, LANE_SWITCH, U_TURN, J_TURN, STOP, START = (
+    int(action.value)
+    for action in (
+        PhysicalAction.LANE_FOLLOW, PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN,
+        PhysicalAction.J_TURN, PhysicalAction.STOP, PhysicalAction.START,
+    )
+)  # fmt: skip
+"""Navigation actions, as plain numbers."""
 
 NOBODY = cast(int, np.int64(-1))
 """No lane, node or body: a NumPy integer. For a plain number numba would compile its readers twice, for this value and
@@ -129,3 +135,42 @@ class Breach(enum.IntEnum):
 
 COLLISION, RED_LIGHT, STOP_SIGN, OFF_ROAD, WRONG_WAY = (int(kind) for kind in Breach)
 """Kinds of breaches, as plain numbers."""
+
+
+class Refusal(enum.IntEnum):
+    """Answer to a navigation action: carried out, or the reason of a refusal."""
+
+    NO_SPACE = -1
+    """The arrays have no room for the new path: to be repeated with longer ones, see `world_arrays.lengthened`."""
+    NONE = 0
+    STOPPED = 1
+    NOT_STOPPED = 2
+    NO_NAVIGATION = 3
+    IN_MANOEUVRE = 4
+    FOLLOWING = 5
+    COMMITTED = 6
+    NO_SIDE = 7
+    NO_LANE_LEFT = 8
+    NO_LANE_RIGHT = 9
+    NO_ROOM_LEFT = 10
+    NO_ROOM_RIGHT = 11
+    PROP_LEFT = 12
+    PROP_RIGHT = 13
+    NOT_LEFTMOST = 14
+    NO_ONCOMING = 15
+    PROP_AHEAD = 16
+    NO_ROOM_TO_TURN = 17
+    PROP_ONCOMING = 18
+    NO_CHOICE = 19
+    SAME_TURN = 20
+    TURN_TOO_CLOSE = 21
+
+
+class Feasible(enum.IntEnum):
+    """Flag of a navigation action that the ego would carry out, see `feasibility.FeasibleManoeuvres`."""
+
+    LANE_FOLLOW = 1
+    SWITCH_LEFT = 2
+    SWITCH_RIGHT = 4
+    U_TURN = 8
+    J_TURN = 16

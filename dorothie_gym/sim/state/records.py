@@ -103,6 +103,29 @@ class LaneRecord:
     passages: Int32
 
 
+class LaneExitsRecord:
+    """Ways on from a lane, and lanes beside it."""
+
+    exit: Int32  # rows of `exits`, from right to left
+    exits: Int32
+    onward: Int32  # lane that follows by default, or -1: the only one, or outside junctions the straightest
+    chooses: Flag  # whether a turn has to be chosen at its end
+    offers: Flag  # whether the junction at its end offers a turn, from this lane or from one beside it
+    beside: Int32  # rows of `lane_lists`: itself and the lanes that are reached from it by lane changes
+    besides: Int32
+    oncoming: Int32  # rows of `lane_lists`: lanes that may be oncoming somewhere along it
+    oncomings: Int32
+
+
+class ExitRecord:
+    """An exit from the end of a lane, see `maps.model.Exit`."""
+
+    connector: Int32
+    lane: Int32
+    angle: Int32  # [degrees], positive left
+    junction: Int32  # junction of the connector, or -1
+
+
 class CellEntryRecord:
     """A lane in the list of a cell."""
 
@@ -375,6 +398,79 @@ class EgoRecord:
     events: Int32  # rows of `events`, `breaches` and `trace` in use
     breaches: Int32
     frames: Int32
+
+
+class PlanRecord:
+    """Plan of the ego: its manoeuvre, and its place on the whole path.
+
+    The fields after `points` follow from the path and `EgoRecord.s`; `manoeuvres.find_place` sets them.
+    """
+
+    version: Int64  # number of paths laid so far
+    written: Int64  # version of the path in `WorldArrays.path`; 0: none, or with other goals
+    written_until: Float  # end of the stretch of it there [m]
+    window: Int32  # point of the whole path that is the first one there
+    action: Int32  # manoeuvre planned or under way: a `PhysicalAction` or 0
+    angle: Int32  # its angle [degrees], positive left
+    end: Float  # distance along the path at which it ends [m]
+    connector: Int32  # connector and lane of the planned turn
+    exit: Int32
+    held: Flag  # whether the ego stands by the action Stop
+    lights: Flag  # whether the head lights are on
+    cruise: Float  # desired speed [km/h]
+    manual: Flag  # whether an outside driver gives throttle, steer and brake
+    throttle: Float
+    steer: Float
+    brake: Float
+    goals: Int32  # rows of `goals` and `seen_props` in use
+    props: Int32
+    open_end: Flag  # whether the path ends where a turn has to be chosen, or at the end of the map
+    points: Int32  # number of points of the path
+    length: Float  # its length [m]
+    at: Int32  # point at or before the ego
+    lane: Int32  # lane of the ego, station [m], height [m], and whether it is off the centre lines
+    station: Float
+    height: Float
+    off_line: Flag
+    choice: Int32  # lane before the next junction with a choice, or -1, and its end along the path [m]
+    choice_at: Float
+    turning: Flag  # whether the planned turn has not begun
+    turn_at: Float  # beginning of its connector along the path [m], or infinite
+    steps: Int32  # rows of `steps` in use
+    needed: Int32  # points of the path that is being laid; 0: a list of `steps` is too long
+    last_x: Float  # the last point of a piece of path, which may be left out [m]
+    last_y: Float
+
+
+class CoursePointRecord:
+    """A point of the whole path."""
+
+    s: Float  # distance along the path [m]
+    x: Float
+    y: Float
+    heading: Float  # unwrapped [rad]
+    height: Float
+    station: Float  # along its lane [m]; during a U-turn that of its end
+    limit: Float  # speed limit [m/s]
+    speed: Float  # speed that curves, limits and the path's end allow [m/s]
+    lane: Int32
+    manoeuvre: Flag  # whether the path leaves the centre lines here: lane switch or U-turn
+
+
+class LaneStepRecord:
+    """A lane of a plan, or of the search for one."""
+
+    lane: Int32
+    before: Int32  # in a search: the row that it was reached from, or -1
+    changes: Int32  # in a search: lane changes up to here
+    change: Flag  # whether it is entered from the side
+
+
+class GoalRecord:
+    """Place where the ego is expected to stop."""
+
+    station: Float
+    lane: Int32
 
 
 class EventRecord:

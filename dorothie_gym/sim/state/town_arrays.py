@@ -17,6 +17,7 @@ from dorothie_gym.maps.polyline import WIDTH, LaneTable
 from dorothie_gym.maps.right_of_way import RightOfWay, right_of_way
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.network.grid import CELL_REACH, SLACK
+from dorothie_gym.sim.network.lane_exits import build_exits
 from dorothie_gym.sim.network.lane_lookup import build_cells
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.walkways import build_walkways
@@ -24,6 +25,8 @@ from dorothie_gym.sim.state.codes import NOBODY, Colour, Relation, TrafficContro
 from dorothie_gym.sim.state.records import (
     CellEntryRecord,
     CrossingRecord,
+    ExitRecord,
+    LaneExitsRecord,
     LaneRecord,
     MouthRecord,
     PassageRecord,
@@ -84,6 +87,9 @@ class TownArrays(NamedTuple):
         passages: passages of lanes over crosswalks, those of a lane in the order of their stations.
         junctions: (j, 3) middle [m] of each junction's connectors, and the radius in which they lie [m].
         lines: ends of lanes with a light or stop sign, in the order of the lanes.
+        ways: ways on from each lane, by the lanes' ids.
+        exits: exits from the ends of lanes.
+        lane_lists: int32 lists of lanes, see `ways`.
         flat: whether all lanes are so level that heights do not matter.
         wide: whether some lane is wider than `WIDE_LANE`.
     """
@@ -106,6 +112,9 @@ class TownArrays(NamedTuple):
     passages: RecordArray[PassageRecord]
     junctions: Array
     lines: RecordArray[StopLineRecord]
+    ways: RecordArray[LaneExitsRecord]
+    exits: RecordArray[ExitRecord]
+    lane_lists: NDArray[np.int32]
     flat: bool
     wide: bool
 
@@ -147,6 +156,9 @@ def empty_town() -> TownArrays:
         passages=empty_records(PassageRecord, 0),
         junctions=np.zeros((0, 3)),
         lines=empty_records(StopLineRecord, 0),
+        ways=empty_records(LaneExitsRecord, 0),
+        exits=empty_records(ExitRecord, 0),
+        lane_lists=np.zeros(0, dtype=np.int32),
         flat=True,
         wide=False,
     )
@@ -171,7 +183,8 @@ def _build(network: TownNetwork) -> TownArrays:
         network.table.points, lanes, neighbours, relations, siblings, programmes, phase_ends, colours,
         cells.origin, cells.bounds, cells.entries,
         walkways.points, walkways.walks, walkways.mouths, walkways.crossings, walkways.passages, _mouths(town, lanes),
-        _lines(town), bool(high - low < LEVEL_TOWN), bool(network.table.points[:, WIDTH].max() > WIDE_LANE),
+        _lines(town), *build_exits(town, lanes), bool(high - low < LEVEL_TOWN),
+        bool(network.table.points[:, WIDTH].max() > WIDE_LANE),
     )  # fmt: skip
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.by_reference import by_reference
+from dorothie_gym.compilation.records import Record
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.state.codes import NOBODY, U_TURN
 from dorothie_gym.sim.state.records import (
@@ -18,15 +19,19 @@ from dorothie_gym.sim.state.records import (
     TRACE,
     BreachRecord,
     ClockRecord,
+    CoursePointRecord,
     EgoRecord,
     EventRecord,
     EyeRecord,
+    GoalRecord,
     LampRecord,
+    LaneStepRecord,
     LineMarkRecord,
     LocalizerRecord,
     NodeRecord,
     PathPointRecord,
     PedestrianRecord,
+    PlanRecord,
     PropRecord,
     RecordArray,
     SeenRecord,
@@ -37,13 +42,16 @@ from dorothie_gym.sim.state.records import (
 )
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
-from dorothie_gym.sim.traffic.parameters import EVENTS, FRAMES, POINTS
+from dorothie_gym.sim.traffic.parameters import COURSE, EVENTS, FRAMES, GOALS, POINTS, STEPS
 
 PROPS = 16
 """Most props in a world."""
 
 CAR_KEY = 0
 """Key of the ego."""
+
+ROWS = 64
+"""Multiple to which the room for a path is rounded up."""
 
 STACK = 32
 """Size of the stack of searches along lanes."""
@@ -73,7 +81,12 @@ class WorldArrays(NamedTuple):
         starts: see there.
         clock: (1,) time and counters.
         car: (1,) control of the ego, if vehicle 0 is of the kind `Kind.DRIVEN`.
-        path: points of the path that it follows.
+        path: points of the path that it follows, around its place.
+        plan: (1,) its plan.
+        course: points of its whole path.
+        steps: lanes of the plan that is being made.
+        goals: places where it is expected to stop.
+        seen_props: (p, 3) x, y and height of the props that it sees [m].
         eye: (1,) its visibility.
         seen: bodies that it perceives, nearest first.
         trace: (f, 10) its trajectory in the last call of `step`, see `records.TRACE`.
@@ -99,6 +112,11 @@ class WorldArrays(NamedTuple):
     clock: RecordArray[ClockRecord]
     car: RecordArray[EgoRecord]
     path: RecordArray[PathPointRecord]
+    plan: RecordArray[PlanRecord]
+    course: RecordArray[CoursePointRecord]
+    steps: RecordArray[LaneStepRecord]
+    goals: RecordArray[GoalRecord]
+    seen_props: Array
     eye: RecordArray[EyeRecord]
     seen: RecordArray[SeenRecord]
     trace: Array
@@ -149,7 +167,8 @@ ALIGNMENT = 16
 _DTYPES = [
     *map(record_dtype, (VehicleRecord, PedestrianRecord, PropRecord, NodeRecord)), *map(np.dtype, "iid"),
     record_dtype(LampRecord), *map(np.dtype, "iid"),
-    *map(record_dtype, (ClockRecord, EgoRecord, PathPointRecord, EyeRecord, SeenRecord)), *map(np.dtype, "dd"),
+    *map(record_dtype, (ClockRecord, EgoRecord, PathPointRecord, PlanRecord, CoursePointRecord, LaneStepRecord)),
+    record_dtype(GoalRecord), np.dtype("d"), *map(record_dtype, (EyeRecord, SeenRecord)), *map(np.dtype, "dd"),
     *map(record_dtype, (EventRecord, LocalizerRecord, WatchRecord, LineMarkRecord, BreachRecord)),
 ]  # fmt: skip
 """Types of the arrays of a world, in order."""
@@ -201,6 +220,11 @@ def empty_world(
         clock=empty_records(ClockRecord, 1),
         car=empty_records(EgoRecord, 1),
         path=empty_records(PathPointRecord, POINTS if driven else 1),
+        plan=empty_records(PlanRecord, 1),
+        course=empty_records(CoursePointRecord, COURSE if driven else 1),
+        steps=empty_records(LaneStepRecord, STEPS if driven else 1),
+        goals=empty_records(GoalRecord, GOALS if driven else 1),
+        seen_props=np.zeros((props if driven else 0, 3)),
         eye=empty_records(EyeRecord, 1),
         seen=empty_records(SeenRecord, vehicles + pedestrians + props if driven else 1),
         trace=np.zeros((FRAMES if driven else 1, len(TRACE))),
@@ -244,11 +268,26 @@ def grown(town: TownArrays, world: WorldArrays, *, vehicles: int, pedestrians: i
         raise ValueError(f"a world with room for {room} vehicles, pedestrians and props does not shrink to {wanted}")
     driven = len(world.path) > 1
     bigger = empty_world(town, vehicles=vehicles, pedestrians=pedestrians, props=props, driven=driven)
+    bigger = bigger._replace(course=world.course, steps=world.steps, goals=world.goals).copy()
     for name, old, new in zip(WorldArrays._fields, world.plain(), bigger.plain(), strict=True):
         if name not in ("nodes", "heads", "order", "keys"):  # rebuilt from the bodies, whose numbers they hold
             new[: len(old)] = old
     rebuild(town, bigger)
     return bigger
+
+
+def lengthened(world: WorldArrays) -> WorldArrays:
+    """Returns the same world with the room for the path of the ego that was missing last."""
+    points = int(world.plan[0].needed)
+    if points > len(world.course):
+        return world._replace(course=_extended(world.course, math.ceil(points / ROWS) * ROWS))
+    return world._replace(steps=_extended(world.steps, 2 * len(world.steps)))
+
+
+def _extended(records: RecordArray[Record], count: int) -> RecordArray[Record]:
+    rows = np.zeros(count, dtype=records.dtype)
+    rows[: len(records)] = np.asarray(records)
+    return cast("RecordArray[Record]", rows.view(np.recarray))
 
 
 # --- Log of the ego: trajectory, poses and events ---------------------------------------------------------------------

@@ -74,6 +74,9 @@ CLOSED = 4
 POINTS = 208
 """Most points of the ego's path in the arrays: 1 m apart, half a metre in U-turns."""
 
+COURSE, STEPS = 320, 128
+"""Points of the ego's whole path and lanes of a plan for which there is room at first."""
+
 EVENTS = 32
 """Most events of the ego within a call."""
 

@@ -3,19 +3,18 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
 import pytest
 
 from dorothie_gym.maps import Lane
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.sim.ego.ego_controller import write_path
+from dorothie_gym.sim.ego.briefing import write_window
+from dorothie_gym.sim.ego.manoeuvres import begin
 from dorothie_gym.sim.ego.obstacles import bodies_ahead, room, safe_speed
-from dorothie_gym.sim.ego.path import Path, follow
+from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_car
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from tests.sim.driving import network
-from tests.sim.network.towns import lane
+from tests.sim.network.towns import lane, town
 
 ROAD: Lane = lane(0, [(0.0, 0.0), (100.0, 0.0)])
 
@@ -36,11 +35,12 @@ def body(x: float, y: float = 0.0, *, kind: ObjectClass = ObjectClass.VEHICLES, 
 
 def ahead(*bodies: dict[str, Any], road: Lane = ROAD, speed: float = 0.0) -> Found | None:
     """Returns the obstacle of a car that keeps its lane 10 m from the start of a road."""
-    town = town_arrays(network("brookside"))
-    world = empty_world(town, vehicles=4, pedestrians=0, driven=True)
-    add_car(town, world, 0, 5.0)
-    path = Path([follow(road)])
-    write_path(world, path, 10.0, np.full(len(path.s), 10.0))
+    arrays = town_arrays(TownNetwork(town([road])))
+    world = empty_world(arrays, vehicles=4, pedestrians=0, driven=True)
+    add_car(arrays, world, 0, 5.0)
+    begin(arrays, world, 0, 0.0, 0.0)
+    world.car[0].s = 10.0
+    write_window(world)
     world.vehicles[0].speed = speed
     for row, fields in zip(world.seen, bodies, strict=False):
         for name, value in fields.items():

@@ -155,16 +155,16 @@ def test_plan_is_fixed_once_the_car_cannot_stop_before_the_junction() -> None:
         ego = on_lane(roads, lane.id, lane.length - room).ego
         planner = ego.planner
         assert planner.command(PhysicalAction.J_TURN, first.angle, 8.0) is None
-        assert planner.is_committed(8.0) == late
+        assert planner.feasible(8.0).j_turn is not late
         assert (planner.command(PhysicalAction.J_TURN, second.angle, 8.0) is not None) == late
         assert (planner.command(PhysicalAction.LANE_FOLLOW, 0, 8.0) is not None) == late
 
 
 def test_u_turn_is_refused_while_the_car_is_too_fast_before_a_roadblock() -> None:
     roads = network("brookside")
-    ego = on_lane(roads, long_lane(roads.town), 30.0).ego
-    planner = ego.planner
-    planner.roadblock = 15.0
+    world = on_lane(roads, long_lane(roads.town), 30.0)
+    planner = world.planner
+    world.actors.arrays.car[0].roadblock = 15.0
     assert planner.command(PhysicalAction.U_TURN, 0, 6.0) == "the car is too fast to turn round before the roadblock"
     assert planner.command(PhysicalAction.U_TURN, 0, 0.0) is None
 
