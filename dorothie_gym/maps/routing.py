@@ -6,16 +6,16 @@ import math
 import threading
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from dorothie_gym.compilation.records import RecordArray, empty_records, fields, plain
+from dorothie_gym.compilation.records import RecordArray, argument, empty_records, fields, filled_records, plain
 from dorothie_gym.maps.model import NO_JUNCTION, LinkType
-from dorothie_gym.maps.route_arrays import empty_search, place_records
+from dorothie_gym.maps.route_arrays import LegRecord, empty_search, place_records
 from dorothie_gym.maps.route_search import find_costs, find_departures, find_route
 from dorothie_gym.maps.routing_graph import (
     CELL,
@@ -112,6 +112,12 @@ class Route:
     legs: tuple[Leg, ...]
     length: float
     cost: float = math.nan
+
+    @cached_property
+    def records(self) -> RecordArray[LegRecord]:
+        """The legs as records (n,)."""
+        rows = [(leg.start, leg.end, leg.lane, LANE_ENTRIES.index(leg.entry)) for leg in self.legs]
+        return argument(filled_records(LegRecord, rows))
 
     @property
     def lanes(self) -> tuple[int, ...]:

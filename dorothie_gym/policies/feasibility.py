@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
-from dorothie_gym.policies.route_progress import SWITCH_ROOM, U_TURN_SPEED_SQUARED
+from dorothie_gym.policies.route_legs import SWITCH_ROOM
+from dorothie_gym.policies.route_progress import U_TURN_SPEED_SQUARED
 from dorothie_gym.sim.ego.feasibility import u_turn_braking
 from dorothie_gym.sim.ego.limits import EGO_MOVING, LEAD
 

@@ -8,37 +8,31 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Exit, LinkType
+from dorothie_gym.maps.route_arrays import LegRecord, place_records
 from dorothie_gym.maps.routing import LaneEntry, Leg, Place, Route, router
+from dorothie_gym.maps.routing_graph import LANE_ENTRIES
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.route_legs import (
+    PASSED,
+    distance_left,
+    find_crossing,
+    find_leg,
+    find_manoeuvre,
+    needs_switch,
+)
+from dorothie_gym.policies.route_tables import default_successor, is_choice, route_tables
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 from dorothie_gym.spaces import ObservationMapping
 
-PASSED = 3.0
-"""Distance behind the car from which on a goal has been passed [m]."""
-
 ASTRAY = 3
 """Number of decisions off the route after which it has been left."""
-
-SWITCH_ROOM = 16.0
-"""Least distance to the end of a lane for a lane switch [m]."""
-
-END_ROOM = 6.0
-"""Distance to the end of a lane within which a car waits there and no longer turns round [m]."""
-
-SAME_WAY = 25.0
-"""Difference in angle within which an exit of the own lane is taken instead of that of a neighbour [degrees]."""
-
-RIGHT_BEHIND = 70.0
-"""Distance from a junction to a goal within which there may be no room to change lanes [m]."""
-
-MANOEUVRE_OVERDUE_DISTANCE = 18.0
-"""Distance behind its planned place from which on a lane change or U-turn is given up [m]."""
 
 U_TURN_SPEED_SQUARED = 12.0
 """Square of the speed at which the scripted agents expect U-turns [m^2/s^2]; the local planner's is 3.5^2 = 12.25."""
@@ -108,20 +102,6 @@ def stopping_distance(speed: float) -> float:
 def direction_of(way: Exit) -> Direction:
     """Returns the direction of an exit as it is said."""
     return _DIRECTIONS[way.type]
-
-
-def is_choice(town: Town, lane: int) -> bool:
-    """Returns whether a lane ends at a junction with more than one exit."""
-    exits = town.exits(lane)
-    return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
-
-
-def default_successor(town: Town, lane: int) -> int | None:
-    """Returns the lane that follows by default; None at a junction with a choice and where the map ends."""
-    exits = town.exits(lane)
-    if not exits or is_choice(town, lane):
-        return None
-    return min(exits, key=lambda way: (abs(way.angle), way.connector)).connector
 
 
 def default_lane_distance(town: Town, here: Place, place: Place, distance: float) -> float | None:
@@ -249,34 +229,22 @@ class RouteProgress:
 
     def followed(self, town: Town, lane: int, station: float) -> RouteProgress:
         """Advances the present leg to the place of the car; `astray` counts up if the car is off the route."""
-        for ahead, leg in enumerate(self.legs):
-            if leg.lane == lane and (ahead or not self._overdue(town, station)):
-                return replace(self, leg=self.leg + ahead, astray=0)
-        return replace(self, astray=self.astray + 1)
+        leg = find_leg(route_tables(town), *self._legs, lane, station) if self.legs else -1
+        return replace(self, astray=self.astray + 1) if leg < 0 else replace(self, leg=leg, astray=0)
 
     def lost(self, station: float) -> bool:
         """Returns whether the route has been left or the goal passed, so that a new route is needed."""
         return self.astray >= ASTRAY or self.left(station) < -PASSED
 
-    def _overdue(self, town: Town, station: float) -> bool:
-        legs = self.legs
-        if len(legs) == 1:
-            return station > self.goal[1] + PASSED
-        if legs[1].entry is LaneEntry.FOLLOW:
-            return False
-        room = town.lanes[legs[0].lane].length - station
-        if legs[1].entry is LaneEntry.U_TURN:
-            return station > legs[0].end + (MANOEUVRE_OVERDUE_DISTANCE if room > END_ROOM else 0.0)
-        return room < SWITCH_ROOM or station > legs[0].end + MANOEUVRE_OVERDUE_DISTANCE
-
     def left(self, station: float) -> float:
         """Returns the distance to the goal along the route [m]; negative just behind the goal."""
-        legs = self.legs
-        if not legs:
-            return math.inf
-        if len(legs) == 1:
-            return self.goal[1] - station
-        return max(legs[0].end - station, 0.0) + sum(leg.end - leg.start for leg in legs[1:])
+        return distance_left(*self._legs, station) if self.legs else math.inf
+
+    @property
+    def _legs(self) -> tuple[RecordArray[LegRecord], int, int]:
+        """Arguments of the compiled functions: legs as records, their number, and the present one."""
+        assert self.route is not None
+        return self.route.records, len(self.route.legs), self.leg
 
     def way_in(self) -> Place | None:
         """Returns the place of the last lane change of the route; None if it has none."""
@@ -291,24 +259,24 @@ class RouteProgress:
 
     def crossings(self, town: Town, station: float) -> Iterator[RouteJunction]:
         """Yields the junctions with a choice on the route, the next first."""
-        legs = self.legs
-        distance = 0.0
-        for k, leg in enumerate(legs[:-1]):
-            distance += max(leg.end - (station if k == 0 else leg.start), 0.0)
-            following = legs[k + 1]
-            if following.entry is LaneEntry.FOLLOW and is_choice(town, leg.lane):
-                way = next((way for way in town.exits(leg.lane) if way.connector == following.lane), None)
-                if way is not None:
-                    yield RouteJunction(lane=leg.lane, exit=way, distance=distance)
+        if not self.legs:
+            return
+        tables, first = route_tables(town), self.leg
+        while True:
+            before, row, distance = find_crossing(tables, *self._legs, station, first)
+            if before < 0:
+                return
+            assert self.route is not None
+            lane, first = self.route.legs[before].lane, before + 1
+            way = town.exits(lane)[row - int(tables.rows[lane])]
+            yield RouteJunction(lane=lane, exit=way, distance=distance)
 
     def next_manoeuvre(self, station: float) -> tuple[LaneEntry, float] | None:
         """Returns the next lane change or U-turn on the route and its distance [m]; None without one."""
-        distance = 0.0
-        for k, leg in enumerate(self.legs):
-            if k and leg.entry is not LaneEntry.FOLLOW:
-                return leg.entry, distance
-            distance += max(leg.end - (station if k == 0 else leg.start), 0.0)
-        return None
+        if not self.legs:
+            return None
+        entry, distance = find_manoeuvre(*self._legs, station)
+        return None if entry < 0 else (LANE_ENTRIES[entry], distance)
 
     def turns_round_on(self, lane: int) -> bool:
         """Returns whether the next U-turn of the route begins on a lane."""
@@ -332,17 +300,10 @@ class RouteProgress:
         Without it the car would reach another junction, run into what blocks its lane, or cross the junction in its
         own lane and come out beside a goal that is right behind it.
         """
-        choice = next_choice(town, lane, station)
-        obstructed = any(place[0] == lane and place[1] > station for place in self.blocked)
-        if obstructed or choice is None or choice.junction != crossing.exit.junction_id:
-            return True
-        if self.left(station) - crossing.distance > RIGHT_BEHIND:
-            return False
-        wanted = crossing.exit
-        return any(
-            way.connector != wanted.connector and abs(wrap_degrees(way.angle - wanted.angle)) <= SAME_WAY
-            for way in choice.exits
-        )
+        tables = route_tables(town)
+        wanted = int(tables.rows[crossing.lane]) + town.exits(crossing.lane).index(crossing.exit)
+        behind = self.left(station) - crossing.distance
+        return needs_switch(tables, lane, station, wanted, behind, place_records(self.blocked), len(self.blocked))
 
     def turns_round_first(self, town: Town, station: float) -> bool:
         """Returns whether the route turns round before its next junction with a choice."""

@@ -1,14 +1,8 @@
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import LinkType, load_town
 from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.policies.route_progress import (
-    RouteProgress,
-    find_exit,
-    is_choice,
-    light_ahead,
-    next_choice,
-    stopping_distance,
-)
+from dorothie_gym.policies.route_progress import RouteProgress, find_exit, light_ahead, next_choice, stopping_distance
+from dorothie_gym.policies.route_tables import is_choice
 
 TOWN = load_town("brookside")
 CHOICES = [lane.id for lane in TOWN.lanes if is_choice(TOWN, lane.id)]

@@ -12,12 +12,8 @@ from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
-from dorothie_gym.policies.route_progress import (
-    SAME_WAY,
-    Choice,
-    direction_of,
-    lanes_beside,
-)
+from dorothie_gym.policies.route_legs import SAME_WAY
+from dorothie_gym.policies.route_progress import Choice, direction_of, lanes_beside
 from dorothie_gym.spaces import Motion, Physical
 
 AT_END: Final = 6.0

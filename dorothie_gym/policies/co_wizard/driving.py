@@ -14,8 +14,8 @@ from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, LandmarkN
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, slowing_distance, u_turn_start
+from dorothie_gym.policies.route_legs import SAME_WAY
 from dorothie_gym.policies.route_progress import (
-    SAME_WAY,
     Choice,
     RouteJunction,
     default_lane_distance,

@@ -17,7 +17,8 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, read_landmarks, read_objects, scalar
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.route_progress import Choice, is_choice, next_choice
+from dorothie_gym.policies.route_progress import Choice, next_choice
+from dorothie_gym.policies.route_tables import is_choice
 from dorothie_gym.spaces import ExitColumn, Motion, ObservationMapping
 
 

@@ -13,7 +13,8 @@ from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps import Exit, Town
-from dorothie_gym.policies.route_progress import is_choice, lanes_beside, next_choice
+from dorothie_gym.policies.route_progress import lanes_beside, next_choice
+from dorothie_gym.policies.route_tables import is_choice
 from dorothie_gym.spaces import ExitColumn, ObservationMapping, SpaceLimits
 
 SECTORS = tuple(range(-180, 180, 45))

@@ -15,7 +15,8 @@ from dorothie_gym.policies.participant.arriving import about_to_arrive, approach
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.route_progress import END_ROOM, Choice, RouteJunction, find_exit, next_choice
+from dorothie_gym.policies.route_legs import END_ROOM
+from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
 from dorothie_gym.policies.speech import Remark, remark
 
 ANNOUNCING_TIME = 1.5
