@@ -81,7 +81,7 @@ class DrivingSession:
     def __init__(self, session: LiveSession, config: NavigationConfig, exits: JunctionExits) -> None:
         self.session, self.exits, self._config = session, exits, config
         town = session.world.town
-        self.instructor = Instructor(town, exits, Guidance(config.guidance))
+        self.instructor = Instructor(town, Guidance(config.guidance))
         streets = [name.value for name in session.scenario.street_names]
         self.driver = driver_arrays(sum(FIELDS.values()), streets)
         self.junction = UpcomingJunction(session.world)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.compilation.records import Float, Int32, RecordArray, empty_records, filled_records
+from dorothie_gym.compilation.records import Float, Int32, RecordArray, argument, empty_records, filled_records
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.routing_graph import RoutingEdge, RoutingGraph
 
@@ -76,14 +76,14 @@ class RouteSearch(NamedTuple):
     result: RecordArray[SearchResult]
 
 
-_NO_PLACES = empty_records(PlaceRecord, 1)
+_NO_PLACES = argument(empty_records(PlaceRecord, 1))
 
 
 def place_records(places: Sequence[tuple[int, float]]) -> RecordArray[PlaceRecord]:
     """Returns places as records; a single record of zeros where there are none."""
     if not places:
         return _NO_PLACES
-    return filled_records(PlaceRecord, [(station, lane) for lane, station in places])
+    return argument(filled_records(PlaceRecord, [(station, lane) for lane, station in places]))
 
 
 def empty_search(graph: RoutingGraph) -> RouteSearch:
@@ -92,12 +92,12 @@ def empty_search(graph: RoutingGraph) -> RouteSearch:
     out = int(np.diff(graph.rows).max(initial=0))
     into = int(np.diff(graph.manoeuvre_rows).max(initial=0))
     return RouteSearch(
-        nodes=empty_records(SearchNode, count),
+        nodes=argument(empty_records(SearchNode, count)),
         heap=np.zeros(count, dtype=np.int32),
         closed=np.zeros(count, dtype=np.bool_),
-        extra=empty_records(RoutingEdge, 24 + out + into),
+        extra=argument(empty_records(RoutingEdge, 24 + out + into)),
         path=np.zeros(count, dtype=np.int32),
         driven=np.zeros(count),
-        legs=empty_records(LegRecord, count),
-        result=empty_records(SearchResult, 1),
+        legs=argument(empty_records(LegRecord, count)),
+        result=argument(empty_records(SearchResult, 1)),
     )

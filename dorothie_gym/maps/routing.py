@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records, fields, filled_records, plain
 from dorothie_gym.maps.model import NO_JUNCTION, LinkType
-from dorothie_gym.maps.route_arrays import LegRecord, empty_search, place_records
+from dorothie_gym.maps.route_arrays import LegRecord, RouteSearch, empty_search, place_records
 from dorothie_gym.maps.route_search import find_costs, find_departures, find_route
 from dorothie_gym.maps.routing_graph import (
     CELL,
@@ -196,6 +196,11 @@ class Router:
         self._searches = _Searches(self._graph)
         self.lane_cells: list[tuple[int, int, float]] = plain(self._graph.lanes)[["first", "cells", "size"]].tolist()
 
+    @property
+    def search(self) -> RouteSearch:
+        """Scratch space of the present thread for `find_route`."""
+        return self._searches.search
+
     def cell(self, lane: int, station: float) -> int:
         """Returns the cell that contains a place."""
         first, count, size = self.lane_cells[lane]
@@ -214,7 +219,7 @@ class Router:
             blocked: impassable places (roadblocks). The route does not enter their cells, nor by lane changes; in
                 the cell of the start only those ahead count.
         """
-        search = self._searches.search
+        search = self.search
         if not find_route(self._graph, search, *start, *goal, place_records(blocked), len(blocked)):
             return None
         cost, _, steps, count = fields(search.result, "cost", "extra", "steps", "legs").item()
@@ -230,7 +235,7 @@ class Router:
     def costs_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
         """Returns `distances_to`, and the costs from the ends of the lanes without the turn there (cells + lanes,)."""
         costs = np.empty(self._graph.cells + len(self._graph.lanes))
-        find_costs(self._graph, self._searches.search, *goal, place_records(blocked), len(blocked), costs)
+        find_costs(self._graph, self.search, *goal, place_records(blocked), len(blocked), costs)
         return costs
 
     # --- What can be reached ----------------------------------------------------------------------------------------
@@ -281,7 +286,7 @@ class Router:
 
     def _departures(self, start: Place, blocked: Sequence[Place]) -> RecordArray[RoutingEdge]:
         """Returns the edges from a start, see `find_departures`."""
-        search = self._searches.search
+        search = self.search
         count = find_departures(self._graph, search, *start, NONE, 0.0, place_records(blocked), len(blocked))
         return joined(search.extra[:count])
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray, empty_records, record_dtype
+from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray, argument, empty_records, record_dtype
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.lane_neighbours import across, oncoming_lanes
 from dorothie_gym.maps.model import Array, LinkType
@@ -211,11 +211,12 @@ def routing_graph(town: Town) -> RoutingGraph:
     manoeuvres = manoeuvres[np.argsort(manoeuvres["target"], kind="stable")]
     incoming = np.argsort(edges["target"], kind="stable")
     return bare._replace(
-        edges=edges,
+        lanes=argument(lanes),
+        edges=argument(edges),
         rows=_rows(edges["source"], nodes),
         incoming=incoming,
         incoming_rows=_rows(edges["target"][incoming], nodes),
-        manoeuvres=manoeuvres,
+        manoeuvres=argument(manoeuvres),
         manoeuvre_rows=_rows(manoeuvres["target"], nodes),
     )
 

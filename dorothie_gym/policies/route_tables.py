@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ def route_tables(town: Town) -> RouteTables:
     exits = [town.exits(lane.id) for lane in town.lanes]
     rows = [(way.connector, way.lane, way.angle, way.junction_id) for ways in exits for way in ways]
     return RouteTables(
-        lanes=argument(routing_graph(town).lanes),
+        lanes=routing_graph(town).lanes,
         exits=argument(filled_records(ExitRecord, rows)),
         rows=np.concatenate(([0], np.cumsum([len(ways) for ways in exits]))),
         choice=np.array([is_choice(town, lane.id) for lane in town.lanes]),
@@ -81,7 +81,7 @@ def _lane_before_choice(town: Town, lane: int) -> int:
     while not is_choice(town, lane):
         following = default_successor(town, lane)
         if following is None or following in seen:
-            return cast(int, NONE)
+            return NONE
         lane = following
         seen.add(lane)
     return lane

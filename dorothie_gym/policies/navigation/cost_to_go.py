@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from dorothie_gym.compilation import compiled
-from dorothie_gym.compilation.records import RecordArray, argument
+from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.copying import shared
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array
@@ -85,7 +85,7 @@ def cost_table(town: Town, goal: Place, blocked: tuple[Place, ...] = ()) -> Cost
         goal: lane and distance along it [m].
         blocked: places that cannot be passed.
     """
-    return CostTable(goal, argument(routing_graph(town).lanes), router(town).costs_to(goal, blocked))
+    return CostTable(goal, routing_graph(town).lanes, router(town).costs_to(goal, blocked))
 
 
 @lru_cache(maxsize=16)

@@ -14,7 +14,7 @@ from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps import Exit, Town
 from dorothie_gym.policies.route_progress import lanes_beside, next_choice
-from dorothie_gym.policies.route_tables import is_choice
+from dorothie_gym.policies.route_tables import is_choice, route_tables
 from dorothie_gym.spaces import ExitColumn, ObservationMapping, SpaceLimits
 
 SECTORS = tuple(range(-180, 180, 45))
@@ -133,26 +133,20 @@ class ExitArrays(NamedTuple):
 @lru_cache(maxsize=16)
 def exit_arrays(town: Town) -> ExitArrays:
     """Returns the exits of a town's junctions in arrays; built once for each town."""
-    exits, count = JunctionExits(town), len(town.lanes)
+    exits, tables, count = JunctionExits(town), route_tables(town), len(town.lanes)
     lanes_by_sector = np.full((count, len(SECTORS)), -1, dtype=np.int32)
-    numbers = np.full(count, -1, dtype=np.int32)
     arrays = ExitArrays(
         lanes_by_sector,
         lanes_by_sector.copy(),
-        numbers,
-        numbers.copy(),
-        numbers.copy(),
+        tables.street,
+        tables.ahead,
+        np.full(count, -1, dtype=np.int32),
         np.zeros(count, dtype=np.bool_),
     )
-    for lane in town.lanes:
-        choice = next_choice(town, lane.id, 0.0)
-        arrays.street[lane.id] = lane.street
-        if choice is not None:
-            arrays.ahead[lane.id] = choice.lane
-        if is_choice(town, lane.id):
-            for sector, way in enumerate(exits.by_sector(lane.id)):
-                if way is not None:
-                    arrays.lane[lane.id, sector], arrays.angle[lane.id, sector] = way.lane, way.angle
+    for lane in np.flatnonzero(tables.choice).tolist():
+        for sector, way in enumerate(exits.by_sector(lane)):
+            if way is not None:
+                arrays.lane[lane, sector], arrays.angle[lane, sector] = way.lane, way.angle
     for options, lanes in _lanes_by_exits(town).items():
         if len(options) <= SpaceLimits.exits:  # no more are observed
             arrays.first[lanes], arrays.alone[lanes] = lanes[0], len(lanes) == 1
