@@ -16,6 +16,7 @@ from dorothie_gym.engine.beliefs import BeliefTracker
 from dorothie_gym.engine.path_measurements import EgoMeasurements, UpcomingJunction
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.ontology import AGENT_ROLES, LABELS, GoalStatus, PropKind, Role, Sensor, encode_slots
+from dorothie_gym.sim.ego.motion_control import motion_of
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import (
     ExitColumn,
@@ -128,7 +129,7 @@ class ObservationBuilder(Lookups):
         if participant is not None or co_wizard is not None:
             true, believed = participant or self._unread[Role.PARTICIPANT], co_wizard or self._unread[Role.CO_WIZARD]
             ego.write_objects(true["objects"], believed["objects"])
-        motion = self._numbers[self.motion()]
+        motion = self._numbers[0 if co_wizard is None and ad_wizard is None else self.motion()]
         if participant is not None:
             self._build_participant(participant, delivered, ego)
         if co_wizard is not None:
@@ -168,14 +169,7 @@ class ObservationBuilder(Lookups):
 
     def motion(self) -> Motion:
         """Returns the state of motion of the ego."""
-        world = self._world
-        if world.planner.held:
-            return Motion.STOPPED
-        if world.hazard is not None:
-            return Motion.HAZARD
-        if world.planner.waits_at_end and world.planner.room < 5.0 and world.car.speed < 0.3:
-            return Motion.WAITING
-        return Motion.DRIVING
+        return Motion(motion_of(self._world.actors.arrays))
 
     # --- templates --------------------------------------------------------------------------------------------------
 

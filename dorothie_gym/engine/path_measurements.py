@@ -8,53 +8,58 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import allocating
+from dorothie_gym.compilation import allocating, compiled
 from dorothie_gym.maps import Exit
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.ego.path_search import SEARCH, index_at, progress_on_path
+from dorothie_gym.sim.ego.path_search import SEARCH, point_before, progress_on_path
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.sensing.perception import see
+from dorothie_gym.sim.state.records import CoursePointRecord, RecordArray
 from dorothie_gym.sim.world import SensorArrays, World
 from dorothie_gym.spaces import ExitColumn
 
 
-@allocating
-def write_lanes(lanes: NDArray[np.int64], here: int, table: NDArray[np.int64]) -> None:
+@compiled
+def write_lanes(
+    course: RecordArray[CoursePointRecord], count: int, here: int, table: NDArray[np.int64]
+) -> None:  # fmt: skip
     """Writes the lanes of a path from a point on, in order and without repetition, as 1 + lane number."""
     row, last = 0, -1
-    for k in range(here, len(lanes)):
+    for k in range(here, count):
         if row == len(table):
             return
-        if lanes[k] != last:
-            last = lanes[k]
+        if course[k].lane != last:
+            last = course[k].lane
             table[row] = last + 1
             row += 1
 
 
-@allocating
-def write_waypoints(s: Array, points: Array, heading: float, start: float, spacing: float, table: Array) -> None:
-    """Writes points of a path ahead of a place on it.
+@compiled
+def write_waypoints(
+    course: RecordArray[CoursePointRecord], count: int, start: float, spacing: float, table: Array
+) -> None:
+    """Writes points of a path ahead of a place on it; before its start, the path is extended straight.
 
     Args:
-        s: see above.
-        points: see above.
-        heading: heading of the path at its start; before it, the path is extended straight [rad].
+        course: points of the path.
+        count: number of points.
         start: distance along the path [m].
         spacing: distance between successive points, and from the start to the first [m].
         table: table that is written: positions (m, 2) [m].
     """
-    end = len(s) - 1
+    end = count - 1
     for row in range(len(table)):
         at = start + (row + 1) * spacing
         if at < 0.0:
-            table[row, 0] = points[0, 0] + at * math.cos(heading)
-            table[row, 1] = points[0, 1] + at * math.sin(heading)
+            table[row, 0] = course[0].x + at * math.cos(course[0].heading)
+            table[row, 1] = course[0].y + at * math.sin(course[0].heading)
             continue
-        at = min(at, s[end])
-        k = min(index_at(s, at), end - 1)
-        t = min(max((at - s[k]) / (s[k + 1] - s[k]), 0.0), 1.0)
-        table[row, 0] = points[k, 0] + t * (points[k + 1, 0] - points[k, 0])
-        table[row, 1] = points[k, 1] + t * (points[k + 1, 1] - points[k, 1])
+        at = min(at, course[end].s)
+        k = min(point_before(course, count, at), end - 1)
+        one, two = course[k], course[k + 1]
+        t = min(max((at - one.s) / (two.s - one.s), 0.0), 1.0)
+        table[row, 0] = one.x + t * (two.x - one.x)
+        table[row, 1] = one.y + t * (two.y - one.y)
 
 
 @allocating
@@ -102,12 +107,10 @@ def write_objects(
         believed[row, 2] = believed_y + dx * sine + dy * cosine
 
 
-@allocating
+@compiled
 def write_path(
-    s: Array,
-    points: Array,
-    lanes: NDArray[np.int64],
-    heading: float,
+    course: RecordArray[CoursePointRecord],
+    count: int,
     near: float,
     spacing: float,
     x: float,
@@ -120,10 +123,8 @@ def write_path(
     """Writes the observed part of a path, from the true and from the estimated position, in one call.
 
     Args:
-        s: see above.
-        points: see above.
-        lanes: lanes of the points (n,).
-        heading: heading at the start of the path [rad].
+        course: points of the path.
+        count: number of points.
         near: true distance of the ego along the path [m].
         spacing: distance between waypoints [m].
         x: estimated position of the ego [m].
@@ -136,10 +137,10 @@ def write_path(
     Returns:
         Estimated distance of the ego along the path [m].
     """
-    progress = progress_on_path(s, points, x, y, near, window)
-    write_waypoints(s, points, heading, near, spacing, waypoints)
-    write_lanes(lanes, index_at(s, near), path_lanes)
-    write_waypoints(s, points, heading, progress, spacing, believed_waypoints)
+    progress = progress_on_path(course, count, x, y, near, window)
+    write_waypoints(course, count, near, spacing, waypoints)
+    write_lanes(course, count, point_before(course, count, near), path_lanes)
+    write_waypoints(course, count, progress, spacing, believed_waypoints)
     return progress
 
 
@@ -165,7 +166,8 @@ class EgoMeasurements:
         self._x, self._y, self._heading = self.pose.tolist()
         x, y = car.position.tolist()
         self.true_pose = x, y, car.heading
-        self._path, self._near = planner.path, planner.s
+        self._course, self._points = world.actors.arrays.course, int(planner.plan["points"])
+        self._near = planner.s
         self.progress = self._near
 
     def write_path(
@@ -180,11 +182,10 @@ class EgoMeasurements:
             believed_waypoints: points ahead of the estimated position (n, 2) [m]. The path is extended straight before
                 its start.
         """
-        path = self._path
         error = math.hypot(self._x - self.true_pose[0], self._y - self.true_pose[1])
         self.progress = write_path(
-            path.s, path.points, path.lanes, path.heading, self._near, spacing,
-            self._x, self._y, SEARCH + 2.0 * error, waypoints, path_lanes, believed_waypoints,
+            self._course, self._points, self._near, spacing, self._x, self._y, SEARCH + 2.0 * error,
+            waypoints, path_lanes, believed_waypoints,
         )  # fmt: skip
 
     def write_objects(self, objects: Array, believed: Array) -> None:

@@ -34,7 +34,6 @@ from dorothie_gym.spaces import (
     AdWizardAction,
     CoWizardAction,
     Mental,
-    Motion,
     Observation,
     ParticipantAction,
     Physical,
@@ -132,11 +131,6 @@ class LiveSession:
     def observations(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
         """Builds the observations of some roles, by agent; what several of them need is computed once."""
         return self._observations.build(self._delivered, roles)
-
-    @property
-    def motion(self) -> Motion:
-        """State of motion of the ego."""
-        return self._observations.motion()
 
     def end(self, reason: str) -> None:
         """Closes the session."""

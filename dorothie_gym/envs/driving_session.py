@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, TypeVar
 
@@ -13,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import Restorable
+from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.engine.observations import LazyObservations
-from dorothie_gym.engine.path_measurements import UpcomingJunction
 from dorothie_gym.engine.scenario import (
     ResetOptions,
     Scenario,
@@ -32,18 +32,17 @@ from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard, idle_until
-from dorothie_gym.policies.navigation.actions import ACTIONS, FIRST_TURN, UNDER_WAY, NavigationAction, prepares
-from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_arrays, look
+from dorothie_gym.policies.navigation.actions import ACTIONS
+from dorothie_gym.policies.navigation.cost_to_go import CostToGo
+from dorothie_gym.policies.navigation.driver_view import driver_arrays
 from dorothie_gym.policies.navigation.instructor import Guidance, Instructor, NavigationInstruction, words_of
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, exit_arrays
-from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, RouteCosts, Vector, encode
+from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, Vector, observe
 from dorothie_gym.policies.observation_parser import read_landmarks
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import (
     ActionDecoder,
     AdWizardAction,
@@ -64,7 +63,7 @@ from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 _SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
 
 
-class DrivingSession:
+class DrivingSession(Lookups):
     """Session in progress in which the agent only drives: instructor, Ad-Wizard, rewards and end of the episode.
 
     Attributes:
@@ -73,20 +72,20 @@ class DrivingSession:
         instructor: built-in participant.
         heard: last instruction, as the Co-Wizard remembers it.
         seen: present observations of the roles, each built when it is read.
-        driver: what the driver knows at the present decision, and its observation.
-        junction: next junction with a choice on the planned path.
+        driver: what the driver knows at the present decision, its observation and its mask.
         episode: rewards and end of the episode.
     """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_state", "_inputs")
 
     def __init__(self, session: LiveSession, config: NavigationConfig, exits: JunctionExits) -> None:
         self.session, self.exits, self._config = session, exits, config
         town = session.world.town
         self.instructor = Instructor(town, Guidance(config.guidance))
         streets = [name.value for name in session.scenario.street_names]
-        self.driver = driver_arrays(sum(FIELDS.values()), streets)
-        self.junction = UpcomingJunction(session.world)
+        self.driver = driver_arrays(sum(FIELDS.values()), len(ACTIONS), streets)
         self._town_arrays, self._exit_arrays = town_arrays(session.world.network), exit_arrays(town)
-        self._costs = RouteCosts(town)
+        self._cost_to_named = CostToGo(town)
         self._decoder = ActionDecoder(Role.AD_WIZARD, session.limits)
         self._adversary = ScriptedAdWizard(session.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
         seed = policy_seed(session.scenario.seed, Role.AD_WIZARD)
@@ -101,7 +100,6 @@ class DrivingSession:
         self._listen()
         self._note_task()
         self._state["left"], self._state["counted"] = self._cost_to_go(), self._state["reached"]
-        self._look()
 
     @classmethod
     def begin(
@@ -148,32 +146,23 @@ class DrivingSession:
         judge(self.session.world.actors.arrays, self.episode)
         if self.reason is not None:
             self.session.end(self.reason)
-        self._look()
 
     def observe_roles(self) -> None:
         """Builds the observations that are read before the next decision, before the planned path changes."""
         for role in (Role.CO_WIZARD,) if self._is_idle else (Role.CO_WIZARD, Role.AD_WIZARD):
             self.seen[role]
 
-    def _look(self) -> None:
-        """Fills the driver's view."""
-        world, inputs = self.session.world, plain(self.driver.inputs)[0]
-        path, options = world.planner.path, self.junction.options()
-        manoeuvre, angle = world.planner.manoeuvre
-        inputs["cruise"], inputs["lights"], inputs["motion"] = world.ego.cruise, world.ego.lights, self.session.motion
-        inputs["manoeuvre"], inputs["angle"] = manoeuvre or 0, angle
-        inputs["weather"] = tuple(world.weather.values.values())
-        look(
-            self._town_arrays, self._exit_arrays, world.sensing_arrays, self.driver,
-            path.s, path.points, world.planner.s, options.lane, options.distance,
-        )  # fmt: skip
-
     def observe(self) -> Vector:
-        """Returns the observation of the driver."""
-        self.heard.write(self.exits.town, self.driver)
-        self._costs.write(self.heard.goal, self.instructor.blocked, self.driver)
-        encode(self.driver, self._config.max_seconds)
-        return self.driver.vector.copy()
+        """Looks, and returns the observation of the driver; its view and mask are in `driver`."""
+        world, driver = self.session.world, self.driver
+        self._inputs["weather"] = tuple(world.weather.values.values())
+        self.heard.write(self.exits.town, driver)
+        self._cost_to_named.aim(self.heard.goal, self.instructor.blocked if self.heard.goal is not None else ())
+        observe(
+            self._town_arrays, self._exit_arrays, world.sensing_arrays, driver, *self._cost_to_named.rows,
+            self._config.max_seconds,
+        )  # fmt: skip
+        return driver.vector.copy()
 
     def info(self) -> StepInfo:
         """Returns the info of the last decision, as a new dictionary."""
@@ -204,9 +193,7 @@ class DrivingSession:
         """Whether the Ad-Wizard does nothing at this decision."""
         if self._adversary is None or self._plans is None:
             return True
-        return self.session.world.time < idle_until(
-            self._adversary, self._plans, self.session.scenario.storyboard.story
-        )
+        return self.session.world.time < idle_until(self._adversary, self._plans, self._story)
 
     def _listen(self) -> None:
         """Lets the instructor speak, and updates the goal."""
@@ -256,11 +243,17 @@ class DrivingSession:
         if aim != self._aim:
             self._aim, state["renewed"] = aim, True
 
-    @property
+    @cached_property
     def _state(self) -> np.void:
         """Record of the episode."""
         state: np.void = plain(self.episode.state)[0]
         return state
+
+    @cached_property
+    def _inputs(self) -> np.void:
+        """View of the driver."""
+        inputs: np.void = plain(self.driver.inputs)[0]
+        return inputs
 
     @property
     def reward(self) -> float:
@@ -295,7 +288,7 @@ Action = TypeVar("Action")
 class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
     """Base class of the navigation environments; subclasses define observations and actions."""
 
-    CHANGES: ClassVar[Sequence[str]] = ("_drive", "_controls", "_shown", "_np_random", "_np_random_seed")
+    CHANGES: ClassVar[Sequence[str]] = ("_drive", "_shown", "_np_random", "_np_random_seed")
 
     def __init__(
         self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
@@ -310,7 +303,6 @@ class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
         self.template = template_option(storyboard)
         self._network = network_of(self.town)
         self._drive: DrivingSession | None = None
-        self._controls: NavigationMask | None = None
 
     def mutable_values(self) -> dict[str, object]:
         """Returns what changes in the environment, and what was noted for its pictures."""
@@ -373,41 +365,3 @@ class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
     def close(self) -> None:
         """Closes the window, if there is one."""
         self._view.close()
-
-
-class NavigationMask:
-    """Mask of the actions that the car of a session would carry out, computed from its planned path.
-
-    Attributes:
-        exits: exits of the town's junctions.
-    """
-
-    def __init__(self, world: World, exits: JunctionExits, junction: UpcomingJunction) -> None:
-        self._world, self.exits, self._junction = world, exits, junction
-
-    @property
-    def choice(self) -> tuple[int, float] | None:
-        """Lane before the next junction with a choice, and the distance to it [m]; None if the path comes to none."""
-        options = self._junction.options()
-        return (options.lane, options.distance) if options.exits else None
-
-    def mask(self, driver: DriverArrays) -> NDArray[np.int8]:
-        """Returns the mask (18,), 1 for feasible actions; `driver` has the view of the present decision."""
-        world, planner = self._world, self._world.planner
-        speed, cruise = float(world.car.speed), world.ego.cruise
-        mask = np.zeros(len(ACTIONS), dtype=np.int8)
-        mask[NavigationAction.NOTHING] = mask[NavigationAction.LIGHTS] = 1
-        mask[NavigationAction.STOP], mask[NavigationAction.START] = not planner.held, planner.held
-        mask[NavigationAction.FASTER] = may_change_cruise(cruise, True)
-        mask[NavigationAction.SLOWER] = may_change_cruise(cruise, False)
-        feasible = planner.feasible(speed)
-        mask[NavigationAction.SWITCH_LEFT] = feasible.switch_left
-        mask[NavigationAction.SWITCH_RIGHT] = feasible.switch_right
-        mask[NavigationAction.U_TURN] = feasible.u_turn
-        mask[NavigationAction.LANE_FOLLOW] = feasible.lane_follow
-        for action in UNDER_WAY:
-            mask[action] |= prepares(driver, action)
-        choice = self.choice if feasible.j_turn else None
-        if choice is not None:
-            mask[FIRST_TURN:] = [way is not None for way in self.exits.by_sector(choice[0])]
-        return mask

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.action_values import real_numbers
 from dorothie_gym.engine.scenario import ResetOptions
-from dorothie_gym.envs.driving_session import DrivingEnv, DrivingSession, NavigationMask
+from dorothie_gym.envs.driving_session import DrivingEnv, DrivingSession
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps import Town
@@ -240,7 +240,6 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
     def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
         """Begins a session; see `NavigationEnv.reset`."""
         drive = self.begin(seed, options)
-        self._controls = NavigationMask(drive.session.world, drive.exits, drive.junction)
         drive.session.world.ego.manual = VehicleControl(throttle=0.0, steer=0.0, brake=0.0)
         return self._observe(drive), drive.info()
 
@@ -276,24 +275,24 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         if action is PhysicalAction.U_TURN:
             may = planner.may_turn_round(float(drive.session.world.car.speed))
             return Physical(action=action) if may else None
-        angle = self._angle(given)
+        angle = _angle(given, drive)
         if angle is None or (action is PhysicalAction.J_TURN and planner.turn_ahead == angle):
             return None
         return Physical(action=action, angle=angle)
-
-    def _angle(self, given: NavigationInstruction) -> int | None:
-        """Returns the angle of the instructed turn or lane switch [degrees, positive left], or None."""
-        assert self._controls is not None
-        if given.sector is None:
-            return None
-        if given.action is ActionValue.LANE_SWITCH:
-            return LEFT if SECTORS[given.sector] > 0 else RIGHT
-        choice = self._controls.choice
-        way = self._controls.exits.by_sector(choice[0])[given.sector] if choice is not None else None
-        return None if way is None else way.angle
 
     def _keep_path(self, drive: DrivingSession) -> None:
         """Plans a new path for a car that has left its path or reached its end."""
         planner = drive.session.world.planner
         if abs(planner.offset) > LOST or (planner.room < END and not planner.waits_at_end):
             drive.session.world.find_path()
+
+
+def _angle(given: NavigationInstruction, drive: DrivingSession) -> int | None:
+    """Returns the angle of the instructed turn or lane switch [degrees, positive left], or None."""
+    if given.sector is None:
+        return None
+    if given.action is ActionValue.LANE_SWITCH:
+        return LEFT if SECTORS[given.sector] > 0 else RIGHT
+    lane, _ = drive.session.world.planner.choice
+    way = drive.exits.by_sector(lane)[given.sector] if lane >= 0 else None
+    return None if way is None else way.angle

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.action_values import whole_number
 from dorothie_gym.engine.scenario import ResetOptions
-from dorothie_gym.envs.driving_session import DrivingEnv, NavigationMask
+from dorothie_gym.envs.driving_session import DrivingEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps import Town
@@ -104,8 +104,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
             seed: seed of the session; None draws one.
             options: `scenario` plays a given `Scenario`; other options cause a warning.
         """
-        drive = self.begin(seed, options)
-        self._controls = NavigationMask(drive.session.world, drive.exits, drive.junction)
+        self.begin(seed, options)
         return self._observe(), self._info()
 
     def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, StepInfo]:
@@ -127,9 +126,9 @@ class NavigationEnv(DrivingEnv[np.int64]):
         return self._mask.astype(np.bool_)
 
     def _observe(self) -> Vector:
-        assert self._controls is not None
-        self._mask = self._controls.mask(self.drive.driver)
-        return self.drive.observe()
+        vector = self.drive.observe()
+        self._mask = self.drive.driver.mask.copy()
+        return vector
 
     def _info(self) -> StepInfo:
         return {"action_mask": self._mask.copy(), **self.drive.info()}

@@ -1,5 +1,6 @@
 """Observation and action spaces: the contract between roles and environments, field by field."""
 
+from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.spaces.actions import (
     NO_MOVE,
     ActionDecoder,
@@ -25,7 +26,6 @@ from dorothie_gym.spaces.observations import (
     ExitColumn,
     GuessColumn,
     LandmarkColumn,
-    Motion,
     ObjectColumn,
     Observation,
     ObservationMapping,

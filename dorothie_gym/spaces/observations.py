@@ -6,7 +6,6 @@ metres, speeds in m/s, headings in radians clockwise, turn angles in degrees pos
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, TypeAlias
@@ -28,6 +27,7 @@ from dorothie_gym.ontology import (
     WeatherParameter,
     decode_slots,
 )
+from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.spaces.actions import NO_MOVE
 from dorothie_gym.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
 from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, UTTERANCE_LENGTH, SpaceLimits
@@ -109,18 +109,6 @@ class PropColumn(Column):
     X = 1, "m", "x of the prop"
     Y = 2, "m", "y of the prop"
     HEADING = 3, "rad", "heading, clockwise"
-
-
-class Motion(enum.IntEnum):
-    """State of motion of the car."""
-
-    DRIVING = 0
-    STOPPED = 1
-    """Stopped by the action Stop, until Start or another manoeuvre."""
-    WAITING = 2
-    """Waiting at the end of the lane for a turn."""
-    HAZARD = 3
-    """Braking or standing because of a hazard ahead."""
 
 
 @lru_cache(maxsize=64)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,19 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.maps import LinkType, Town
-from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.ontology import SPEED_STEP, PhysicalAction
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
 from dorothie_gym.policies.navigation.driver_view import DriverArrays
-from dorothie_gym.policies.navigation.junction_exits import SECTORS
+from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays
 from dorothie_gym.sim.ego.feasibility import is_past_stopping
 from dorothie_gym.sim.ego.limits import HALF_LENGTH, LEAD, MAX_CRUISE, MIN_CRUISE, MIN_SWITCH, U_TURN_SPEED
+from dorothie_gym.sim.ego.manoeuvres import find_feasible
+from dorothie_gym.sim.state.codes import Feasible
 from dorothie_gym.spaces import Motion, Physical
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 LEFT, RIGHT = 90, -90
 """Angles of a lane switch [degrees]."""
@@ -128,6 +134,42 @@ def turn_angle(driver: DriverArrays, sector: int) -> int:
     """Returns the angle of the exit in a sector of the next junction, or that of the sector [degrees]."""
     view = driver.inputs[0]
     return int(view.exit_angle[sector]) if view.exit_lane[sector] >= 0 else SECTORS[sector]
+
+
+@compiled
+def write_mask(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: DriverArrays) -> None:
+    """Writes which actions the ego would carry out, by its planned path; the view of the driver is up to date."""
+    plan, mask = world.plan[0], driver.mask
+    feasible = find_feasible(town, world, world.vehicles[0].speed)
+    mask[:] = 0
+    mask[_NOTHING], mask[_LIGHT_SWITCH] = 1, 1
+    mask[_STOP], mask[_START] = not plan.held, plan.held
+    mask[_FASTER] = plan.cruise + SPEED_STEP <= MAX_CRUISE
+    mask[_SLOWER] = plan.cruise - SPEED_STEP >= MIN_CRUISE
+    for flag, action in _FEASIBLE:
+        mask[action] = feasible & flag > 0
+    for action in UNDER_WAY:
+        if prepares(driver, action):
+            mask[action] = 1
+    if feasible & _MAY_TURN > 0 and plan.choice >= 0:
+        for sector in range(len(SECTORS)):
+            mask[FIRST_TURN + sector] = exits.lane[plan.choice, sector] >= 0
+
+
+_NOTHING, _LIGHT_SWITCH, _STOP, _START, _FASTER, _SLOWER = (
+    int(action)
+    for action in (
+        NavigationAction.NOTHING, NavigationAction.LIGHTS, NavigationAction.STOP, NavigationAction.START,
+        NavigationAction.FASTER, NavigationAction.SLOWER,
+    )
+)  # fmt: skip
+_MAY_TURN = int(Feasible.J_TURN)
+_FEASIBLE = (
+    (int(Feasible.LANE_FOLLOW), int(NavigationAction.LANE_FOLLOW)),
+    (int(Feasible.SWITCH_LEFT), _SWITCH_LEFT),
+    (int(Feasible.SWITCH_RIGHT), _SWITCH_RIGHT),
+    (int(Feasible.U_TURN), _ROUND),
+)
 
 
 # --- estimated mask ---------------------------------------------------------------------------------------------------

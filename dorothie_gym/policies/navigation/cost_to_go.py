@@ -120,6 +120,13 @@ class CostToGo:
         self._table = None if goal is None else cost_table(self._town, goal, blocked)
         return True
 
+    @property
+    def rows(self) -> tuple[RecordArray[RoutingLane], Array]:
+        """Lanes and costs for `cost_from`; no costs where there is no goal."""
+        if self._table is None:
+            return cast("RecordArray[RoutingLane]", np.asarray(routing_graph(self._town).lanes)), np.zeros(0)
+        return self._table.lanes, self._table.costs
+
     def from_place(self, lane: int, station: float) -> float:
         """Returns the cost from a place [m]; infinite where no route leads to the goal, or there is no goal."""
         table = self._table

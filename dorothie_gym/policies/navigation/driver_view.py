@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray, empty_records, plain
-from dorothie_gym.maps.model import Array, LinkType
+from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays, JunctionExits
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.ego.motion_control import motion_of
 from dorothie_gym.sim.ego.path_search import SEARCH, progress_on_path
 from dorothie_gym.sim.network.lane_lookup import closest_lane, wrap_radians
 from dorothie_gym.sim.sensing.perception import see
@@ -114,6 +115,7 @@ class DriverArrays(NamedTuple):
         costs: (1,) costs of routes to the goal, if one is known.
         streets: (s,) names of the town's streets in the session: ids of `StreetName`.
         vector: (161,) float32 observation, see `observation_vector`.
+        mask: (18,) int8 feasible actions, see `actions.write_mask`.
     """
 
     inputs: RecordArray[DriverView]
@@ -121,18 +123,20 @@ class DriverArrays(NamedTuple):
     costs: RecordArray[CostRecord]
     streets: NDArray[np.int64]
     vector: NDArray[np.float32]
+    mask: NDArray[np.int8]
 
 
-def driver_arrays(size: int, streets: Sequence[int] = ()) -> DriverArrays:
+def driver_arrays(size: int = 0, actions: int = 0, streets: Sequence[int] = ()) -> DriverArrays:
     """Returns the arrays of a driver that has neither seen nor heard anything.
 
     Args:
         size: length of the observation.
+        actions: length of the mask.
         streets: names of the town's streets: ids of `StreetName`.
     """
     arrays = DriverArrays(
         empty_records(DriverView, 1), empty_records(HeardRecord, 1), empty_records(CostRecord, 1),
-        np.array(streets, dtype=np.int64), np.zeros(size, dtype=np.float32),
+        np.array(streets, dtype=np.int64), np.zeros(size, dtype=np.float32), np.zeros(actions, dtype=np.int8),
     )  # fmt: skip
     for name in ("goal_lane", "move", "action", "sector", "landmark", "street"):
         arrays.heard[name] = -1
@@ -143,34 +147,21 @@ def driver_arrays(size: int, streets: Sequence[int] = ()) -> DriverArrays:
 
 
 @compiled
-def look(
-    town: TownArrays,
-    exits: ExitArrays,
-    world: WorldArrays,
-    driver: DriverArrays,
-    s: Array,
-    points: Array,
-    near: float,
-    before: int,
-    ahead: float,
-) -> None:
-    """Fills a driver's view from the arrays of a world, except what the planner and the weather decide.
+def look(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: DriverArrays) -> None:
+    """Fills a driver's view from the arrays of a world, except the weather.
 
     Args:
         town: arrays of the town.
         exits: exits of its junctions.
         world: arrays of the world.
         driver: arrays of the driver, of which the view is written.
-        s: distance along the ego's path of each point (n,) [m].
-        points: of the path (n, 2) [m].
-        near: true distance of the ego along the path [m].
-        before: lane before the next junction with a choice on the path, or -1.
-        ahead: true distance to that junction [m].
     """
     car, control, frame, view = world.vehicles[0], world.car[0], world.clock[0].frame, driver.inputs[0]
     view.time, view.speed, view.hazard = frame / FRAME_RATE, car.speed, control.hazard
     view.hazard_distance = max(control.hazard_gap, 0.0) if control.hazard > 0 else 0.0
-    belief = world.localizer[0]
+    plan, belief = world.plan[0], world.localizer[0]
+    view.cruise, view.lights, view.motion = plan.cruise, plan.lights, motion_of(world)
+    view.manoeuvre, view.angle = plan.action, plan.angle
     x, y, heading = belief.estimate[0], belief.estimate[1], belief.estimate[2]
     view.x, view.y, view.heading = x, y, heading
     view.place_variance = belief.covariance[0, 0] + belief.covariance[1, 1]
@@ -185,12 +176,12 @@ def look(
     view.light = colour_at(town, lane, view.time)
     view.light_distance = record.length - view.station
     junction = -1
-    view.junction_ahead = before >= 0
-    if before >= 0:
+    view.junction_ahead = plan.choice >= 0
+    if plan.choice >= 0:
         error = np.hypot(x - car.x, y - car.y)
-        progress = progress_on_path(s, points, x, y, near, SEARCH + 2.0 * error)
-        view.junction_distance = max(ahead - (progress - near), 0.0)
-        junction = believed_junction(exits, before, lane)
+        progress = progress_on_path(world.course, int(plan.points), x, y, control.s, SEARCH + 2.0 * error)
+        view.junction_distance = max(plan.choice_at - control.s - (progress - control.s), 0.0)
+        junction = believed_junction(exits, int(plan.choice), lane)
     _take_exits(exits, view, junction, driver.streets)
     count = see(world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], car.x, car.y, frame, 0)
     for row in range(OBJECTS):
@@ -278,7 +269,7 @@ def read_view(observation: ObservationMapping, exits: JunctionExits, view: NDArr
 
 def driver_of(observation: ObservationMapping, exits: JunctionExits) -> DriverArrays:
     """Returns new arrays of a driver with the view of an observation of the Co-Wizard."""
-    driver = driver_arrays(0)
+    driver = driver_arrays()
     read_view(observation, exits, plain(driver.inputs)[0])
     return driver
 

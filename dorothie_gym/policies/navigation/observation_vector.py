@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import plain
-from dorothie_gym.maps import LinkType, Town
-from dorothie_gym.maps.lane_neighbours import oncoming_lanes
+from dorothie_gym.compilation.records import RecordArray, plain
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.routing import Place
+from dorothie_gym.maps.routing_graph import RoutingLane
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueMove,
@@ -24,7 +25,8 @@ from dorothie_gym.ontology import (
     PhysicalAction,
     WeatherParameter,
 )
-from dorothie_gym.policies.navigation.cost_to_go import CostToGo
+from dorothie_gym.policies.navigation.actions import write_mask
+from dorothie_gym.policies.navigation.cost_to_go import CostToGo, cost_from
 from dorothie_gym.policies.navigation.driver_view import (
     COLOURS,
     OBJECTS,
@@ -33,14 +35,23 @@ from dorothie_gym.policies.navigation.driver_view import (
     DriverView,
     HeardRecord,
     driver_arrays,
+    look,
     read_view,
 )
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
-from dorothie_gym.policies.navigation.junction_exits import SECTORS, JunctionExits
+from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays, JunctionExits
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.sim.ego.limits import MAX_CRUISE
+from dorothie_gym.sim.ego.manoeuvres import find_oncoming
+from dorothie_gym.sim.network.centre_lines import position_on, project_on
+from dorothie_gym.sim.network.network import network_of
+from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.spaces import Motion, ObservationMapping
 from dorothie_gym.spaces.fields import share, signal, sizes
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 Vector: TypeAlias = NDArray[np.float32]
 
@@ -329,6 +340,59 @@ def _encode_objects(view: DriverView, vector: Vector, k: int) -> int:
     return k + OBJECTS * (3 + len(_KINDS))
 
 
+@compiled
+def measure_costs(town: TownArrays, lanes: RecordArray[RoutingLane], costs: Array, driver: DriverArrays) -> None:
+    """Writes the costs of the routes to the goal from where a driver believes to be.
+
+    Args:
+        town: arrays of the town.
+        lanes: lanes of the routing graph.
+        costs: costs to the goal, see `cost_to_go.cost_from`.
+        driver: arrays of the driver with a known goal; view and instruction are read, the costs are written.
+    """
+    view, heard, found = driver.inputs[0], driver.heard[0], driver.costs[0]
+    goal, stop, lane, station = int(heard.goal_lane), heard.goal_station, int(view.lane), view.station
+    found.here = cost_from(lanes, costs, goal, stop, lane, station)
+    found.back = found.left = found.right = math.inf
+    oncoming, there = find_oncoming(town, lane, station)
+    if oncoming >= 0:
+        found.back = cost_from(lanes, costs, goal, stop, oncoming, there)
+    x, y = position_on(town.points, town.lanes[lane], station)
+    if town.lanes[lane].left >= 0:
+        there, _ = project_on(town, int(town.lanes[lane].left), x, y)
+        found.left = cost_from(lanes, costs, goal, stop, int(town.lanes[lane].left), there)
+    if town.lanes[lane].right >= 0:
+        there, _ = project_on(town, int(town.lanes[lane].right), x, y)
+        found.right = cost_from(lanes, costs, goal, stop, int(town.lanes[lane].right), there)
+    for k in range(len(SECTORS)):
+        found.exits[k] = math.inf
+        if view.exit_lane[k] >= 0:
+            found.exits[k] = cost_from(lanes, costs, goal, stop, int(view.exit_lane[k]), 0.0)
+
+
+@compiled
+def observe(
+    town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: DriverArrays,
+    lanes: RecordArray[RoutingLane], costs: Array, max_seconds: float,
+) -> None:  # fmt: skip
+    """Writes view, observation vector and mask of a driver at a decision.
+
+    Args:
+        town: arrays of the town.
+        exits: exits of its junctions.
+        world: arrays of the world.
+        driver: arrays of the driver, with the last instruction.
+        lanes: lanes of the routing graph.
+        costs: costs to the goal of the instruction, if there is one, see `cost_to_go.cost_from`.
+        max_seconds: time limit of the session [s].
+    """
+    look(town, exits, world, driver)
+    if driver.heard[0].goal_lane >= 0:
+        measure_costs(town, lanes, costs, driver)
+    encode(driver, max_seconds)
+    write_mask(town, exits, world, driver)
+
+
 class NavigationEncoder:
     """Encoder of observations for a driver in a town, in `DuoWizardEnv`.
 
@@ -338,7 +402,7 @@ class NavigationEncoder:
 
     def __init__(self, town: Town, exits: JunctionExits, max_seconds: float) -> None:
         self._town, self._exits, self._max_seconds = town, exits, max_seconds
-        self._costs = RouteCosts(town)
+        self._arrays, self._cost_to_go = town_arrays(network_of(town)), CostToGo(town)
 
     def observe(self, seen: ObservationMapping, heard: HeardInstruction, blocked: tuple[Place, ...]) -> Vector:
         """Encodes an observation.
@@ -354,38 +418,8 @@ class NavigationEncoder:
         driver = driver_arrays(sum(FIELDS.values()))
         read_view(seen, self._exits, plain(driver.inputs)[0])
         heard.write(self._town, driver)
-        self._costs.write(heard.goal, blocked, driver)
+        if heard.goal is not None:
+            self._cost_to_go.aim(heard.goal, blocked)
+            measure_costs(self._arrays, *self._cost_to_go.rows, driver)
         encode(driver, self._max_seconds)
         return driver.vector
-
-
-class RouteCosts:
-    """Costs of the routes to a driver's goal."""
-
-    def __init__(self, town: Town) -> None:
-        self._town, self._oncoming, self._cost_to_go = town, oncoming_lanes(town), CostToGo(town)
-
-    def write(self, goal: Place | None, blocked: tuple[Place, ...], driver: DriverArrays) -> None:
-        """Writes the costs from where a driver believes to be; nothing where no goal is known.
-
-        Args:
-            goal: lane and distance along it [m].
-            blocked: places behind the roadblocks known.
-            driver: arrays of the driver; the view is read, the costs are written.
-        """
-        self._cost_to_go.aim(goal, blocked if goal is not None else ())
-        if goal is None:
-            return
-        town, left = self._town, self._cost_to_go.from_place
-        view, costs = plain(driver.inputs)[0], plain(driver.costs)[0]
-        lane, station = int(view["lane"]), float(view["station"])
-        oncoming = self._oncoming.at(lane, station)
-        costs["here"] = left(lane, station)
-        costs["back"] = math.inf if oncoming is None else left(oncoming.lane, oncoming.station)
-        for name, side in (("left", LinkType.LANE_CHANGE_LEFT), ("right", LinkType.LANE_CHANGE_RIGHT)):
-            beside = town.neighbour(lane, side)
-            position = town.lanes[lane].position(station)
-            costs[name] = math.inf if beside is None else left(beside, float(town.lanes[beside].project(position)[0]))
-        costs["exits"] = [
-            math.inf if way < 0 or view["junction"] < 0 else left(way, 0.0) for way in view["exit_lane"].tolist()
-        ]

@@ -30,7 +30,7 @@ from dorothie_gym.sim.ego.obstacles import SHORTEST_STOP, room, safe_speed
 from dorothie_gym.sim.ego.path import advance, heading_at, point_at, take_lanes
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.sensing.perception import see
-from dorothie_gym.sim.state.codes import STATIC, U_TURN, EventCode
+from dorothie_gym.sim.state.codes import STATIC, U_TURN, EventCode, Motion
 from dorothie_gym.sim.state.records import EgoRecord
 from dorothie_gym.sim.state.world_arrays import log
 from dorothie_gym.sim.traffic.junctions import note
@@ -230,3 +230,24 @@ def _note_hazard(world: WorldArrays, limiting: bool) -> None:
     if frame - car.hazard_seen > HAZARD_PAUSE:
         log(world, EventCode.HAZARD_END, int(car.hazard), int(car.hazard_key), float(frame - car.hazard_since))
         car.hazard = 0
+
+
+# --- State of motion --------------------------------------------------------------------------------------------------
+
+WAITING_ROOM, WAITING_SPEED = 5.0, 0.3
+"""Room ahead [m] and speed [m/s] below which the ego waits at the end of its path."""
+
+
+@compiled
+def motion_of(world: WorldArrays) -> int:
+    """Returns the `codes.Motion` of the ego."""
+    plan, car = world.plan[0], world.car[0]
+    if plan.held:
+        return _STOPPED
+    if car.hazard > 0:
+        return _HAZARD
+    waits = plan.open_end and plan.length - car.s < WAITING_ROOM and world.vehicles[0].speed < WAITING_SPEED
+    return _WAITING if waits else _DRIVING
+
+
+_DRIVING, _STOPPED, _WAITING, _HAZARD = (int(motion) for motion in Motion)

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 
 from dorothie_gym.compilation import compiled
-from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.state.records import CoursePointRecord, RecordArray
 
 SEARCH = 6.0
 """Half width of the search for a place on the path [m], to which twice the error of the pose estimate is added."""
 
 
 @compiled
-def index_at(s: Array, at: float) -> int:
-    """Returns the index of the point at or before a distance along the path."""
-    low, high = 0, len(s)
+def point_before(course: RecordArray[CoursePointRecord], count: int, at: float) -> int:
+    """Returns the number of the point at or before a distance along a path of so many points."""
+    low, high = 0, count
     while low < high:
         middle = (low + high) // 2
-        if at < s[middle]:
+        if at < course[middle].s:
             high = middle
         else:
             low = middle + 1
@@ -25,29 +25,32 @@ def index_at(s: Array, at: float) -> int:
 
 
 @compiled
-def progress_on_path(s: Array, points: Array, x: float, y: float, near: float, window: float) -> float:
+def progress_on_path(
+    course: RecordArray[CoursePointRecord], count: int, x: float, y: float, near: float, window: float
+) -> float:
     """Returns the distance along a path [m] of its point closest to a position, searched around a known distance.
 
     The path is extended straight before its first and after its last point.
 
     Args:
-        s: see above.
-        points: see above.
+        course: points of the path.
+        count: number of points.
         x: position [m].
         y: position [m].
         near: centre of the search along the path [m].
         window: half width of the search [m].
     """
-    end = len(s) - 1
+    end = count - 1
     best, answer = math.inf, near
-    for k in range(index_at(s, near - window), min(index_at(s, near + window) + 1, end)):
-        ax, ay = points[k, 0], points[k, 1]
-        dx, dy = points[k + 1, 0] - ax, points[k + 1, 1] - ay
-        t = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
+    first, last = point_before(course, count, near - window), point_before(course, count, near + window)
+    for k in range(first, min(last + 1, end)):
+        one, two = course[k], course[k + 1]
+        dx, dy = two.x - one.x, two.y - one.y
+        t = ((x - one.x) * dx + (y - one.y) * dy) / (dx * dx + dy * dy)
         if (t < 0.0 and k > 0) or (t > 1.0 and k < end - 1):
             t = 0.0 if t < 0.0 else 1.0
-        ox, oy = x - ax - t * dx, y - ay - t * dy
+        ox, oy = x - one.x - t * dx, y - one.y - t * dy
         distance = ox * ox + oy * oy
         if distance < best:
-            best, answer = distance, s[k] + t * (s[k + 1] - s[k])
+            best, answer = distance, one.s + t * (two.s - one.s)
     return answer

@@ -174,3 +174,15 @@ class Feasible(enum.IntEnum):
     SWITCH_RIGHT = 4
     U_TURN = 8
     J_TURN = 16
+
+
+class Motion(enum.IntEnum):
+    """State of motion of the car."""
+
+    DRIVING = 0
+    STOPPED = 1
+    """Stopped by the action Stop, until Start or another manoeuvre."""
+    WAITING = 2
+    """Waiting at the end of the lane for a turn."""
+    HAZARD = 3
+    """Braking or standing because of a hazard ahead."""
