@@ -124,7 +124,7 @@ class CostToGo:
     def rows(self) -> tuple[RecordArray[RoutingLane], Array]:
         """Lanes and costs for `cost_from`; no costs where there is no goal."""
         if self._table is None:
-            return cast("RecordArray[RoutingLane]", np.asarray(routing_graph(self._town).lanes)), np.zeros(0)
+            return routing_graph(self._town).lanes, np.zeros(0)
         return self._table.lanes, self._table.costs
 
     def from_place(self, lane: int, station: float) -> float:
