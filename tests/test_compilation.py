@@ -6,6 +6,7 @@ import warnings
 import numba
 import numpy as np
 import pytest
+from numba.core import event
 
 from dorothie_gym.compilation import allocating, cache, compiled, inlined
 from dorothie_gym.compilation.cache import compiled_folder
@@ -145,3 +146,23 @@ print(network.get_closest_lane_index([5.0, 1.0], 0.1), network.lane_of(0).local_
         assert run.returncode == 0, run.stderr
         outputs.append(run.stdout.replace("np.float64", "").replace("(", "").replace(")", ""))
     assert outputs[0] == outputs[1]
+
+
+@compiled
+def doubled(number):
+    return 2 * number
+
+
+@compiled
+def sum_of_doubled(small, byte):
+    return doubled(small[0]) + doubled(byte[0]) + doubled(len(small)) + doubled(7)
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+def test_function_is_compiled_once_for_all_sizes_of_integers(monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    with event.install_recorder("numba:compile") as recorder:
+        total = sum_of_doubled(np.array([2**30 + 1], dtype=np.int32), np.array([255], dtype=np.uint8))
+    assert total == 2**31 + 2 + 510 + 2 + 14
+    names = [found.data["dispatcher"].py_func.__name__ for _, found in recorder.buffer if found.is_start]
+    assert sorted(names) == ["doubled", "sum_of_doubled"]

@@ -109,6 +109,14 @@ class _PartCompiler(Compiler):  # type: ignore[misc]  # numba has no type inform
         self.state.flags.no_compile = True
 
 
+def _widest(kind: types.Type) -> types.Type:
+    """Returns the type of an argument for the call, so that numba compiles a function once for all of them.
+
+    Of a constant only its type counts, and every integer is passed as the widest one: fields of records have 32 bits.
+    """
+    return types.int64 if isinstance(kind, types.Integer) and kind.bitwidth < types.int64.bitwidth else kind
+
+
 class CompiledFunction(CPUDispatcher):  # type: ignore[misc]  # numba has no type information
     """A function that is compiled when it is called from Python, and a part of those that call it."""
 
@@ -135,8 +143,7 @@ class CompiledFunction(CPUDispatcher):  # type: ignore[misc]  # numba has no typ
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Returns the signature of the part that compiled code calls with arguments of some types."""
         pysig, args = self._compiler.fold_argument_types(args, kws)
-        # of a constant only its type counts: numba would compile the function again for each
-        args = tuple(types.unliteral(kind) for kind in args)
+        args = tuple(_widest(types.unliteral(kind)) for kind in args)
         part = self._part(args)
         name = self.py_func.__name__
         return (
