@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, TypeVar
+from typing import ClassVar, TypeVar, cast
 
 import gymnasium as gym
 import numpy as np
@@ -30,7 +30,7 @@ from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import LandmarkName, MentalAction, Role
+from dorothie_gym.ontology import LandmarkName, MentalAction, Role, StreetName
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard, idle_until
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
@@ -38,9 +38,8 @@ from dorothie_gym.policies.navigation.driver_view import driver_arrays
 from dorothie_gym.policies.navigation.instructor import Guidance, Instructor, NavigationInstruction, words_of
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, exit_arrays
 from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, Vector, observe
-from dorothie_gym.policies.observation_parser import read_landmarks
+from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.spaces import (
@@ -57,7 +56,7 @@ from dorothie_gym.spaces import (
     plain_text,
 )
 from dorothie_gym.spaces.limits import STORY_LENGTH
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.tasks import Landmark, StoryboardTemplate
 from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
 _SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
@@ -70,35 +69,41 @@ class DrivingSession(Lookups):
         session: the session.
         exits: exits of the town's junctions.
         instructor: built-in participant.
-        heard: last instruction, as the Co-Wizard remembers it.
         seen: present observations of the roles, each built when it is read.
         driver: what the driver knows at the present decision, its observation and its mask.
-        episode: rewards and end of the episode.
+        episode: rewards of the episode.
+        ending: reason for its end.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_state", "_inputs")
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_state", "_inputs", "_record")
 
     def __init__(self, session: LiveSession, config: NavigationConfig, exits: JunctionExits) -> None:
         self.session, self.exits, self._config = session, exits, config
-        town = session.world.town
-        self.instructor = Instructor(town, Guidance(config.guidance))
-        streets = [name.value for name in session.scenario.street_names]
+        town, scenario, limits = session.world.town, session.scenario, session.limits
+        streets = [name.value for name in scenario.street_names]
+        landmarks = scenario.storyboard.landmarks[: limits.landmarks]
+        self._known = frozenset((mark.lane, mark.station) for mark in landmarks if not mark.hidden)
+        self.instructor = Instructor(
+            town, Guidance(config.guidance), [_seen(mark, row, town, streets) for row, mark in enumerate(landmarks)],
+            self._known, streets, subgoals=len(scenario.storyboard.subgoals), things=limits.objects,
+        )  # fmt: skip
         self.driver = driver_arrays(sum(FIELDS.values()), len(ACTIONS), streets)
         self._town_arrays, self._exit_arrays = town_arrays(session.world.network), exit_arrays(town)
         self._cost_to_named = CostToGo(town)
-        self._decoder = ActionDecoder(Role.AD_WIZARD, session.limits)
-        self._adversary = ScriptedAdWizard(session.limits, rate=config.exceptions) if config.exceptions > 0.0 else None
-        seed = policy_seed(session.scenario.seed, Role.AD_WIZARD)
+        self._decoder = ActionDecoder(Role.AD_WIZARD, limits)
+        self._adversary = ScriptedAdWizard(limits, rate=config.exceptions) if config.exceptions > 0.0 else None
+        seed = policy_seed(scenario.seed, Role.AD_WIZARD)
         self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
-        self._story = plain_text(session.scenario.storyboard.story, STORY_LENGTH)
-        self.heard, self._notes = HeardInstruction(), list[Mental]()
+        self._story = plain_text(scenario.storyboard.story, STORY_LENGTH)
+        self._driven, self._named, self._notes = 0.0, cast("Place | None", None), list[Mental]()
         self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # goal and roadblocks of the last decision
+        self._weather: tuple[float, ...] = ()
         self.seen: Mapping[str, Observation] = LazyObservations(session)
-        marks = read_landmarks(self.seen[Role.CO_WIZARD], town)  # those on its map, for the whole session
-        self._known = frozenset(mark.place for mark in marks)
-        self.episode, self._task_version = episode_arrays(config), -1
-        self._listen()
+        self.episode, self._task_version, self.ending = episode_arrays(config), -1, Ending.NONE
+        session.world.open_eye()
         self._note_task()
+        self._listen()
+        self._note_aim()
         self._state["left"], self._state["counted"] = self._cost_to_go(), self._state["reached"]
 
     @classmethod
@@ -125,27 +130,29 @@ class DrivingSession(Lookups):
 
     def play(self, action: CoWizardAction) -> None:
         """Plays one decision; the next belief update of the Co-Wizard is sent with its action."""
-        if self.reason is not None:
+        if self.ending:
             from gymnasium.error import ResetNeeded
 
             raise ResetNeeded("the session is over: call reset() first")
         if self._notes:
             action = replace(action, mental=self._notes.pop(0))
-        before, speed = self.session.world.time, float(self.session.world.car.speed)
-        self.session.step({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
-        self.seen = LazyObservations(self.session)
-        self.heard = self.heard.after(self.session.world.time - before, speed, float(self.session.world.car.speed))
-        state, left = self._state, self._cost_to_go()  # to the goal of the last decision
-        last = float(state["left"])
+        session, world, state = self.session, self.session.world, self._state
+        before, speed = world.time, float(world.car.speed)
+        session.step({Role.PARTICIPANT: _SILENCE, Role.CO_WIZARD: action, Role.AD_WIZARD: self.interfere()})
+        self.seen = LazyObservations(session)
+        self._driven += (world.time - before) * (speed + float(world.car.speed)) / 2.0
+        last, left = float(state["left"]), self._cost_to_go()  # to the goal of the last decision
         state["progress"] = last - left if math.isfinite(left) and math.isfinite(last) else 0.0
+        self._note_task()
         self._listen()
+        self._note_aim()
         state["left"] = self._cost_to_go()
         state["acted"] = action.physical is not None
-        state["refusals"] = len(self.session.refused[Role.CO_WIZARD])
-        self._note_task()
-        judge(self.session.world.actors.arrays, self.episode)
-        if self.reason is not None:
-            self.session.end(self.reason)
+        state["refusals"] = len(session.refused[Role.CO_WIZARD])
+        judge(world.actors.arrays, self.episode)
+        self.ending = Ending(int(state["ending"]))
+        if self.ending:
+            session.end(self.ending.label)
 
     def observe_roles(self) -> None:
         """Builds the observations that are read before the next decision, before the planned path changes."""
@@ -154,12 +161,14 @@ class DrivingSession(Lookups):
 
     def observe(self) -> Vector:
         """Looks, and returns the observation of the driver; its view and mask are in `driver`."""
-        world, driver = self.session.world, self.driver
-        self._inputs["weather"] = tuple(world.weather.values.values())
-        self.heard.write(self.exits.town, driver)
-        self._cost_to_named.aim(self.heard.goal, self.instructor.blocked if self.heard.goal is not None else ())
+        world, driver, named = self.session.world, self.driver, self._named
+        weather = tuple(world.weather.values.values())
+        if weather != self._weather:
+            self._weather = self._inputs["weather"] = weather
+        self._record["driven"] = self._driven
+        self._cost_to_named.aim(named, self.instructor.blocked if named is not None else ())
         observe(
-            self._town_arrays, self._exit_arrays, world.sensing_arrays, driver, *self._cost_to_named.rows,
+            self._town_arrays, self._exit_arrays, world.actors.arrays, driver, *self._cost_to_named.rows,
             self._config.max_seconds,
         )  # fmt: skip
         return driver.vector.copy()
@@ -171,8 +180,8 @@ class DrivingSession(Lookups):
             "refused": list(self.session.refused[Role.CO_WIZARD]),
             "infractions": dict(self.session.infractions),
         }
-        if self.reason is not None:
-            info["is_success"], info["reason"] = self.session.success, self.reason
+        if self.ending:
+            info["is_success"], info["reason"] = self.session.success, self.ending.label
             info["subgoals"] = {"live": len(self.session.task.live), "reached": int(self._state["reached"])}
         return info
 
@@ -197,20 +206,22 @@ class DrivingSession(Lookups):
 
     def _listen(self) -> None:
         """Lets the instructor speak, and updates the goal."""
-        planner = self.session.world.planner
-        waits = planner.held and float(self.session.world.car.speed) <= EGO_STANDING
-        turning = max(planner.manoeuvre_end - planner.s, 0.1) if planner.in_manoeuvre else 0.0
-        goal = self.instructor.goal
-        said = self.instructor.instruct(self.seen[Role.PARTICIPANT], self._known, waits=waits, turning=turning)
+        self.instructor.look(self.session.world.actors.arrays)
+        goal, said = self.instructor.goal, self.instructor.instruct()
         if self.instructor.goal is not goal:
-            self.heard = replace(self.heard, goal=None)
+            self._named = None
             self._notes = [Mental(action=MentalAction.GOAL_UPDATE)]
-        if said is None:
-            return
-        self.heard = replace(self.heard, instruction=said, driven=0.0)
-        name = said.landmark
-        if name is not None:
-            self._note_goal(name, said.distance, by_name=said.action is None)
+        if said is not None:
+            self._driven = 0.0
+            if said.landmark is not None:
+                self._note_goal(said.landmark, said.distance, by_name=said.action is None)
+        if said is not None or self.instructor.goal is not goal:
+            self.heard.write(self.exits.town, self.driver)
+
+    @property
+    def heard(self) -> HeardInstruction:
+        """Last instruction, as the Co-Wizard remembers it."""
+        return HeardInstruction(instruction=self.instructor.instruction, driven=self._driven, goal=self._named)
 
     def _note_goal(self, name: LandmarkName, distance: float, *, by_name: bool) -> None:
         """Queues the belief updates for a goal: a place on the map, or one as far ahead as was said."""
@@ -218,7 +229,7 @@ class DrivingSession(Lookups):
         assert goal is not None
         self._notes = [Mental(action=MentalAction.GOAL_UPDATE, goals=(name,))]
         if by_name:
-            self.heard = replace(self.heard, goal=goal.place)
+            self._named = goal.place
         elif goal.place not in self._known:
             path, s = self.session.world.planner.path, self.session.world.planner.s
             k = path.index_at(min(s + distance, path.length))
@@ -233,15 +244,23 @@ class DrivingSession(Lookups):
         return self.instructor.cost_to_go.from_place(planner.lane, planner.station)
 
     def _note_task(self) -> None:
-        """Notes the state of the task, and whether the goal or the known roadblocks have changed."""
-        task, way, state = self.session.task, self.instructor.cost_to_go, self._state
+        """Notes the state of the task after a change."""
+        task, state = self.session.task, self._state
         if task.version != self._task_version:
             self._task_version = task.version
             state["reached"] = sum(task.reached(i) for i in task.live)
             state["done"], state["succeeded"] = task.done, task.success
+            self.instructor.note_subgoals(
+                (task.landmark_of(i), i in task.live and not task.reached(i), task.allowed(i))
+                for i in range(len(task.storyboard.subgoals))
+            )
+
+    def _note_aim(self) -> None:
+        """Notes whether the goal or the known roadblocks have changed."""
+        way = self.instructor.cost_to_go
         aim = way.goal, way.blocked
         if aim != self._aim:
-            self._aim, state["renewed"] = aim, True
+            self._aim, self._state["renewed"] = aim, True
 
     @cached_property
     def _state(self) -> np.void:
@@ -255,6 +274,12 @@ class DrivingSession(Lookups):
         inputs: np.void = plain(self.driver.inputs)[0]
         return inputs
 
+    @cached_property
+    def _record(self) -> np.void:
+        """Last instruction in the arrays of the driver."""
+        record: np.void = plain(self.driver.heard)[0]
+        return record
+
     @property
     def reward(self) -> float:
         """Reward of the last decision."""
@@ -266,20 +291,21 @@ class DrivingSession(Lookups):
         return dict(zip(TERMS, self._state["terms"].tolist(), strict=True))
 
     @property
-    def reason(self) -> str | None:
-        """Reason for the end of the episode; None while it goes on."""
-        ending = int(self._state["ending"])
-        return Ending(ending).label if ending else None
-
-    @property
     def truncated(self) -> bool:
         """Whether time is up."""
-        return bool(self._state["ending"] == Ending.OUT_OF_TIME)
+        return self.ending is Ending.OUT_OF_TIME
 
     @property
     def terminated(self) -> bool:
         """Whether the destination was reached, the ego has left the road, or the participant gave up."""
-        return not self.truncated and bool(self._state["ending"])
+        return self.ending not in (Ending.NONE, Ending.OUT_OF_TIME)
+
+
+def _seen(mark: Landmark, row: int, town: Town, streets: Sequence[int]) -> SeenLandmark:
+    """Returns a landmark as the participant observes it; `streets` has the ids of the streets' names."""
+    street, (x, y) = town.lanes[mark.lane].street, mark.position
+    name = StreetName(streets[street]) if 0 <= street < len(streets) else StreetName.UNKNOWN
+    return SeenLandmark(row=row, name=mark.name, x=x, y=y, lane=mark.lane, station=float(mark.station), street=name)
 
 
 Action = TypeVar("Action")
@@ -345,13 +371,14 @@ class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
 
     def show(self) -> None:
         """Notes the present decision for `render()`, and draws it in human mode."""
+        if self.render_mode is None:
+            return
         drive = self.drive
         instruction = drive.heard.instruction
         if instruction is not None and instruction is not self._shown:
             self._view.note_instruction(instruction.time, words_of(instruction), str(instruction.act))
         self._shown = instruction
-        if self.render_mode is not None:
-            self._view.note(drive.seen[Role.CO_WIZARD])
+        self._view.note(drive.seen[Role.CO_WIZARD])
         if self.render_mode == "human":
             self.render()
 

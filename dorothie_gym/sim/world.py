@@ -157,6 +157,7 @@ class World(Lookups, Restorable):
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
         if self.faults:
             self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
+            self.open_eye()
         self._note_props()
         return self.reports.take()
 
@@ -229,22 +230,21 @@ class World(Lookups, Restorable):
             for key, kind, x, y, heading, length, width, speed, height in self.seen().tolist()
         ]  # fmt: skip
 
-    @property
-    def sensing_arrays(self) -> WorldArrays:
-        """Arrays of the world, with the present visibility."""
-        arrays = self.actors.arrays
-        self._tell_weather(arrays)
-        return arrays
+    def open_eye(self) -> None:
+        """Writes the present visibility into the arrays."""
+        self._tell_weather(self.actors.arrays)
 
     @property
     def senses(self) -> SensorArrays:
         """Arrays for perception: bodies, visibility, and room for the result."""
-        arrays = self.sensing_arrays
+        self.open_eye()
+        arrays = self.actors.arrays
         return SensorArrays(arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye)
 
     def seen(self) -> Array:
         """Returns the perceived bodies as numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
-        arrays = self.sensing_arrays
+        self.open_eye()
+        arrays = self.actors.arrays
         table = np.empty((len(arrays.seen), len(BODY)))
         return table[: look_around(arrays, self.frame, table)]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,14 @@ from dorothie_gym.policies.route_legs import (
 )
 from dorothie_gym.policies.route_progress import ASTRAY, CELL_BEHIND, SAME_ROADBLOCK
 from dorothie_gym.policies.route_tables import RouteTables
+from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.feasibility import u_turn_braking
-from dorothie_gym.sim.ego.limits import U_TURN_SPEED
+from dorothie_gym.sim.ego.limits import EGO_STANDING, U_TURN_SPEED
+from dorothie_gym.sim.sensing.perception import see
+from dorothie_gym.sim.state.codes import STATIC
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 SWITCH_DISTANCE = 80.0
 """Distance at which a lane switch is announced [m]."""
@@ -57,6 +63,39 @@ _NO_STEP, _GOAL_STEP, _TURN_STEP, _ROUND_STEP, _SWITCH_STEP, _STOP_STEP, _ON_STE
 
 Step: TypeAlias = tuple[int, int, int, int, int, int, int, float]
 """Step before it is said: kind, the two numbers that identify it, action, street, landmark, sector, distance [m]."""
+
+
+@compiled
+def attend(world: WorldArrays, guide: InstructorArrays) -> None:
+    """Reads what the instructor sees now from the arrays of a world.
+
+    Args:
+        world: arrays of the world.
+        guide: the instructor, of which `now` and the static bodies in sight are written.
+    """
+    view, plan, car, frame = guide.now[0], world.plan[0], world.vehicles[0], world.clock[0].frame
+    view.lane, view.station, view.speed, view.time = plan.lane, plan.station, car.speed, frame / FRAME_RATE
+    view.waits = plan.held and car.speed <= EGO_STANDING
+    view.turning = max(plan.end - world.car[0].s, 0.1) if plan.off_line else 0.0
+    view.things = 0
+    if not _has_props(world):
+        return
+    count = see(world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], car.x, car.y, frame, 0)
+    for row in range(min(count, len(guide.things))):
+        body = world.seen[row]
+        if body.kind == STATIC:
+            thing = guide.things[view.things]
+            view.things += 1
+            dx, dy = body.x - car.x, body.y - car.y
+            thing.x, thing.y, thing.distance = body.x, body.y, math.sqrt(dx * dx + dy * dy)
+
+
+@compiled
+def _has_props(world: WorldArrays) -> bool:
+    for k in range(len(world.props)):
+        if world.props[k].present:
+            return True
+    return False
 
 
 @compiled

@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation.records import fields, plain
+from dorothie_gym.copying import Lookups
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place, router
 from dorothie_gym.maps.routing_graph import routing_graph
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, StreetName
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
-from dorothie_gym.policies.navigation.guidance_steps import instruct
+from dorothie_gym.policies.navigation.guidance_steps import attend, instruct
 from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
-from dorothie_gym.policies.observation_parser import SeenLandmark, read_landmarks, read_subgoals, scalar
+from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.route_tables import route_tables
-from dorothie_gym.spaces import ObjectColumn, Observation
 from dorothie_gym.tasks import map_label
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
 class Guidance(enum.StrEnum):
@@ -91,7 +95,7 @@ def exit_sectors(town: Town) -> NDArray[np.int32]:
     return np.array([-1 if sector is None else sector for sector in found] or [-1], dtype=np.int32)
 
 
-class Instructor:
+class Instructor(Lookups):
     """Participant that guides the car to one subgoal after another: a face of `guidance_steps.instruct`.
 
     Attributes:
@@ -99,39 +103,56 @@ class Instructor:
         blocked: places behind the roadblocks seen.
         cost_to_go: cost of the route to it from anywhere; progress is measured by it.
         instruction: last instruction given.
+        arrays: what it sees, its route, and the last instruction.
     """
 
-    def __init__(self, town: Town, guidance: Guidance) -> None:
-        self._town, self._guidance = town, guidance
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_route",)
+
+    def __init__(
+        self, town: Town, guidance: Guidance, marks: Sequence[SeenLandmark], known: frozenset[Place],
+        streets: Sequence[int], *, subgoals: int, things: int,
+    ) -> None:  # fmt: skip
+        """Begins a session.
+
+        Args:
+            town: the map.
+            guidance: level of the guidance.
+            marks: landmarks.
+            known: places of those on the Co-Wizard's map.
+            streets: names of the town's streets: ids of `StreetName`.
+            subgoals: number of subgoals.
+            things: number of bodies in sight, the nearest first, among which static ones are noticed.
+        """
+        self._town = town
+        self._marks = {mark.row: mark for mark in marks}
         self.goal: SeenLandmark | None = None
         self.blocked: tuple[Place, ...] = ()
         self.cost_to_go = CostToGo(town)
         self.instruction: NavigationInstruction | None = None
-        self._arrays: InstructorArrays | None = None
-        self._marks: dict[int, SeenLandmark] = {}
-        self._subgoals = b""
+        self.arrays = instructor_arrays(
+            lanes=len(town.lanes), subgoals=subgoals, landmarks=max(self._marks, default=-1) + 1, streets=len(streets),
+            things=things,
+        )  # fmt: skip
+        self.arrays.names[:] = streets
+        self.arrays.now["by_name"] = guidance is Guidance.GOALS
+        for row, mark in self._marks.items():
+            self.arrays.marks[row] = mark.station, mark.lane, mark.name.value, mark.place in known
 
-    def instruct(
-        self, observation: Observation, known: frozenset[Place], *, waits: bool, turning: float
-    ) -> NavigationInstruction | None:
-        """Gives an instruction if one is due.
+    def note_subgoals(self, subgoals: Iterable[tuple[int, bool, bool]]) -> None:
+        """Notes a change of the task: landmark of each subgoal, whether it is open, and may be reached now."""
+        for row, subgoal in enumerate(subgoals):
+            self.arrays.subgoals[row] = subgoal
 
-        Args:
-            observation: observation of the participant.
-            known: places of the landmarks on the Co-Wizard's map.
-            waits: whether the car was instructed to stop, and stands.
-            turning: remaining length of the lane switch or U-turn under way [m]; 0 where there is none.
+    def look(self, world: WorldArrays) -> None:
+        """Sees the car and what is around it at a decision."""
+        attend(world, self.arrays)
 
-        Returns:
-            The instruction, or None.
-        """
-        town, arrays = self._town, self._arrays
-        if arrays is None:
-            arrays = self._arrays = self._begin(observation, known)
-        self._read(observation, arrays, waits, turning)
+    def instruct(self) -> NavigationInstruction | None:
+        """Returns an instruction if one is due by what was seen last, or None."""
+        town, arrays = self._town, self.arrays
         search = router(town).search
         given = instruct(route_tables(town), routing_graph(town), search, exit_sectors(town), arrays)
-        _, row, closed = fields(arrays.route, "subgoal", "landmark", "closed").item()
+        row, closed = self._route.item()
         self.goal = self._marks.get(row)
         if closed != len(self.blocked):
             self.blocked = tuple((lane, station) for station, lane in plain(arrays.closed)[:closed].tolist())
@@ -141,41 +162,9 @@ class Instructor:
         self.instruction = _instruction_of(arrays)
         return self.instruction
 
-    def _begin(self, observation: Observation, known: frozenset[Place]) -> InstructorArrays:
-        """Returns the arrays of the session: the landmarks, and the names of the streets."""
-        names = np.asarray(observation["street_names"], dtype=np.int32)
-        arrays = instructor_arrays(
-            lanes=len(self._town.lanes), subgoals=len(observation["subgoals"]),
-            landmarks=len(observation["landmarks"]), streets=len(names), things=len(observation["objects"]),
-        )  # fmt: skip
-        arrays.names[:] = names
-        self._marks = {mark.row: mark for mark in read_landmarks(observation, self._town)}
-        marks = plain(arrays.marks)
-        for row, mark in self._marks.items():
-            marks[row] = mark.station, mark.lane, mark.name.value, mark.place in known
-        return arrays
-
-    def _read(self, observation: Observation, arrays: InstructorArrays, waits: bool, turning: float) -> None:
-        """Writes what is seen at this decision."""
-        table = observation["subgoals"].tobytes()
-        if table != self._subgoals:  # as at few decisions
-            self._subgoals = table
-            rows = plain(arrays.subgoals)
-            for subgoal in read_subgoals(observation):
-                rows[subgoal.index] = subgoal.landmark, subgoal.open, subgoal.allowed
-        objects = observation["objects"]
-        static = objects[objects[:, ObjectColumn.KIND] == ObjectClass.STATIC.value].tolist()
-        if static:
-            things = plain(arrays.things)
-            for row, thing in enumerate(static):
-                things[row] = thing[ObjectColumn.X], thing[ObjectColumn.Y], thing[ObjectColumn.DISTANCE]
-        fields(arrays.now, *_VIEW)[()] = (
-            scalar(observation, "station"), scalar(observation, "speed"), scalar(observation, "time"), turning,
-            int(observation["lane"]), len(static), waits, self._guidance is Guidance.GOALS,
-        )  # fmt: skip
-
-
-_VIEW = ("station", "speed", "time", "turning", "lane", "things", "waits", "by_name")
+    @cached_property
+    def _route(self) -> NDArray[np.void]:
+        return fields(self.arrays.route, "landmark", "closed")
 
 
 def _instruction_of(arrays: InstructorArrays) -> NavigationInstruction:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import itertools
 from collections.abc import Iterator
 from typing import Any
@@ -27,9 +28,16 @@ class Talk:
         self.seen: dict[str, Any] = copy.deepcopy(dict(env.drive.seen[Role.PARTICIPANT]))
         self.seen["objects"][:] = 0.0
         self.seen["speed"] = np.array([8.0])
-        self.instructor = Instructor(env.town, guidance)
         self.known: frozenset[Place] = frozenset()
-        self.time = 0.0
+        self.guidance, self.time = guidance, 0.0
+
+    @functools.cached_property
+    def instructor(self) -> Instructor:
+        """The instructor, which knows the landmarks of the session."""
+        return Instructor(
+            self.town, self.guidance, read_landmarks(self.seen, self.town), self.known,
+            self.seen["street_names"].tolist(), subgoals=len(self.seen["subgoals"]), things=len(self.seen["objects"]),
+        )  # fmt: skip
 
     @property
     def place(self) -> Place:
@@ -39,7 +47,15 @@ class Talk:
         """Moves the car to a place; returns what is said there."""
         self.time += wait
         self.seen.update(lane=np.array(lane), station=np.array([station]), time=np.array([self.time]))
-        return self.instructor.instruct(self.seen, self.known, waits=waits, turning=0.0)
+        arrays = self.instructor.arrays
+        self.instructor.note_subgoals((row.landmark, row.open, row.allowed) for row in read_subgoals(self.seen))
+        static = self.seen["objects"][self.seen["objects"][:, ObjectColumn.KIND] == ObjectClass.STATIC.value]
+        for name, column in (("x", ObjectColumn.X), ("y", ObjectColumn.Y), ("distance", ObjectColumn.DISTANCE)):
+            arrays.things[name][: len(static)] = static[:, column]
+        now = {"lane": lane, "station": station, "speed": 8.0, "time": self.time, "waits": waits, "things": len(static)}
+        for name, value in now.items():
+            arrays.now[name] = value
+        return self.instructor.instruct()
 
     def route(self, blocked: tuple[Place, ...] = ()) -> Route:
         """The route from the car to the goal."""
