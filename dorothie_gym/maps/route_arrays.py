@@ -39,6 +39,13 @@ class SearchNode:
     arrival: Int32  # row of `RouteSearch.extra` that leads from here to the goal, or -1
 
 
+class HeapEntry:
+    """A node in the heap of a search, with its cost so far [m]."""
+
+    cost: Float
+    node: Int32
+
+
 class SearchResult:
     """Outcome of a search."""
 
@@ -67,7 +74,7 @@ class RouteSearch(NamedTuple):
     """
 
     nodes: RecordArray[SearchNode]
-    heap: NDArray[np.int32]
+    heap: RecordArray[HeapEntry]
     closed: NDArray[np.bool_]
     extra: RecordArray[RoutingEdge]
     path: NDArray[np.int32]
@@ -93,7 +100,7 @@ def empty_search(graph: RoutingGraph) -> RouteSearch:
     into = int(np.diff(graph.manoeuvre_rows).max(initial=0))
     return RouteSearch(
         nodes=argument(empty_records(SearchNode, count)),
-        heap=np.zeros(count, dtype=np.int32),
+        heap=argument(empty_records(HeapEntry, count)),
         closed=np.zeros(count, dtype=np.bool_),
         extra=argument(empty_records(RoutingEdge, 24 + out + into)),
         path=np.zeros(count, dtype=np.int32),

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.model import Array
-from dorothie_gym.maps.route_arrays import SETTLED, UNREACHED, PlaceRecord, RouteSearch, SearchNode
+from dorothie_gym.maps.route_arrays import SETTLED, UNREACHED, PlaceRecord, RouteSearch
 from dorothie_gym.maps.routing_graph import (
     CHANGE_LEFT,
     CHANGE_RIGHT,
@@ -197,7 +197,7 @@ def find_route(
             size = _reach(search, size, extra[k].target, len(graph.edges) + k, extra[k].cost)
     found = False
     while size and not found:
-        node = search.heap[0]
+        node = int(search.heap[0].node)
         size = _settle(search, size)
         found = node == goal
         cost = search.nodes[node].cost
@@ -241,7 +241,7 @@ def find_costs(
         if search.nodes[source].arrival == k:
             size = _reach(search, size, source, k, search.extra[k].cost)
     while size:
-        node = search.heap[0]
+        node = int(search.heap[0].node)
         size = _settle(search, size)
         cost = search.nodes[node].cost
         for at in range(graph.incoming_rows[node], graph.incoming_rows[node + 1]):
@@ -323,13 +323,13 @@ def _reach(search: RouteSearch, size: int, number: int, edge: int, cost: float) 
     node.cost, node.edge = cost, edge
     while at:
         above = (at - 1) // 2
-        other = heap[above]
-        if not _is_before(nodes, number, other):
+        other = int(heap[above].node)
+        if not _is_before(cost, number, heap[above].cost, other):
             break
-        heap[at] = other
+        heap[at].cost, heap[at].node = heap[above].cost, other
         nodes[other].place = at
         at = above
-    heap[at] = number
+    heap[at].cost, heap[at].node = cost, number
     node.place = at
     return size
 
@@ -338,30 +338,31 @@ def _reach(search: RouteSearch, size: int, number: int, edge: int, cost: float) 
 def _settle(search: RouteSearch, size: int) -> int:
     """Takes the nearest node from the heap; returns the size of the heap."""
     heap, nodes = search.heap, search.nodes
-    nodes[heap[0]].place = SETTLED
+    nodes[heap[0].node].place = SETTLED
     size -= 1
     if size == 0:
         return 0
-    number, at = heap[size], 0
+    cost, number, at = heap[size].cost, int(heap[size].node), 0
     while 2 * at + 1 < size:
         below = 2 * at + 1
-        if below + 1 < size and _is_before(nodes, heap[below + 1], heap[below]):
+        one, other = heap[below], heap[min(below + 1, size - 1)]
+        if _is_before(other.cost, int(other.node), one.cost, int(one.node)):
             below += 1
-        if not _is_before(nodes, heap[below], number):
+        least, first = heap[below].cost, int(heap[below].node)
+        if not _is_before(least, first, cost, number):
             break
-        heap[at] = heap[below]
-        nodes[heap[at]].place = at
+        heap[at].cost, heap[at].node = least, first
+        nodes[first].place = at
         at = below
-    heap[at] = number
+    heap[at].cost, heap[at].node = cost, number
     nodes[number].place = at
     return size
 
 
-@compiled
-def _is_before(nodes: RecordArray[SearchNode], one: int, other: int) -> bool:
-    """Returns whether a node is settled before another one."""
-    cost, than = nodes[one].cost, nodes[other].cost
-    return cost < than or (cost == than and one < other)
+@inlined
+def _is_before(cost: float, node: int, than: float, other: int) -> bool:
+    """Returns whether a node with a cost is settled before another one."""
+    return cost < than or (cost == than and node < other)
 
 
 # --- Route ------------------------------------------------------------------------------------------------------------

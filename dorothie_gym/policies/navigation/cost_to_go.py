@@ -88,16 +88,6 @@ def cost_table(town: Town, goal: Place, blocked: tuple[Place, ...] = ()) -> Cost
     return CostTable(goal, routing_graph(town).lanes, router(town).costs_to(goal, blocked))
 
 
-@lru_cache(maxsize=16)
-def site_costs(town: Town) -> Array:
-    """Returns the costs to all sites of a town (sites, cells + lanes): rows for `cost_from`, in the order of the sites.
-
-    The goals of tasks are sites; only roadblocks ask for other rows.
-    """
-    tables = [cost_table(town, (site.lane, site.station)) for site in town.sites]
-    return np.stack([table.costs for table in tables])
-
-
 class CostToGo:
     """Cost of the cheapest route to a goal.
 
