@@ -100,7 +100,6 @@ class DrivingSession(Lookups):
         self._weather: tuple[float, ...] = ()
         self.seen: Mapping[str, Observation] = LazyObservations(session)
         self.episode, self._task_version, self.ending = episode_arrays(config), -1, Ending.NONE
-        session.world.open_eye()
         self._note_task()
         self._listen()
         self._note_aim()
@@ -168,7 +167,7 @@ class DrivingSession(Lookups):
         self._record["driven"] = self._driven
         self._cost_to_named.aim(named, self.instructor.blocked if named is not None else ())
         observe(
-            self._town_arrays, self._exit_arrays, world.actors.arrays, driver, *self._cost_to_named.rows,
+            self._town_arrays, self._exit_arrays, world.sensing_arrays, driver, *self._cost_to_named.rows,
             self._config.max_seconds,
         )  # fmt: skip
         return driver.vector.copy()
@@ -206,7 +205,7 @@ class DrivingSession(Lookups):
 
     def _listen(self) -> None:
         """Lets the instructor speak, and updates the goal."""
-        self.instructor.look(self.session.world.actors.arrays)
+        self.instructor.look(self.session.world.sensing_arrays)
         goal, said = self.instructor.goal, self.instructor.instruct()
         if self.instructor.goal is not goal:
             self._named = None

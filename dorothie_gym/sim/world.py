@@ -157,7 +157,7 @@ class World(Lookups, Restorable):
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
         if self.faults:
             self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
-            self.open_eye()
+            self._tell_weather(self.actors.arrays)
         self._note_props()
         return self.reports.take()
 
@@ -230,21 +230,22 @@ class World(Lookups, Restorable):
             for key, kind, x, y, heading, length, width, speed, height in self.seen().tolist()
         ]  # fmt: skip
 
-    def open_eye(self) -> None:
-        """Writes the present visibility into the arrays."""
-        self._tell_weather(self.actors.arrays)
+    @property
+    def sensing_arrays(self) -> WorldArrays:
+        """Arrays of the world, with the present visibility."""
+        arrays = self.actors.arrays
+        self._tell_weather(arrays)
+        return arrays
 
     @property
     def senses(self) -> SensorArrays:
         """Arrays for perception: bodies, visibility, and room for the result."""
-        self.open_eye()
-        arrays = self.actors.arrays
+        arrays = self.sensing_arrays
         return SensorArrays(arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye)
 
     def seen(self) -> Array:
         """Returns the perceived bodies as numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""
-        self.open_eye()
-        arrays = self.actors.arrays
+        arrays = self.sensing_arrays
         table = np.empty((len(arrays.seen), len(BODY)))
         return table[: look_around(arrays, self.frame, table)]
 
