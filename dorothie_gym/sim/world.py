@@ -26,7 +26,7 @@ from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.sensing.localizer import Localizer, switch_on
 from dorothie_gym.sim.sensing.perception import BODY, Perception, look_around
 from dorothie_gym.sim.sensing.visibility import Visibility
-from dorothie_gym.sim.state.codes import Refusal
+from dorothie_gym.sim.state.codes import NO_SPACE
 from dorothie_gym.sim.state.records import (
     EyeRecord,
     PedestrianRecord,
@@ -164,7 +164,7 @@ class World(Lookups, Restorable):
     def _run(self, frames: int) -> Array:
         """Steps all bodies by no more than `FRAMES` substeps; returns the ego's trace, see `WorldArrays`."""
         self._tell_weather(self.actors.arrays)
-        while step(self._arrays, self.actors.arrays, frames, 1.0 / FRAME_RATE) == Refusal.NO_SPACE:
+        while step(self._arrays, self.actors.arrays, frames, 1.0 / FRAME_RATE) == NO_SPACE:
             self.actors.arrays = lengthened(self.actors.arrays)
         self.car.refresh()
         self.frame += frames

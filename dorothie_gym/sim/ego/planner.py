@@ -19,13 +19,13 @@ from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.sim.ego.feasibility import FeasibleManoeuvres
 from dorothie_gym.sim.ego.manoeuvres import BEGIN, find_feasible, request
 from dorothie_gym.sim.ego.path import Path
-from dorothie_gym.sim.state.codes import Feasible, Refusal
+from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE, Feasible, Refusal
 from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
 
-REASONS: Final[Mapping[Refusal, str]] = MappingProxyType(
+REASONS: Final[Mapping[int, str]] = MappingProxyType(
     {
         Refusal.STOPPED: "the car is stopped already",
         Refusal.NOT_STOPPED: "the car is not stopped",
@@ -50,6 +50,8 @@ REASONS: Final[Mapping[Refusal, str]] = MappingProxyType(
     }
 )
 """Reasons of refusals."""
+
+_FLAGS: Final = tuple(int(flag) for flag in Feasible)
 
 
 class LocalPlanner(Lookups):
@@ -76,12 +78,12 @@ class LocalPlanner(Lookups):
     def _request(
         self, action: int, *, angle: int = 0, speed: float = 0.0, lane: int = 0, station: float = 0.0,
         offset: float = 0.0,
-    ) -> Refusal:  # fmt: skip
+    ) -> int:  # fmt: skip
         """Calls `request`, again with longer arrays where they have no room for the path."""
         while True:
             answer = request(self._arrays, self._holder.arrays, action, angle, speed, lane, station, offset)
-            if answer != Refusal.NO_SPACE:
-                return Refusal(answer)
+            if answer != NO_SPACE:
+                return answer
             self._holder.arrays = lengthened(self._holder.arrays)
 
     def _look_up(self) -> np.void:
@@ -235,14 +237,14 @@ class LocalPlanner(Lookups):
             None, or the reason of the refusal; then nothing has changed.
         """
         answer = self._request(int(action), angle=int(angle), speed=float(speed))
-        if answer is Refusal.NO_NAVIGATION:
-            return f"{action.label} is no navigation action"
-        return None if answer is Refusal.NONE else REASONS[answer]
+        if answer == CARRIED_OUT:
+            return None
+        return REASONS.get(answer, f"{action.label} is no navigation action")
 
     def feasible(self, speed: float) -> FeasibleManoeuvres:
         """Returns the navigation actions that would be carried out at a speed [m/s]."""
         found = find_feasible(self._arrays, self._holder.arrays, float(speed))
-        return FeasibleManoeuvres._make(bool(found & flag) for flag in Feasible)
+        return FeasibleManoeuvres(*[bool(found & flag) for flag in _FLAGS])
 
     def may_switch(self, side: LinkType, speed: float = 0.0) -> bool:
         """Returns whether a lane switch would be carried out at a speed [m/s]; `side` is a lane-change type."""

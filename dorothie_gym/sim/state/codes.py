@@ -166,6 +166,10 @@ class Refusal(enum.IntEnum):
     TURN_TOO_CLOSE = 21
 
 
+CARRIED_OUT, NO_SPACE = int(Refusal.NONE), int(Refusal.NO_SPACE)
+"""Answers to navigation actions, as plain numbers."""
+
+
 class Feasible(enum.IntEnum):
     """Flag of a navigation action that the ego would carry out, see `feasibility.FeasibleManoeuvres`."""
 
