@@ -2,13 +2,15 @@ import os
 import subprocess
 import sys
 import warnings
+from typing import NamedTuple
 
 import numba
 import numpy as np
 import pytest
 from numba.core import event
 
-from dorothie_gym.compilation import allocating, cache, compiled, inlined
+from dorothie_gym.compilation import allocating, cache, compiled, direct, inlined
+from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.cache import compiled_folder
 
 
@@ -146,6 +148,35 @@ print(network.get_closest_lane_index([5.0, 1.0], 0.1), network.lane_of(0).local_
         assert run.returncode == 0, run.stderr
         outputs.append(run.stdout.replace("np.float64", "").replace("(", "").replace(")", ""))
     assert outputs[0] == outputs[1]
+
+
+@by_reference
+class Numbers(NamedTuple):
+    values: np.ndarray
+    factor: float
+
+
+@compiled
+def scaled_sum(numbers, more, offset=0.0):
+    total = more + offset
+    for value in numbers.values:
+        total += value * numbers.factor
+    return total
+
+
+def test_function_called_directly_gives_the_same_results():
+    fast = direct(scaled_sum)
+    for count in (3, 0, 5):
+        numbers = Numbers(np.arange(count, dtype=np.float64), 2.0)
+        for more in (1, 1.5):  # of two types
+            assert fast(numbers, more) == scaled_sum(numbers, more) == more + count * (count - 1)
+            assert fast(numbers, more, 4.0) == 4.0 + scaled_sum(numbers, more)
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+def test_function_of_arrays_is_not_called_directly():
+    with pytest.raises(TypeError, match="sum_of_doubled takes arrays"):
+        direct(sum_of_doubled)(np.zeros(1, dtype=np.int32), np.zeros(1, dtype=np.uint8))
 
 
 @compiled

@@ -9,14 +9,24 @@ written, every process compiles again, and one ``RuntimeWarning`` explains how t
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TypeVar, cast
 
+import numpy as np
 from numba.core import config
 
 from dorothie_gym.compilation.cache import compiled_folder
 from dorothie_gym.compilation.dispatcher import CompiledFunction
 
-__all__ = ["WITHOUT_COUNTS", "CompiledFunction", "allocating", "compiled", "compiled_folder", "concurrent", "inlined"]
+__all__ = [
+    "WITHOUT_COUNTS",
+    "CompiledFunction",
+    "allocating",
+    "compiled",
+    "compiled_folder",
+    "concurrent",
+    "direct",
+    "inlined",
+]
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -50,6 +60,32 @@ def inlined(function: F) -> F:
     A call passes a tuple of thirty arrays as two hundred numbers, which takes longer than many small functions.
     """
     return _compile(function, **WITHOUT_COUNTS, forceinline=True)
+
+
+def direct(function: F) -> F:
+    """Makes Python call a compiled function without a look at the types inside of its arguments.
+
+    Before a call numba compares the types of all arrays in all tuples with those of earlier calls, which takes 7 us for
+    a town and a world. Here only the classes of the arguments decide: all tuples of one class must hold arrays of the
+    same types, as `WorldArrays` and `TownArrays` do.
+
+    Raises:
+        TypeError: (when the function is called) an argument is an array, whose class does not say its type.
+    """
+    if not isinstance(function, CompiledFunction):
+        return function
+    entries: dict[tuple[type, ...], Callable[..., object]] = {}
+
+    def call(*arguments: object) -> object:
+        kinds = tuple(map(type, arguments))
+        entry = entries.get(kinds)
+        if entry is None:
+            if any(issubclass(kind, np.ndarray) for kind in kinds):
+                raise TypeError(f"{function.__name__} takes arrays, and cannot be called directly")
+            entry = entries[kinds] = function.entry_for(*arguments)
+        return entry(*arguments)
+
+    return cast(F, call)
 
 
 def _compile(function: F, **options: bool) -> F:

@@ -10,6 +10,7 @@ calls.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from llvmlite import binding
@@ -109,6 +110,10 @@ class _PartCompiler(Compiler):  # type: ignore[misc]  # numba has no type inform
         self.state.flags.no_compile = True
 
 
+def _call(entry: Callable[..., object], left_out: tuple[None, ...], *arguments: object) -> object:
+    return entry(*arguments, *left_out)
+
+
 def _widest(kind: types.Type) -> types.Type:
     """Returns the type of an argument for the call, so that numba compiles a function once for all of them.
 
@@ -135,6 +140,15 @@ class CompiledFunction(CPUDispatcher):  # type: ignore[misc]  # numba has no typ
         """Compiles the function for arguments of the types of examples, without a call."""
         kinds = [typeof(example) for example in examples]
         self.compile(tuple(self._compiler.fold_argument_types(kinds, {})[1]))
+
+    def entry_for(self, *examples: object) -> Callable[..., object]:
+        """Returns the machine code for arguments of the types of examples, which does not look at types again.
+
+        Machine code takes all arguments, and ignores the values of those that are left out.
+        """
+        kinds = tuple(self._compiler.fold_argument_types([typeof(example) for example in examples], {})[1])
+        entry: Callable[..., object] = self.compile(kinds)
+        return partial(_call, entry, (None,) * (len(kinds) - len(examples))) if len(kinds) > len(examples) else entry
 
     def is_cached(self) -> bool:
         """Returns whether there is machine code of this version of the function on disk."""

@@ -13,8 +13,6 @@ from typing import Annotated, Any, Protocol, TypeAlias, TypeVar, cast, get_type_
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import inlined
-
 Float: TypeAlias = Annotated[float, "f8"]
 Int32: TypeAlias = Annotated[int, "i4"]
 Int64: TypeAlias = Annotated[int, "i8"]
@@ -107,9 +105,3 @@ def fields(records: RecordArray[Record], *names: str) -> NDArray[np.void]:
     time that a single field of `plain` takes.
     """
     return cast("NDArray[np.void]", records).view(np.ndarray)[list(names)][:1].reshape(())
-
-
-@inlined
-def int64_of(number: int) -> int:
-    """Returns an integer field as int64: numba compiles a function once more for integers of another size."""
-    return number + 0

@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.maps.model import Array
@@ -41,6 +42,8 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world, length
 from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import FRAMES
 from dorothie_gym.sim.weather import Weather, Wind
+
+_step = direct(step)
 
 FAULT_SECONDS = 30.0
 """Duration of a sensor fault [s] (design)."""
@@ -164,7 +167,7 @@ class World(Lookups, Restorable):
     def _run(self, frames: int) -> Array:
         """Steps all bodies by no more than `FRAMES` substeps; returns the ego's trace, see `WorldArrays`."""
         self._tell_weather(self.actors.arrays)
-        while step(self._arrays, self.actors.arrays, frames, 1.0 / FRAME_RATE) == NO_SPACE:
+        while _step(self._arrays, self.actors.arrays, frames, 1.0 / FRAME_RATE) == NO_SPACE:
             self.actors.arrays = lengthened(self.actors.arrays)
         self.car.refresh()
         self.frame += frames

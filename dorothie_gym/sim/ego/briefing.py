@@ -10,7 +10,6 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled
-from dorothie_gym.compilation.records import int64_of
 from dorothie_gym.sim.ego.course import find_end, point_before
 from dorothie_gym.sim.ego.limits import KMH
 from dorothie_gym.sim.ego.manoeuvres import extend
@@ -86,7 +85,7 @@ def find_goals(town: TownArrays, world: WorldArrays) -> None:
         x, y = position_on(town.points, town.lanes[goal.lane], goal.station)
         ways = town.ways[goal.lane]
         for k in range(ways.beside, ways.beside + ways.besides):
-            lane, station = int64_of(town.lane_lists[k]), goal.station
+            lane, station = town.lane_lists[k], goal.station
             if lane != goal.lane:
                 station, _ = project_on(town, lane, x, y)
             place = place_on_path(world, lane, station)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import int64_of
 from dorothie_gym.maps.polyline import HEADING, HEIGHT, STATION, X, Y
 from dorothie_gym.sim.ego.limits import LATERAL_ACCELERATION, PROFILE_BRAKING, U_TURN_SPEED
 from dorothie_gym.sim.network.centre_lines import interpolated, position_on, project_on, segment_at, value_on
@@ -182,7 +181,7 @@ def keep(world: WorldArrays, first: int, end: int, write: bool) -> None:
     """Lays the points from `first` to before `end` of the present path, which is being replaced."""
     if not count_points(world, end - first, write):
         return
-    course, lane, limit = world.course, int64_of(world.plan[0].lane), world.course[first].limit
+    course, lane, limit = world.course, world.plan[0].lane, world.course[first].limit
     for k in range(first, end):  # the points move to the front
         point = course[k]
         append(world, point.x, point.y, point.height, point.station, limit, lane, True)

@@ -10,7 +10,6 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled
-from dorothie_gym.compilation.records import int64_of
 from dorothie_gym.sim.ego.course import follow, keep, switch, u_turn
 from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, PLANNED_BRAKING, SWITCH_TIME
 from dorothie_gym.sim.network.lane_exits import ANOTHER_WAY
@@ -73,7 +72,7 @@ def cross_junction(town: TownArrays, world: WorldArrays, lane: int) -> bool:
     """Begins a plan with a lane, and inside a junction with those up to the lane behind it."""
     fits = begin_steps(world, lane)
     while fits and lane >= 0 and town.lanes[lane].junction >= 0:
-        lane = int64_of(town.ways[lane].onward)
+        lane = town.ways[lane].onward
         fits = lane < 0 or add_step(world, lane, False)
     return fits
 
@@ -84,7 +83,7 @@ def take_course(town: TownArrays, world: WorldArrays) -> bool:
     plan, course, last = world.plan[0], world.course, NOBODY
     plan.steps, fits = 0, True
     for k in range(plan.at, plan.points):
-        lane = int64_of(course[k].lane)
+        lane = course[k].lane
         if fits and (k == plan.at or lane != last):
             beside = k > plan.at and (town.lanes[last].left == lane or town.lanes[last].right == lane)
             fits, last = add_step(world, lane, beside), lane
@@ -95,10 +94,10 @@ def take_course(town: TownArrays, world: WorldArrays) -> bool:
 def enter_exit(town: TownArrays, world: WorldArrays, number: int) -> bool:
     """Adds the connectors of an exit, a row of `TownArrays.exits`, and the lane behind the junction."""
     way = town.exits[number]
-    lane = int64_of(way.connector)
+    lane = way.connector
     fits = add_step(world, lane, False)
     while fits and lane != way.lane:
-        lane = int64_of(town.neighbours[town.lanes[lane].successor])
+        lane = town.neighbours[town.lanes[lane].successor]
         fits = add_step(world, lane, False)
     return fits
 
@@ -134,8 +133,8 @@ def find_turn(town: TownArrays, world: WorldArrays, station: float, angle: int) 
     # successors come before lanes beside, so that lanes are changed as late as there is room
     row, waiting = root, root + 1
     while row < plan.steps:
-        lane, changes, follows = int64_of(steps[row].lane), int64_of(steps[row].changes), -1
-        onward = int64_of(town.ways[lane].onward)
+        lane, changes, follows = steps[row].lane, steps[row].changes, -1
+        onward = town.ways[lane].onward
         if town.ways[lane].offers:
             number = _closest_exit(town, lane, angle)
             misfit = misfit_of(town, number, angle) + SWITCH_COST * changes if number >= 0 else math.inf
@@ -192,8 +191,8 @@ def _closest_exit(town: TownArrays, lane: int, angle: int) -> int:
 def _reach_beside(town: TownArrays, world: WorldArrays, root: int, row: int, station: float) -> bool:
     """Notes the lanes beside a row of the search to which there is room to switch; returns whether they fit in."""
     step = world.steps[row]
-    lane, changes = town.lanes[step.lane], int64_of(step.changes)
-    left, right = int64_of(lane.left), int64_of(lane.right)
+    lane, changes = town.lanes[step.lane], step.changes
+    left, right = lane.left, lane.right
     if changes == MOST_CHANGES or not _has_room(town, world, row, station):
         return True
     if left >= 0 and not _is_seen(world, root, left) and not _reach(world, left, row, changes + 1, True):
@@ -275,7 +274,7 @@ def grow(town: TownArrays, world: WorldArrays, station: float) -> int:
             ahead += town.lanes[steps[k].lane].length
     ahead -= station
     while ahead < LAID:
-        on = int64_of(town.ways[steps[plan.steps - 1].lane].onward)
+        on = town.ways[steps[plan.steps - 1].lane].onward
         if on < 0:
             return 1
         if not add_step(world, on, False):
@@ -297,7 +296,7 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
     """
     count, steps, at = int(world.plan[0].steps), world.steps, station
     for k in range(count):
-        number = int64_of(steps[k].lane)
+        number = steps[k].lane
         lane = town.lanes[number]
         changes = 0
         while k + 1 + changes < count and steps[k + 1 + changes].change:
@@ -307,7 +306,7 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
                 follow(town, world, number, at, lane.length, write)
             at = 0.0
             continue
-        beside = int64_of(steps[k + 1].lane)
+        beside = steps[k + 1].lane
         end = lane.length - (WAITING_ROOM if town.ways[beside].chooses else 0.0)
         room = max((end - at) / changes - LEAD, 2.0)
         distance = min(max(MIN_SWITCH, SWITCH_TIME * speed), room)
@@ -338,7 +337,7 @@ def lay_head(
         begin: distance along the ego's lane at which the U-turn begins [m].
         write: whether the points are written or only counted.
     """
-    lane, station = int64_of(world.plan[0].lane), world.plan[0].station
+    lane, station = world.plan[0].lane, world.plan[0].station
     if end > first:
         keep(world, first, end, write)
     if oncoming >= 0:

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import int64_of
 from dorothie_gym.maps.lane_neighbours import opposite_gap
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.maps.polyline import HEADING, HEIGHT, WIDTH, X, Y
@@ -155,7 +154,7 @@ def plan_switch(town: TownArrays, world: WorldArrays, left: bool, speed: float) 
     lane = town.lanes[plan.lane]
     if _is_busy(town, world):
         return Refusal.IN_MANOEUVRE, -1
-    target = int64_of(lane.left if left else lane.right)
+    target = lane.left if left else lane.right
     if target < 0:
         return Refusal.NO_LANE_LEFT if left else Refusal.NO_LANE_RIGHT, -1
     if not _has_room_to_switch(lane.length - plan.station):
@@ -177,13 +176,13 @@ def plan_u_turn(town: TownArrays, world: WorldArrays, speed: float) -> tuple[int
     if _is_busy(town, world):
         return Refusal.IN_MANOEUVRE, -1, 0.0, 0.0
     begin = station + LEAD * (speed > EGO_MOVING) + _u_turn_braking(speed, U_TURN_SPEED * U_TURN_SPEED)
-    other, there = find_oncoming(town, int64_of(plan.lane), min(begin, lane.length))
+    other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other >= 0:
         # just behind a junction: begin later, so that the turn ends before the end of the oncoming lane
         short = LANDING - (town.lanes[other].length - there)
         if short > 0.0:
             begin += short
-            other, there = find_oncoming(town, int64_of(plan.lane), min(begin, lane.length))
+            other, there = find_oncoming(town, plan.lane, min(begin, lane.length))
     if other < 0:
         return Refusal.NOT_LEFTMOST if lane.left >= 0 else Refusal.NO_ONCOMING, -1, 0.0, 0.0
     if speed > EGO_MOVING and begin - station + U_TURN_REACH > world.car[0].roadblock:
@@ -206,7 +205,7 @@ def find_oncoming(town: TownArrays, number: int, station: float) -> tuple[int, f
     x, y = value_near(points, lane, here, X, station), value_near(points, lane, here, Y, station)
     heading, height = value_near(points, lane, here, HEADING, station), value_near(points, lane, here, HEIGHT, station)
     for k in range(ways.oncoming, ways.oncoming + ways.oncomings):
-        other = int64_of(town.lane_lists[k])
+        other = town.lane_lists[k]
         beside = town.lanes[other]
         if max(beside.left_edge - x, x - beside.right_edge, beside.low_edge - y, y - beside.high_edge) > WIDEST_GAP:
             continue
@@ -278,8 +277,7 @@ def extend(town: TownArrays, world: WorldArrays, speed: float) -> int:
         return Refusal.NONE
     if not take_course(town, world):
         return Refusal.NO_SPACE
-    action, angle, connector = int64_of(plan.action), int64_of(plan.angle), int64_of(plan.connector)
-    return _lay_from_here(town, world, speed, action, angle, connector, int64_of(plan.exit))
+    return _lay_from_here(town, world, speed, plan.action, plan.angle, plan.connector, plan.exit)
 
 
 @compiled
@@ -330,7 +328,7 @@ def _follow_lane(town: TownArrays, world: WorldArrays, speed: float) -> int:
         return Refusal.FOLLOWING
     if is_committed(world, speed):
         return Refusal.COMMITTED
-    if not begin_steps(world, int64_of(plan.lane)):
+    if not begin_steps(world, plan.lane):
         return Refusal.NO_SPACE
     return _replace(town, world, plan.station, 0.0, 0, 0, -1, 0.0, 0, 0, -1, -1, False, 0.0)
 
@@ -343,7 +341,7 @@ def _switch_lane(town: TownArrays, world: WorldArrays, angle: int, speed: float)
     if answer != Refusal.NONE:
         return answer
     plan = world.plan[0]
-    if not (begin_steps(world, int64_of(plan.lane)) and add_step(world, target, True)):
+    if not (begin_steps(world, plan.lane) and add_step(world, target, True)):
         return Refusal.NO_SPACE
     side = LEFT if angle > 0 else -LEFT
     return _replace(town, world, plan.station, speed, 0, 0, -1, 0.0, LANE_SWITCH, side, -1, -1, False, 0.0)
@@ -364,7 +362,7 @@ def _turn_round(town: TownArrays, world: WorldArrays, speed: float) -> int:
 def _turn(town: TownArrays, world: WorldArrays, angle: int, speed: float) -> int:
     plan = world.plan[0]
     _, _, free = _under_way(world)  # after the end of a manoeuvre under way, lanes may be changed again
-    if not cross_junction(town, world, int64_of(plan.lane)):
+    if not cross_junction(town, world, plan.lane):
         return Refusal.NO_SPACE
     number = find_turn(town, world, free, angle)
     if number < 0:
@@ -374,7 +372,7 @@ def _turn(town: TownArrays, world: WorldArrays, angle: int, speed: float) -> int
         return Refusal.SAME_TURN
     if is_committed(world, speed):
         return Refusal.TURN_TOO_CLOSE
-    return _lay_from_here(town, world, speed, J_TURN, int64_of(way.angle), int64_of(way.connector), int64_of(way.lane))
+    return _lay_from_here(town, world, speed, J_TURN, way.angle, way.connector, way.lane)
 
 
 # --- Laying the path --------------------------------------------------------------------------------------------------
@@ -479,7 +477,7 @@ def _lay(
     whole = 1
     if plan.points < 2:
         whole, plan.points, length = 0, 0, town.lanes[plan.lane].length
-        follow(town, world, int64_of(plan.lane), length - LAST_PIECE, length, True)
+        follow(town, world, plan.lane, length - LAST_PIECE, length, True)
     plan.open_end = open_end
     finish(world)
     return whole

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.course import SEARCH_RANGE
-from dorothie_gym.sim.state.records import CoursePointRecord, PathPointRecord, RecordArray, VehicleRecord, plain
+from dorothie_gym.sim.state.records import PathPointRecord, RecordArray, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.route import locate
 
@@ -23,29 +25,63 @@ if TYPE_CHECKING:
 
 @shared
 class Path:
-    """A path of the ego as it was laid: a copy of `WorldArrays.course`.
+    """A path of the ego as it was laid: a copy of `WorldArrays.course`; n points."""
 
-    Attributes:
-        s: distance along the path of each point (n,) [m].
-        points: (n, 2) [m].
-        headings: direction at each point (n,) [rad], unwrapped.
-        heading: at the first point [rad].
-        heights: (n,) [m].
-        lanes: lane of each point (n,).
-        stations: distance along that lane (n,) [m].
-        limits: speed limit (n,) [m/s].
-        speeds: speed that curves, limits and the end of the path allow (n,) [m/s].
-        manoeuvre: whether each point is off the lanes' centre lines (n,).
-    """
+    def __init__(self, course: NDArray[np.void]) -> None:
+        self._rows = np.frombuffer(course.tobytes(), dtype=course.dtype)
 
-    def __init__(self, course: RecordArray[CoursePointRecord]) -> None:
-        rows = plain(course).copy()
-        self.s, self.headings, self.heights, self.stations, self.limits, self.speeds = (
-            np.ascontiguousarray(rows[name]) for name in ("s", "heading", "height", "station", "limit", "speed")
-        )
-        self.points = np.column_stack((rows["x"], rows["y"]))
-        self.lanes, self.manoeuvre = rows["lane"].astype(np.int64), rows["manoeuvre"].copy()
-        self.heading = float(self.headings[0])
+    def _column(self, name: str) -> Array:
+        return np.ascontiguousarray(self._rows[name])
+
+    @cached_property
+    def s(self) -> Array:
+        """Distance along the path of each point (n,) [m]."""
+        return self._column("s")
+
+    @cached_property
+    def points(self) -> Array:
+        """Places of the points (n, 2) [m]."""
+        return np.column_stack((self._rows["x"], self._rows["y"]))
+
+    @cached_property
+    def headings(self) -> Array:
+        """Direction at each point (n,) [rad], unwrapped."""
+        return self._column("heading")
+
+    @cached_property
+    def heading(self) -> float:
+        """Direction at the first point [rad]."""
+        return float(self.headings[0])
+
+    @cached_property
+    def heights(self) -> Array:
+        """Heights of the points (n,) [m]."""
+        return self._column("height")
+
+    @cached_property
+    def stations(self) -> Array:
+        """Distance of each point along its lane (n,) [m]."""
+        return self._column("station")
+
+    @cached_property
+    def limits(self) -> Array:
+        """Speed limit at each point (n,) [m/s]."""
+        return self._column("limit")
+
+    @cached_property
+    def speeds(self) -> Array:
+        """Speed that curves, limits and the end of the path allow at each point (n,) [m/s]."""
+        return self._column("speed")
+
+    @cached_property
+    def lanes(self) -> NDArray[np.int64]:
+        """Lane of each point (n,)."""
+        return self._rows["lane"].astype(np.int64)
+
+    @cached_property
+    def manoeuvre(self) -> NDArray[np.bool_]:
+        """Whether each point is off the lanes' centre lines (n,)."""
+        return np.ascontiguousarray(self._rows["manoeuvre"])
 
     @property
     def length(self) -> float:

@@ -12,6 +12,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from dorothie_gym.compilation import direct
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
@@ -53,11 +54,13 @@ REASONS: Final[Mapping[int, str]] = MappingProxyType(
 
 _FLAGS: Final = tuple(int(flag) for flag in Feasible)
 
+_find_feasible, _request = direct(find_feasible), direct(request)
+
 
 class LocalPlanner(Lookups):
     """Path of the ego, changed by navigation actions: a view on the plan in the arrays of its world."""
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_shown", "_row", "_car", "_laid", "_path")
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_shown", "_row", "_car", "_course", "_laid", "_path")
 
     _shown: WorldArrays | None = None
     _laid = 0
@@ -81,7 +84,7 @@ class LocalPlanner(Lookups):
     ) -> int:  # fmt: skip
         """Calls `request`, again with longer arrays where they have no room for the path."""
         while True:
-            answer = request(self._arrays, self._holder.arrays, action, angle, speed, lane, station, offset)
+            answer = _request(self._arrays, self._holder.arrays, action, angle, speed, lane, station, offset)
             if answer != NO_SPACE:
                 return answer
             self._holder.arrays = lengthened(self._holder.arrays)
@@ -91,6 +94,7 @@ class LocalPlanner(Lookups):
         arrays = self._holder.arrays
         if arrays is not self._shown:
             self._shown, self._row, self._car = arrays, plain(arrays.plan)[0], plain(arrays.car)[0]
+            self._course = plain(arrays.course)
         row: np.void = self._row
         return row
 
@@ -116,7 +120,7 @@ class LocalPlanner(Lookups):
         plan = self._look_up()
         if plan["version"] != self._laid:
             self._laid = int(plan["version"])
-            self._path = Path(self._holder.arrays.course[: int(plan["points"])])
+            self._path = Path(self._course[: plan["points"]])
         return self._path
 
     @property
@@ -243,7 +247,7 @@ class LocalPlanner(Lookups):
 
     def feasible(self, speed: float) -> FeasibleManoeuvres:
         """Returns the navigation actions that would be carried out at a speed [m/s]."""
-        found = find_feasible(self._arrays, self._holder.arrays, float(speed))
+        found = _find_feasible(self._arrays, self._holder.arrays, float(speed))
         return FeasibleManoeuvres(*[bool(found & flag) for flag in _FLAGS])
 
     def may_switch(self, side: LinkType, speed: float = 0.0) -> bool:
