@@ -87,7 +87,7 @@ def _add_manoeuvres(
     if station <= nearest:
         number = add_u_turn(graph, lane, station, station, extra, number)
     # also from the middle of the cell: just behind a junction there may be no oncoming lane
-    middle = (cell_at(graph, lane, station) - row.first + 0.5) * row.size
+    middle = (cell_at(graph, lane, station) - row.first + 0.5) * row.cell_size
     if station < middle <= nearest:
         number = add_u_turn(graph, lane, station, middle, extra, number)
     return number
@@ -127,7 +127,7 @@ def _set_along(extra: RecordArray[RoutingEdge], number: int, goal: int, cost: fl
 def _follow(graph: RoutingGraph, extra: RecordArray[RoutingEdge], number: int, lane: int, station: float) -> int:
     """Adds the edges from a place along its lane; returns the new number."""
     row, cell = graph.lanes[lane], cell_at(graph, lane, station)
-    gone = station - (cell - row.first) * row.size
+    gone = station - (cell - row.first) * row.cell_size
     for k in range(graph.rows[cell], graph.rows[cell + 1]):
         if graph.edges[k].entry == FOLLOW:
             extra[number] = graph.edges[k]
@@ -153,7 +153,7 @@ def _add_arrivals(graph: RoutingGraph, search: RouteSearch, number: int, lane: i
             if node.arrival < 0 or edge.cost < extra[node.arrival].cost:
                 node.arrival = number
             number += 1
-    cost = max((station - (cell - row.first) * row.size) * row.weight, LEAST_COST)
+    cost = max((station - (cell - row.first) * row.cell_size) * row.weight, LEAST_COST)
     _set_along(extra, number, goal, cost, lane, station)
     extra[number].source = cell
     if nodes[cell].arrival < 0 or cost < extra[nodes[cell].arrival].cost:

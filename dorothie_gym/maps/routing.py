@@ -194,7 +194,9 @@ class Router:
     def __init__(self, town: Town) -> None:
         self._graph = routing_graph(town)
         self._searches = _Searches(self._graph)
-        self.lane_cells: list[tuple[int, int, float]] = plain(self._graph.lanes)[["first", "cells", "size"]].tolist()
+        self.lane_cells: list[tuple[int, int, float]] = plain(self._graph.lanes)[
+            ["first", "cells", "cell_size"]
+        ].tolist()
 
     @property
     def search(self) -> RouteSearch:
@@ -218,7 +220,11 @@ class Router:
             goal: goal; one slightly behind the start on the same lane needs a detour.
             blocked: impassable places (roadblocks). The route does not enter their cells, nor by lane changes; in
                 the cell of the start only those ahead count.
+
+        Raises:
+            IndexError: the town has no such lane.
         """
+        self._check(start, goal, *blocked)
         search = self.search
         if not find_route(self._graph, search, *start, *goal, place_records(blocked), len(blocked)):
             return None
@@ -234,9 +240,17 @@ class Router:
 
     def costs_to(self, goal: Place, blocked: Sequence[Place] = ()) -> NDArray[np.float64]:
         """Returns `distances_to`, and the costs from the ends of the lanes without the turn there (cells + lanes,)."""
+        self._check(goal, *blocked)
         costs = np.empty(self._graph.cells + len(self._graph.lanes))
         find_costs(self._graph, self.search, *goal, place_records(blocked), len(blocked), costs)
         return costs
+
+    def _check(self, *places: Place) -> None:
+        """Raises an `IndexError` for a lane that the town does not have; compiled code would read other memory."""
+        count = len(self.lane_cells)
+        for lane, _ in places:
+            if not 0 <= lane < count:
+                raise IndexError(f"the town has no lane {lane}; its lanes are 0 to {count - 1}")
 
     # --- What can be reached ----------------------------------------------------------------------------------------
 
@@ -286,6 +300,7 @@ class Router:
 
     def _departures(self, start: Place, blocked: Sequence[Place]) -> RecordArray[RoutingEdge]:
         """Returns the edges from a start, see `find_departures`."""
+        self._check(start, *blocked)
         search = self.search
         count = find_departures(self._graph, search, *start, NONE, 0.0, place_records(blocked), len(blocked))
         return joined(search.extra[:count])

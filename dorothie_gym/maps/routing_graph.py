@@ -95,7 +95,7 @@ class RoutingLane:
     """A lane of a town, divided into cells; indices are -1 where there is none."""
 
     length: Float  # [m]
-    size: Float  # length of its cells [m]
+    cell_size: Float  # length of its cells [m]
     weight: Float  # cost of a metre
     offset: Float  # beginning of the lane where all lanes lie in one row with gaps of one metre [m]
     first: Int32  # first cell, and number of cells
@@ -185,7 +185,7 @@ def routing_graph(town: Town) -> RoutingGraph:
     lengths = np.array([lane.length for lane in town.lanes])
     counts = np.maximum(1, np.round(lengths / CELL)).astype(np.int64)
     first = np.concatenate(([0], np.cumsum(counts)))
-    lanes["length"], lanes["cells"], lanes["first"], lanes["size"] = lengths, counts, first[:-1], lengths / counts
+    lanes["length"], lanes["cells"], lanes["first"], lanes["cell_size"] = lengths, counts, first[:-1], lengths / counts
     lanes["weight"] = USUAL_SPEED / np.clip([lane.speed_limit for lane in town.lanes], *SPEEDS)
     lanes["offset"] = np.concatenate(([0.0], np.cumsum(lengths + 1.0)))[:-1]
     lanes["junction"] = [lane.in_junction for lane in town.lanes]
@@ -241,10 +241,10 @@ def _following(town: Town, graph: RoutingGraph, cells: int) -> RecordArray[Routi
     ends, tails = across_ends[: len(links)], across_ends[len(links) :]
     lane = owner[within]
     along["source"], along["target"], along["lane"] = within, within + 1, lane
-    along["leave"] = along["land"] = (within + 1 - lanes["first"][lane]) * lanes["size"][lane]
-    along["cost"] = lanes["size"][lane] * lanes["weight"][lane]
+    along["leave"] = along["land"] = (within + 1 - lanes["first"][lane]) * lanes["cell_size"][lane]
+    along["cost"] = lanes["cell_size"][lane] * lanes["weight"][lane]
     ends["source"] = lanes["first"][source] + lanes["cells"][source] - 1
-    ends["cost"] = lanes["size"][source] * lanes["weight"][source] + turn
+    ends["cost"] = lanes["cell_size"][source] * lanes["weight"][source] + turn
     tails["source"], tails["cost"] = cells + source, np.maximum(turn, LEAST_COST)
     for crossing in (ends, tails):
         crossing["target"], crossing["lane"] = lanes["first"][target], target
@@ -279,7 +279,7 @@ def _rows(keys: NDArray[np.int32], nodes: int) -> IntArray:
 def cell_at(graph: RoutingGraph, lane: int, station: float) -> int:
     """Returns the cell that contains a place."""
     row = graph.lanes[lane]
-    return int(row.first) + min(max(int(station / row.size), 0), int(row.cells) - 1)
+    return int(row.first) + min(max(int(station / row.cell_size), 0), int(row.cells) - 1)
 
 
 @compiled
@@ -343,12 +343,12 @@ def find_manoeuvres(graph: RoutingGraph, edges: RecordArray[RoutingEdge]) -> int
         row = graph.lanes[lane]
         for entry in (CHANGE_LEFT, CHANGE_RIGHT):
             for k in range(0 if row.junction else row.cells):
-                count = add_changes(graph, lane, entry, k * row.size, edges, count)
+                count = add_changes(graph, lane, entry, k * row.cell_size, edges, count)
     for lane in range(len(graph.lanes)):
         row = graph.lanes[lane]
         for k in range(0 if row.junction else row.cells):
-            begin = k * row.size
-            count = add_u_turn(graph, lane, begin, begin + 0.5 * row.size, edges, count)
+            begin = k * row.cell_size
+            count = add_u_turn(graph, lane, begin, begin + 0.5 * row.cell_size, edges, count)
     return count
 
 
@@ -434,5 +434,5 @@ def drive_on(graph: RoutingGraph, edges: RecordArray[RoutingEdge], first: int, l
         if beyond == lane.cells:
             edge.target, ahead = cells + edge.lane, lane.length
         else:
-            edge.target, ahead = edge.target + 1, beyond * lane.size
+            edge.target, ahead = edge.target + 1, beyond * lane.cell_size
         edge.cost += (ahead - edge.land) * lane.weight

@@ -216,6 +216,20 @@ def test_place_ahead_in_the_same_cell_is_driven_to_straight() -> None:
     assert (route.lanes, route.length) == ((0,), pytest.approx(3.0))
 
 
+@pytest.mark.parametrize("lane", [-1, 2, 10**6])
+def test_lane_that_the_town_does_not_have_is_refused(lane: int) -> None:
+    search = Router(two_lanes(80.0))
+    for call in (
+        lambda: search.route((lane, 5.0), (0, 70.0)),
+        lambda: search.route((0, 5.0), (lane, 70.0)),
+        lambda: search.route((0, 5.0), (1, 70.0), [(lane, 40.0)]),
+        lambda: search.distances_to((lane, 5.0)),
+        lambda: search.reachable((lane, 5.0)),
+    ):
+        with pytest.raises(IndexError, match=f"the town has no lane {lane}; its lanes are 0 to 1"):
+            call()
+
+
 def test_crossed_junctions_are_listed_in_order() -> None:
     town = network("brookside").town
     start, goal = pairs(town, 9)[8]

@@ -40,7 +40,7 @@ def cost_from(
         station: station of the place [m].
     """
     row = lanes[lane]
-    size, passed = row.size, False
+    size, passed = row.cell_size, False
     if lane == goal_lane:
         ahead = goal_station - station
         if -REACHED_BEHIND <= ahead <= size:
