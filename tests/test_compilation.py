@@ -12,6 +12,7 @@ from numba.core import event
 from dorothie_gym.compilation import allocating, cache, compiled, direct, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.cache import compiled_folder
+from dorothie_gym.compilation.records import Float, empty_records
 
 
 @pytest.mark.parametrize("kind", [allocating, compiled, inlined])
@@ -197,3 +198,11 @@ def test_function_is_compiled_once_for_all_sizes_of_integers(monkeypatch, tmp_pa
     assert total == 2**31 + 2 + 510 + 2 + 14
     names = [found.data["dispatcher"].py_func.__name__ for _, found in recorder.buffer if found.is_start]
     assert sorted(names) == ["doubled", "sum_of_doubled"]
+
+
+def test_field_with_the_name_of_an_attribute_of_numpy_is_refused():
+    class Cell:
+        size: Float
+
+    with pytest.raises(TypeError, match=r"Cell\.size has the name of an attribute"):
+        empty_records(Cell, 1)

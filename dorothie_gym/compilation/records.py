@@ -65,13 +65,20 @@ class RecordArray(Protocol[Record]):
 
 
 def record_dtype(kind: type) -> np.dtype[np.void]:
-    """Returns the dtype of a record class, aligned as in C."""
+    """Returns the dtype of a record class, aligned as in C.
+
+    Raises:
+        TypeError: a field has the name of an attribute of NumPy's records, which would hide it in plain Python.
+    """
     return _dtype_of(kind)
 
 
 @cache
 def _dtype_of(kind: type) -> np.dtype[np.void]:
     hints = get_type_hints(kind, include_extras=True)
+    for name in hints:
+        if hasattr(np.record, name):
+            raise TypeError(f"{kind.__name__}.{name} has the name of an attribute of NumPy's records")
     return np.dtype([(name, *hint.__metadata__) for name, hint in hints.items()], align=True)
 
 

@@ -2,6 +2,9 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -64,6 +67,26 @@ def test_routes_and_distances_are_those_of_scipy(name: str) -> None:
         if k % 5 == 0:
             distances = search.distances_to(goal, blocked)
             np.testing.assert_allclose(distances, reference.distances_to(goal, blocked), rtol=0, atol=1e-9)
+
+
+def test_routes_are_the_same_without_compilation() -> None:
+    program = """
+from dorothie_gym.maps import load_town
+from dorothie_gym.maps.routing import router
+town = load_town("brookside")
+search, places = router(town), [(site.lane, site.station) for site in town.sites[::5]]
+for start in places:
+    for goal in places:
+        print(search.route(start, goal), search.route(start, goal, [(goal[0], 20.0), (start[0], start[1] + 12.0)]))
+    print(search.distances_to(start, places[:2]).tolist())
+"""
+    outputs = []
+    for disabled in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
+        run = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+        assert run.returncode == 0, run.stderr
+        outputs.append(run.stdout)
+    assert outputs[0] == outputs[1]
 
 
 @pytest.mark.parametrize("name", ["brookside", "Town05"])
