@@ -105,20 +105,17 @@ class LiveSession:
 
     def step(self, actions: Mapping[Role, RoleAction]) -> dict[Role, RewardTerms]:
         """Carries out one action of each role, runs the physics until the next decision, returns the reward terms."""
-        self.decisions += 1
-        self._log.clear()
+        self.begin_decision()
         collisions, reached = self.world.collisions, self._subgoals.reached
-        message = self._play_ad_wizard(actions[Role.AD_WIZARD])
+        message = self.play_ad_wizard(actions[Role.AD_WIZARD])
         spoken = {role: self._speak(role, actions[role]) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
         self._play_co_wizard(actions[Role.CO_WIZARD])
         for event in self.world.step(self.config.frames):
             self._log.add_world_event(event)
         self._infractions = None
-        position = self._ego_position()
-        if self.world.car.speed <= EGO_STANDING:
-            self._subgoals.note_arrivals(*position)
+        self.note_arrivals()
         self._delivered = self._deliver(message)
-        self.trail.append(position)
+        self.note_place()
         return self.config.rewards.terms(
             reached=self._subgoals.reached - reached,
             success=self.success,
@@ -167,7 +164,13 @@ class LiveSession:
 
     # --- actions of the roles ---------------------------------------------------------------------------------------
 
-    def _play_ad_wizard(self, action: RoleAction) -> str:
+    def begin_decision(self) -> None:
+        """Counts a decision and forgets the events of the last one."""
+        self.decisions += 1
+        self._log.clear()
+
+    def play_ad_wizard(self, action: RoleAction) -> str:
+        """Carries out an action of the Ad-Wizard; returns its message to the participant."""
         assert isinstance(action, AdWizardAction)
         if action.exception is ExceptionKind.NONE:
             return ""
@@ -200,7 +203,7 @@ class LiveSession:
     def _play_co_wizard(self, action: RoleAction) -> None:
         assert isinstance(action, CoWizardAction)
         if action.mental is not None:
-            self._update_beliefs(action.mental)
+            self.update_beliefs(action.mental)
         if action.physical is not None:
             self._drive(action.physical)
 
@@ -216,15 +219,26 @@ class LiveSession:
         data = {"action": action.label, "angle": angle, "up": up}
         self._log.add(EventType.PHYSICAL_ACTION, Role.CO_WIZARD, data, flagged=action in NAVIGATION_ACTIONS)
 
-    def _update_beliefs(self, mental: Mental) -> None:
+    def update_beliefs(self, mental: Mental) -> str | None:
+        """Carries out a belief update of the Co-Wizard; returns the reason of a refusal."""
         outcome = self.beliefs.update(mental, self.world.localizer, self.world.sight)
         if isinstance(outcome, str):
             self._log.refuse(Role.CO_WIZARD, mental.action.label, outcome)
-            return
+            return self._log.refused[Role.CO_WIZARD][-1]
         self.world.ego.set_goals(self.beliefs.goal_places())
         self._log.add(EventType.BELIEF_UPDATE, Role.CO_WIZARD, {"action": mental.action.label, **outcome})
+        return None
 
     # --- consequences -----------------------------------------------------------------------------------------------
+
+    def note_place(self) -> None:
+        """Notes the place of the ego at a decision."""
+        self.trail.append(self._ego_position())
+
+    def note_arrivals(self) -> None:
+        """Completes the subgoals whose waypoint the ego has reached, if it stands."""
+        if self.world.car.speed <= EGO_STANDING:
+            self._subgoals.note_arrivals(*self._ego_position())
 
     def _deliver(self, message: str) -> DeliveredMessages:
         """Delivers the utterances that are over and logs their acts; `message` is that of the Ad-Wizard."""

@@ -26,12 +26,12 @@ from dorothie_gym.engine.scenario import (
 )
 from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.envs.episode import TERMS, Ending, episode_arrays, judge
+from dorothie_gym.envs.interference import Interference
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role, StreetName
-from dorothie_gym.policies.ad_wizard import ScriptedAdWizard, idle_until
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.driver_view import driver_arrays
@@ -39,11 +39,9 @@ from dorothie_gym.policies.navigation.instructor import Guidance, Instructor, Na
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, exit_arrays
 from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, Vector, observe
 from dorothie_gym.policies.observation_parser import SeenLandmark
-from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.network.network import TownNetwork, network_of
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.spaces import (
-    ActionDecoder,
     AdWizardAction,
     CoWizardAction,
     LanePosition,
@@ -53,9 +51,7 @@ from dorothie_gym.spaces import (
     RoleAction,
     SpaceLimits,
     StepInfo,
-    plain_text,
 )
-from dorothie_gym.spaces.limits import STORY_LENGTH
 from dorothie_gym.tasks import Landmark, StoryboardTemplate
 from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
@@ -90,11 +86,7 @@ class DrivingSession(Lookups):
         self.driver = driver_arrays(sum(FIELDS.values()), len(ACTIONS), streets)
         self._town_arrays, self._exit_arrays = town_arrays(session.world.network), exit_arrays(town)
         self._cost_to_named = CostToGo(town)
-        self._decoder = ActionDecoder(Role.AD_WIZARD, limits)
-        self._adversary = ScriptedAdWizard(limits, rate=config.exceptions) if config.exceptions > 0.0 else None
-        seed = policy_seed(scenario.seed, Role.AD_WIZARD)
-        self._plans = self._adversary.initial_state(seed, town) if self._adversary is not None else None
-        self._story = plain_text(scenario.storyboard.story, STORY_LENGTH)
+        self._interference = Interference(session, config.exceptions) if config.exceptions > 0.0 else None
         self._driven, self._named, self._notes = 0.0, cast("Place | None", None), list[Mental]()
         self._aim: tuple[Place | None, tuple[Place, ...]] = (None, ())  # goal and roadblocks of the last decision
         self._weather: tuple[float, ...] = ()
@@ -188,20 +180,18 @@ class DrivingSession(Lookups):
 
     def interfere(self) -> RoleAction:
         """Returns the present action of the Ad-Wizard."""
-        if self._adversary is None or self._plans is None:
+        interference = self._interference
+        if interference is None:
             return _INTACT
         if self._is_idle:
-            self._plans = self._plans.advanced()
+            interference.wait()
             return _INTACT
-        action, self._plans = self._adversary.step(self.seen[Role.AD_WIZARD], self._plans)
-        return self._decoder(action)
+        return interference.act(self.seen)
 
     @property
     def _is_idle(self) -> bool:
         """Whether the Ad-Wizard does nothing at this decision."""
-        if self._adversary is None or self._plans is None:
-            return True
-        return self.session.world.time < idle_until(self._adversary, self._plans, self._story)
+        return self._interference is None or self.session.world.time < self._interference.due
 
     def _listen(self) -> None:
         """Lets the instructor speak, and updates the goal."""

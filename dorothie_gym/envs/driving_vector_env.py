@@ -1,28 +1,28 @@
-"""Vectorised navigation environments, the results of `gymnasium.make_vec`."""
+"""Vectorised navigation environments, the results of `gymnasium.make_vec`: what both have in common."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
+from typing import ClassVar, Final, TypeAlias
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from dorothie_gym.copying import Restorable
-from dorothie_gym.envs.driving_session import DrivingEnv
+from dorothie_gym.engine.scenario import Scenario, check_options, scenario_option
 from dorothie_gym.envs.episode import TERMS
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps import Town
+from dorothie_gym.maps import Town, load_town
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.vector_infos import Infos, mask_of, masked_infos, seeds_of
-
-Env = TypeVar("Env", bound=DrivingEnv[Any])
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
 """A town, or several that the environments of a batch play in turn."""
@@ -30,45 +30,48 @@ Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
 INFRACTIONS: Final = tuple(kind.value for kind in INFRACTION_KINDS)
 """Names of the infractions that infos count."""
 
+LARGEST_SEED: Final = 2**31
+"""Seeds of sessions that follow without a seed of their own are below."""
 
-class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArray[np.generic]], Generic[Env]):
+
+class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArray[np.generic]]):
     """Base class of the vectorised navigation environments.
 
     Each environment has episodes of its own: they depend on its seed and actions, and neither on the other
-    environments, nor on its place among them.
+    environments, nor on its place among them, nor on the number of threads.
 
     Attributes:
         autoreset_mode: when environments that are over begin anew, as `SyncVectorEnv` has it.
+        towns: town of each environment.
     """
 
     metadata: dict[str, object] = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     CHANGES: ClassVar[Sequence[str]] = (
         "_observations", "_rewards", "_terminations", "_truncations", "_terms", "_infractions", "_refused", "_subgoals",
-        "_success", "_reasons", "_begun"
+        "_success", "_reasons", "_begun", "_generators", "_seeds",
     )  # fmt: skip
 
     def __init__(
-        self, make: Callable[[str | Path | Town], Env], num_envs: int, town: Towns,
-        render_mode: str | None, autoreset_mode: str | AutoresetMode,
+        self, num_envs: int, town: Towns, observation_space: spaces.Space[Vector], action_space: spaces.Space[np.int64]
+        | spaces.Space[NDArray[np.float32]], frequency: float, render_mode: str | None,
+        autoreset_mode: str | AutoresetMode,
     ) -> None:  # fmt: skip
         if num_envs < 1:
             raise ValueError(f"num_envs is {num_envs}; it must be at least 1")
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or 'rgb_array' for several environments")
-        towns = [town] if isinstance(town, str | Path | Town) else list(town)
-        if not towns:
+        names = [town] if isinstance(town, str | Path | Town) else list(town)
+        if not names:
             raise ValueError("town is an empty sequence; it must name at least one town")
-        self.num_envs = num_envs
+        towns = [each if isinstance(each, Town) else load_town(each) for each in names]
+        self.towns = [towns[i % len(towns)] for i in range(num_envs)]
+        self.num_envs, self.render_mode = num_envs, render_mode
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.render_mode = render_mode
-        self._envs = [make(towns[i % len(towns)]) for i in range(num_envs)]
-        self.single_observation_space = self._envs[0].observation_space
-        self.single_action_space = self._envs[0].action_space
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.metadata["render_fps"] = self._envs[0].metadata["render_fps"]
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": frequency}
+        self.single_observation_space, self.single_action_space = observation_space, action_space
+        self.observation_space = batch_space(observation_space, num_envs)
+        self.action_space = batch_space(action_space, num_envs)
         assert self.observation_space.shape is not None
         self._observations: Vector = np.zeros(self.observation_space.shape, dtype=np.float32)
         self._rewards = np.zeros(num_envs)
@@ -79,6 +82,8 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         self._success = np.zeros(num_envs, dtype=np.bool_)
         self._refused, self._reasons = np.full(num_envs, None), np.full(num_envs, None)
         self._begun = np.zeros(num_envs, dtype=np.bool_)
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._seeds: list[int] = [-1] * num_envs
 
     # --- Gymnasium's interface ----------------------------------------------------------------------------------------
 
@@ -89,8 +94,8 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
 
         Args:
             seed: of the first environment; the others have the numbers that follow. Or one for each.
-            options: `reset_mask`, a bool array (num_envs,): which environments, by default all; the others as in the
-                single environment.
+            options: `reset_mask`, a bool array (num_envs,): which environments, by default all; `scenario` as in the
+                single environment, for all of them.
 
         Returns:
             Observations (num_envs, n) of all environments, and infos of those that begin.
@@ -100,9 +105,9 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         """
         options = dict(options or {})
         mask = mask_of(options.pop("reset_mask", None), self.num_envs)
-        for i, each in enumerate(seeds_of(seed, self.num_envs)):
-            if mask[i]:
-                self._begin(i, each, options)
+        check_options(options, "scenario")
+        seeds = seeds_of(seed, self.num_envs)
+        self._begin({i: seeds[i] for i in np.flatnonzero(mask).tolist()}, scenario_option(options))
         return self._observations.copy(), self._infos(mask)
 
     def step(
@@ -126,18 +131,15 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         if not self._begun.all() or (mode is AutoresetMode.DISABLED and over.any()):
             waiting = np.flatnonzero(~self._begun | over)
             raise gym.error.ResetNeeded(f"environments {short_repr(waiting.tolist())} wait for a reset: call reset()")
-        for i in range(self.num_envs):
-            if over[i]:
-                self._begin(i, None, {})
-            else:
-                self._play(i, actions[i])
+        self._play(actions, ~over)
+        if over.any():
+            self._begin(dict.fromkeys(np.flatnonzero(over).tolist()), None)
         rewards, terminations, truncations = self._rewards.copy(), self._terminations.copy(), self._truncations.copy()
-        everywhere = np.ones(self.num_envs, dtype=np.bool_)
         over = terminations | truncations
         if mode is AutoresetMode.SAME_STEP and over.any():
             infos = self._begin_at_once(over)
         else:
-            infos = self._infos(everywhere)
+            infos = self._infos(np.ones(self.num_envs, dtype=np.bool_))
         return self._observations.copy(), rewards, terminations, truncations, infos
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
@@ -145,77 +147,69 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         frame = self.render_one(0)
         return None if frame is None else (frame,)
 
+    @abstractmethod
     def render_one(self, number: int) -> NDArray[np.uint8] | None:
         """Draws one of the environments (800, 1280, 3), as the single environment does."""
-        return self._envs[range(self.num_envs)[number]].render()
-
-    def close_extras(self, **_kwargs: object) -> None:
-        """Closes the environments."""
-        for env in self._envs:
-            env.close()
 
     # of many environments instead of one, and read-only
     @property  # type: ignore[misc]  # gymnasium's is writable
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]  # see above
         """The environments' generators."""
-        return tuple(env.np_random for env in self._envs)
+        return tuple(self._generator(number) for number in range(self.num_envs))
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]  # see `np_random`
         """The environments' seeds."""
-        return tuple(env.np_random_seed for env in self._envs)
-
-    # --- states -------------------------------------------------------------------------------------------------------
-
-    def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the environments."""
-        return {**super().mutable_values(), "envs": [env.mutable_values() for env in self._envs]}
-
-    def apply_values(self, values: dict[str, object]) -> None:
-        """Applies the values of the environments."""
-        parts = values.pop("envs")
-        assert isinstance(parts, list)  # of `mutable_values`
-        for env, part in zip(self._envs, parts, strict=True):
-            env.apply_values(part)
-        super().apply_values(values)
+        return tuple(self._seeds[number] for number, _ in enumerate(self.np_random))
 
     def compatibility(self) -> dict[str, object]:
-        """Returns the kind of environment, their towns and their settings."""
-        towns, configs = [env.town for env in self._envs], self._envs[0].config
-        return {**super().compatibility(), "the towns": towns, "the settings": configs}
+        """Returns the kind of environment and the towns."""
+        return {**super().compatibility(), "the towns": self.towns}
 
-    # --- episodes -----------------------------------------------------------------------------------------------------
+    # --- Episodes -----------------------------------------------------------------------------------------------------
 
     @abstractmethod
     def _checked(self, actions: object) -> NDArray[np.generic]:
         """Returns actions as an array; raises `ValueError` if they are none of the action space."""
 
-    def _begin(self, i: int, seed: int | None, options: dict[str, object]) -> None:
-        self._observations[i], _ = self._envs[i].reset(seed=seed, options=options)
-        self._rewards[i], self._terminations[i], self._truncations[i], self._begun[i] = 0.0, False, False, True
-        self._note(i)
+    @abstractmethod
+    def _play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
+        """Plays a decision in the environments of a mask, and notes its outcome in the arrays of this object."""
 
-    def _play(self, i: int, action: object) -> None:
-        env = self._envs[i]
-        self._observations[i], self._rewards[i], self._terminations[i], self._truncations[i], _ = env.step(action)
-        self._note(i)
+    @abstractmethod
+    def _start(self, seeds: Mapping[int, int], scenario: Scenario | None) -> None:
+        """Begins sessions of environments by their seeds, and notes observations and outcomes."""
 
-    def _note(self, i: int) -> None:
-        info = self._envs[i].drive.info()
-        self._terms[i] = list(info["reward_terms"].values())
-        self._infractions[i] = list(info["infractions"].values())
-        self._refused[i] = info["refused"]
-        if "reason" in info:
-            self._success[i], self._reasons[i] = info["is_success"], info["reason"]
-            self._subgoals[i] = info["subgoals"]["live"], info["subgoals"]["reached"]
+    def _begin(self, seeds: Mapping[int, int | None], scenario: Scenario | None) -> None:
+        """Begins episodes of environments; a seed of None continues the environment's own series."""
+        for number, seed in seeds.items():
+            if seed is not None:
+                self._generators[number], self._seeds[number] = seeding.np_random(seed)
+        self._start(
+            {
+                number: int(self._generator(number).integers(LARGEST_SEED)) if seed is None else seed
+                for number, seed in seeds.items()
+            },
+            scenario,
+        )
+        begun = list(seeds)
+        self._rewards[begun], self._terminations[begun], self._truncations[begun] = 0.0, False, False
+        self._begun[begun] = True
+
+    def _generator(self, number: int) -> np.random.Generator:
+        found = self._generators[number]
+        if found is None:
+            found, self._seeds[number] = seeding.np_random()
+            self._generators[number] = found
+        return found
 
     def _begin_at_once(self, over: NDArray[np.bool_]) -> Infos:
         """Resets environments that are over; returns the infos of the mode `SAME_STEP`."""
         final = np.full(self.num_envs, None, dtype=object)
-        ended = self._infos(over)
-        for i in np.flatnonzero(over).tolist():
-            final[i] = self._observations[i].copy()
-            self._begin(i, None, {})
+        ended, numbers = self._infos(over), np.flatnonzero(over).tolist()
+        for number in numbers:
+            final[number] = self._observations[number].copy()
+        self._begin(dict.fromkeys(numbers), None)
         infos = self._infos(np.ones(self.num_envs, dtype=np.bool_))
         return {**infos, "final_obs": final, "_final_obs": over, "final_info": ended, "_final_info": over.copy()}
 

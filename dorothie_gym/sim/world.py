@@ -176,6 +176,13 @@ class World(Lookups, Restorable):
             self.reports.note(events, breaches)
         return self.actors.arrays.trace[:frames].copy()
 
+    def catch_up(self) -> None:
+        """Reads time and place of the ego after another caller has stepped the arrays of the world."""
+        self.frame = int(plain(self.actors.arrays.clock)["frame"][0])
+        self.car.refresh()
+        if self.faults:
+            self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
+
     @property
     def _record(self) -> CarRecord:
         """Fields of the ego's record."""

@@ -99,6 +99,24 @@ def test_several_towns_are_played_in_turn() -> None:
         np.testing.assert_array_equal(observations[number], alone)
 
 
+def test_number_of_threads_changes_nothing() -> None:
+    one, two = (NavigationVectorEnv(9, max_seconds=30.0, threads=threads) for threads in (1, 2))
+    check_equal(one.reset(seed=2), two.reset(seed=2))
+    rng = np.random.default_rng(5)
+    for _ in range(70):
+        actions = rng.integers(0, 18, 9)
+        check_equal(one.step(actions), two.step(actions))
+
+
+def test_an_environment_takes_at_most_a_hundred_kilobytes() -> None:
+    env = NavigationVectorEnv(4, "midtown", traffic="medium", exceptions=2.0)
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        env.step(rng.integers(0, 18, 4))
+    assert env.nbytes / 4 < 100 * 1024
+
+
 def test_masks_are_those_of_infos() -> None:
     env = NavigationVectorEnv(4)
     _, infos = env.reset(seed=1)
@@ -153,6 +171,8 @@ def test_mistakes_are_explained() -> None:
         NavigationVectorEnv(2, [])
     with pytest.raises(ValueError, match="None or 'rgb_array'"):
         NavigationVectorEnv(2, render_mode="human")
+    with pytest.raises(ValueError, match="threads is 0"):
+        NavigationVectorEnv(2, threads=0)
     env = NavigationVectorEnv(2, max_seconds=10.0, autoreset_mode="Disabled")
     with pytest.raises(gym.error.ResetNeeded, match=r"environments \[0, 1\] wait for a reset"):
         env.step(np.array([0, 0]))

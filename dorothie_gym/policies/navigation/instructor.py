@@ -159,7 +159,7 @@ class Instructor(Lookups):
         self.cost_to_go.aim(self.goal.place if self.goal is not None else None, self.blocked)
         if not given:
             return None
-        self.instruction = _instruction_of(arrays)
+        self.instruction = instruction_of(arrays)
         return self.instruction
 
     @cached_property
@@ -167,7 +167,7 @@ class Instructor(Lookups):
         return fields(self.arrays.route, "landmark", "closed")
 
 
-def _instruction_of(arrays: InstructorArrays) -> NavigationInstruction:
+def instruction_of(arrays: InstructorArrays) -> NavigationInstruction:
     """Returns the last instruction as a value."""
     distance, time, action, street, landmark, sector = fields(
         arrays.said, "distance", "time", "action", "street", "landmark", "sector"

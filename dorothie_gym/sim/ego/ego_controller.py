@@ -16,6 +16,9 @@ from dorothie_gym.sim.ego.vehicle import Car
 from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.records import GoalRecord, filled_records
 
+CRUISE_REFUSAL = f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
+"""Reason of the refusal of a cruise speed."""
+
 
 @shared
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +105,7 @@ class EgoController:
     def change_cruise(self, up: bool) -> str | None:
         """Changes the cruise speed by one step; returns the reason of a refusal."""
         if not may_change_cruise(self.cruise, up):
-            return f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
+            return CRUISE_REFUSAL
         self.cruise += SPEED_STEP if up else -SPEED_STEP
         return None
 

@@ -276,6 +276,21 @@ def grown(town: TownArrays, world: WorldArrays, *, vehicles: int, pedestrians: i
     return bigger
 
 
+def with_room_of(town: TownArrays, world: WorldArrays, other: WorldArrays) -> WorldArrays:
+    """Returns the same world with at least the room that another one has, for bodies, path and goals."""
+    vehicles = max(len(world.vehicles), len(other.vehicles))
+    pedestrians = max(len(world.pedestrians), len(other.pedestrians))
+    props = max(len(world.props), len(other.props))
+    larger = world
+    if (vehicles, pedestrians, props) != (len(world.vehicles), len(world.pedestrians), len(world.props)):
+        larger = grown(town, world, vehicles=vehicles, pedestrians=pedestrians, props=props)
+    return larger._replace(
+        course=_extended(larger.course, max(len(larger.course), len(other.course))),
+        steps=_extended(larger.steps, max(len(larger.steps), len(other.steps))),
+        goals=_extended(larger.goals, max(len(larger.goals), len(other.goals))),
+    )
+
+
 def lengthened(world: WorldArrays) -> WorldArrays:
     """Returns the same world with the room for the path of the ego that was missing last."""
     points = int(world.plan[0].needed)

@@ -1,0 +1,530 @@
+"""Batch of navigation sessions in one town: compiled decisions, with Python for what happens rarely."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar, Final, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.compilation.records import empty_records, plain
+from dorothie_gym.copying import Lookups
+from dorothie_gym.engine.observations import LazyObservations
+from dorothie_gym.engine.scenario import Scenario, draw_scenario
+from dorothie_gym.engine.session_engine import LiveSession
+from dorothie_gym.envs.driving_steps import (
+    BEGINS,
+    CRUISE_LIMIT,
+    PLAYS,
+    DriveArrays,
+    DriveRecord,
+    DrivingTown,
+    Stage,
+    act_share,
+    guide_share,
+    row_of,
+)
+from dorothie_gym.envs.episode import EpisodeArrays, episode_arrays
+from dorothie_gym.envs.interference import Interference
+from dorothie_gym.envs.navigation_config import NavigationConfig
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.route_arrays import empty_search
+from dorothie_gym.maps.routing import Place
+from dorothie_gym.maps.routing_graph import routing_graph
+from dorothie_gym.ontology import LandmarkName, MentalAction, PhysicalAction
+from dorothie_gym.policies.navigation.actions import ACTIONS, PLAIN_ACTIONS
+from dorothie_gym.policies.navigation.cost_to_go import cost_table
+from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_arrays
+from dorothie_gym.policies.navigation.instructor import Guidance, NavigationInstruction, exit_sectors, instruction_of
+from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
+from dorothie_gym.policies.navigation.junction_exits import exit_arrays
+from dorothie_gym.policies.navigation.observation_vector import FIELDS, Vector
+from dorothie_gym.policies.route_tables import route_tables
+from dorothie_gym.sim.batch.threads import ThreadPool, turns_of
+from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL
+from dorothie_gym.sim.ego.planner import REASONS
+from dorothie_gym.sim.network.network import network_of
+from dorothie_gym.sim.state.codes import Refusal
+from dorothie_gym.sim.state.town_arrays import town_arrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_room_of
+from dorothie_gym.spaces import LanePosition, Mental, SpaceLimits
+from dorothie_gym.tasks import StoryboardTemplate
+
+Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
+
+ROOMS: Final = ("vehicles", "pedestrians", "props", "course", "steps", "goals")
+"""Arrays of a world whose lengths differ between worlds of a town."""
+
+
+CHANGES: Final = ("faces", "_stacks", "_due", "_waited", "_live", "_noted", "_faulty", "_common", "_cost_rows")
+"""Attributes of a batch that hold what changes."""
+
+
+@dataclass
+class DrivingFace:
+    """What a session of a batch has besides its row: objects for rare events.
+
+    Attributes:
+        live: the session, whose world shows the row.
+        interference: scripted Ad-Wizard; None without exceptions.
+        notes: belief updates that wait to be sent.
+        version: version of the task that the row knows.
+        refused: reasons for the refusals of belief updates at the last decision.
+    """
+
+    live: LiveSession
+    interference: Interference | None
+    notes: list[Mental] = field(default_factory=list)
+    version: int = -1
+    refused: list[str] = field(default_factory=list)
+
+
+class DrivingBatch(Lookups):
+    """Sessions of one town in which only driving is left to the agents.
+
+    The state of each session lies in a row of arrays, which compiled code plays. Python handles what happens rarely:
+    belief updates, exceptions of the Ad-Wizard, arrivals, new sessions.
+
+    Attributes:
+        town: the map.
+        faces: present session of each environment; None before its first.
+        threads: number of threads, the caller's included.
+    """
+
+    LOOKED_UP: ClassVar[tuple[str, ...]] = ("_pool", "_rows")
+
+    def __init__(
+        self, town: Town, template: StoryboardTemplate | None, config: NavigationConfig, count: int, threads: int
+    ) -> None:  # fmt: skip
+        """Prepares for sessions.
+
+        Args:
+            town: the map.
+            template: template of the storyboards; None draws one for each session.
+            config: settings.
+            count: number of environments.
+            threads: number of threads at most.
+        """
+        self.town, self._template, self._config, self._count = town, template, config, count
+        self.threads = max(1, min(threads, count))
+        self._limits, self._network = SpaceLimits.for_town(town), network_of(town)
+        self._arrays, self._exits = town_arrays(self._network), exit_arrays(town)
+        self._tables, self._graph = route_tables(town), routing_graph(town)
+        self._searches = _stacked(empty_search(self._graph), self.threads)
+        self._cost_rows: dict[tuple[Place, tuple[Place, ...]], int] = {}
+        first = town.sites[0]
+        self._common = DrivingTown(
+            exit_sectors(town), np.zeros((1, len(cost_table(town, (first.lane, first.station)).costs))),
+            config.session_config.frames, float(config.max_seconds),
+        )  # fmt: skip
+        self.faces: list[DrivingFace | None] = [None] * count
+        self._stacks: list[Any] = []
+        self._due, self._waited = np.full(count, math.inf), np.zeros(count, dtype=np.int64)
+        self._live = np.zeros(count, dtype=np.int64)
+        self._noted, self._faulty = set[int](), set[int]()
+
+    @cached_property
+    def _pool(self) -> ThreadPool:
+        return ThreadPool(self.threads - 1)
+
+    @cached_property
+    def _rows(self) -> list[WorldArrays]:
+        """Rows of the worlds, each the same object as long as the arrays are."""
+        return [row_of(self._worlds, number) for number in range(self._count)]
+
+    def __setstate__(self, values: dict[str, object]) -> None:
+        self.__dict__.update(values)
+        self.bind()
+
+    def mutable_values(self) -> dict[str, object]:
+        """Returns what changes in the sessions."""
+        values = self.__getstate__()
+        return {name: values[name] for name in CHANGES}
+
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies the values of `mutable_values`."""
+        self.__setstate__(values)
+
+    def bind(self) -> None:
+        """Lets the faces show their rows, after the arrays or the faces were replaced."""
+        self.__dict__.pop("_rows", None)
+        for number, face in enumerate(self.faces):
+            if face is not None:
+                face.live.world.actors.arrays = self._rows[number]
+
+    # --- Arrays of all environments -----------------------------------------------------------------------------------
+
+    @property
+    def _worlds(self) -> WorldArrays:
+        return cast(WorldArrays, self._stacks[0])
+
+    @property
+    def _drivers(self) -> DriverArrays:
+        return cast(DriverArrays, self._stacks[1])
+
+    @property
+    def _guidances(self) -> InstructorArrays:
+        return cast(InstructorArrays, self._stacks[2])
+
+    @property
+    def _episodes(self) -> EpisodeArrays:
+        return cast(EpisodeArrays, self._stacks[3])
+
+    @property
+    def _drives(self) -> DriveArrays:
+        return cast(DriveArrays, self._stacks[4])
+
+    @property
+    def observations(self) -> Vector:
+        """Observations at the present decision (environments, n), to be copied."""
+        return self._drivers.vector
+
+    @property
+    def masks(self) -> NDArray[np.int8]:
+        """Feasible actions at the present decision (environments, 18), to be copied."""
+        return self._drivers.mask
+
+    @property
+    def outcomes(self) -> NDArray[np.void]:
+        """`EpisodeRecord` of each environment (environments,)."""
+        return plain(self._episodes.state)[:, 0]
+
+    @property
+    def infractions(self) -> NDArray[np.int64]:
+        """Numbers of infractions so far (environments, 5), in the order of `INFRACTION_KINDS`, to be copied."""
+        counts: NDArray[np.int64] = plain(self._worlds.watch)[:, 0]["counts"]
+        return counts
+
+    @property
+    def successes(self) -> NDArray[np.bool_]:
+        """Whether every live subgoal was reached, the destination last, without a collision that the ego caused."""
+        outcomes, collisions = self.outcomes, plain(self._worlds.car)[:, 0]["collisions"]
+        successes: NDArray[np.bool_] = (collisions == 0) & outcomes["done"] & outcomes["succeeded"]
+        return successes
+
+    @property
+    def live_subgoals(self) -> NDArray[np.int64]:
+        """Numbers of subgoals that count (environments,)."""
+        return self._live
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the arrays of all environments [bytes]."""
+        return sum(array.nbytes for stack in self._stacks for array in stack)
+
+    def refused(self, number: int) -> list[str]:
+        """Returns the reasons for the refusals of an environment at its last decision."""
+        face, state = self.faces[number], self._decisions[number]
+        reasons = list(face.refused) if face is not None and state["refused"] else []
+        if state["refusal"] > 0:
+            action = PLAIN_ACTIONS.get(int(state["action"]))
+            order = PhysicalAction.J_TURN if action is None else action.action
+            known = state["refusal"] != CRUISE_LIMIT
+            reason = REASONS[Refusal(int(state["refusal"]))] if known else CRUISE_REFUSAL
+            reasons.append(f"{order.label}: {reason}")
+        return reasons
+
+    @property
+    def any_refused(self) -> NDArray[np.bool_]:
+        """Environments at whose last decision something was refused (environments,)."""
+        refused: NDArray[np.bool_] = (self._decisions["refusal"] > 0) | (self._decisions["refused"] > 0)
+        return refused
+
+    @property
+    def _decisions(self) -> NDArray[np.void]:
+        return plain(self._drives.state)[:, 0]
+
+    def instruction(self, number: int) -> NavigationInstruction | None:
+        """Returns the last instruction of an environment; None if none was given yet."""
+        guidance = row_of(self._guidances, number)
+        return instruction_of(guidance) if plain(guidance.said)["given"][0] else None
+
+    def catch_up(self, number: int) -> LiveSession:
+        """Returns the session of an environment, as it is after the last decision."""
+        return self._face(number).live
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self._pool.close()
+
+    # --- Episodes -----------------------------------------------------------------------------------------------------
+
+    def begin(self, seeds: Mapping[int, int], scenario: Scenario | None = None) -> None:
+        """Begins sessions.
+
+        Args:
+            seeds: seed of the session by environment.
+            scenario: scenario to play instead of drawn ones.
+        """
+        flags = np.zeros(self._count, dtype=np.int8)
+        for number, seed in seeds.items():
+            played = draw_scenario(self.town, self._template, seed) if scenario is None else scenario
+            live = LiveSession(self.town, self._network, played, self._config.session_config, self._limits)
+            self._put(number, live)
+            flags[number] = BEGINS
+        self._decisions["refusal"][list(seeds)] = self._decisions["refused"][list(seeds)] = 0
+        self._guide(flags)
+
+    def _put(self, number: int, live: LiveSession) -> None:
+        """Moves a session that begins into a row."""
+        world, config = live.world, self._config
+        face = DrivingFace(live, Interference(live, config.exceptions) if config.exceptions > 0.0 else None)
+        fresh = (
+            world.sensing_arrays, driver_arrays(sum(FIELDS.values()), len(ACTIONS), _streets(live)),
+            self._guidance_of(live), episode_arrays(config), self._drive_of(live),
+        )  # fmt: skip
+        if not self._stacks:
+            self._stacks = [_stacked(arrays, self._count) for arrays in fresh]
+        self.faces[number] = face
+        plain(fresh[1].inputs)["weather"][0] = tuple(world.weather.values.values())
+        self._move_in(number)
+        for stack, arrays in zip(self._stacks[1:], fresh[1:], strict=True):
+            _copy(row_of(stack, number), arrays)
+        self._due[number] = face.interference.due if face.interference is not None else math.inf
+        self._waited[number] = 0
+        self._noted.discard(number)
+        self._faulty.discard(number)
+        self._note_task(number)
+
+    def _move_in(self, number: int) -> None:
+        """Copies the world of a session into its row, and makes the session show the row."""
+        face = self.faces[number]
+        assert face is not None
+        actors = face.live.world.actors
+        if actors.arrays is self._rows[number]:
+            return
+        self._make_room(actors.arrays)
+        _copy(self._rows[number], with_room_of(self._arrays, actors.arrays, self._rows[number]))
+        actors.arrays = self._rows[number]
+
+    def _make_room(self, world: WorldArrays) -> None:
+        """Gives all rows the room of a world, if they have less."""
+        if all(len(getattr(self._rows[0], name)) >= len(getattr(world, name)) for name in ROOMS):
+            return
+        rows = [with_room_of(self._arrays, row, world) for row in self._rows]
+        shown = [
+            face is not None and face.live.world.actors.arrays is row
+            for face, row in zip(self.faces, self._rows, strict=True)
+        ]
+        self._stacks[0] = _stacked(rows[0], self._count)
+        del self.__dict__["_rows"]
+        for number, row in enumerate(rows):
+            _copy(self._rows[number], row)
+            face = self.faces[number]
+            if face is not None and shown[number]:
+                face.live.world.actors.arrays = self._rows[number]
+
+    def _drive_of(self, live: LiveSession) -> DriveArrays:
+        """Returns the decision arrays of a session that begins."""
+        landmarks = live.scenario.storyboard.landmarks[: self._limits.landmarks]
+        arrays = DriveArrays(
+            empty_records(DriveRecord, 1), np.zeros(self._limits.landmarks, dtype=np.int32),
+            np.full((self._limits.landmarks, 2), math.inf),
+        )  # fmt: skip
+        arrays.state["landmark"] = arrays.state["goal_lane"] = -1
+        for row, landmark in enumerate(landmarks):
+            arrays.waypoints[row] = landmark.waypoint
+            arrays.rows[row] = self._row_of_costs((landmark.lane, landmark.station), ())
+        return arrays
+
+    def _row_of_costs(self, goal: Place, blocked: tuple[Place, ...]) -> int:
+        """Returns the row of the costs to a goal; new ones are added."""
+        row = self._cost_rows.get((goal, blocked))
+        if row is None:
+            row = self._cost_rows[goal, blocked] = len(self._cost_rows)
+            if row == len(self._common.costs):
+                more = np.zeros((2 * row, self._common.costs.shape[1]))
+                more[:row] = self._common.costs
+                self._common = self._common._replace(costs=more)
+            self._common.costs[row] = cost_table(self.town, goal, blocked).costs
+        return row
+
+    # --- A decision ---------------------------------------------------------------------------------------------------
+
+    def play(self, actions: NDArray[np.int64], playing: NDArray[np.bool_]) -> None:
+        """Plays a decision in some environments.
+
+        Args:
+            actions: `NavigationAction` of each environment (n,).
+            playing: environments that play (n,).
+        """
+        state = self._decisions
+        state["action"], state["refused"], state["refusal"] = actions, 0, 0
+        state["stage"] = np.where(playing, Stage.ACTING, Stage.DONE)
+        self._interfere(playing)
+        for number in [number for number in self._noted if playing[number]]:
+            self._send_note(number)
+        self._share(act_share, self._worlds, self._drivers, self._drives, self._common.frames)
+        while (waiting := np.flatnonzero(state["stage"])).size:
+            for number in waiting.tolist():
+                if state["stage"][number] == Stage.NO_SPACE:
+                    self._make_room(lengthened(self._rows[number]))
+                else:
+                    self._look(number)
+            self._share(act_share, self._worlds, self._drivers, self._drives, self._common.frames)
+        for number in list(self._faulty):
+            self._look(number)
+        for number in np.flatnonzero(state["near"] & playing).tolist():
+            self._arrive(number)
+        self._guide(playing.astype(np.int8) * np.int8(PLAYS))
+
+    def _guide(self, flags: NDArray[np.int8]) -> None:
+        """Plays the second half of a decision; `flags` (n,) are `PLAYS`, `BEGINS` or 0."""
+        self._share_guide(flags)
+        state = self._decisions
+        missing = np.flatnonzero((state["stage"] == Stage.NO_COSTS) & (flags > 0))
+        if missing.size:
+            for number in missing.tolist():
+                guidance = row_of(self._guidances, number)
+                mark = plain(guidance.marks)[int(plain(guidance.route)["landmark"][0])]
+                closed = plain(guidance.closed)[: int(plain(guidance.route)["closed"][0])]
+                blocked = tuple((lane, station) for station, lane in closed.tolist())
+                state["new_costs"][number] = self._row_of_costs((int(mark["lane"]), float(mark["station"])), blocked)
+            again = np.zeros_like(flags)
+            again[missing] = flags[missing]
+            self._share_guide(again)
+        spoken = (state["said"] & (plain(self._guidances.said)[:, 0]["landmark"] >= 0)) | state["fresh"]
+        for number in np.flatnonzero(spoken & (flags > 0)).tolist():
+            self._note_goal(number)
+
+    def _share_guide(self, flags: NDArray[np.int8]) -> None:
+        self._share(
+            guide_share, self._exits, self._tables, self._graph, self._searches, self._common, self._worlds,
+            self._drivers, self._guidances, self._episodes, self._drives, flags,
+        )  # fmt: skip
+
+    def _share(self, work: Callable[..., None], *arguments: object) -> None:
+        turns = turns_of(self._count, self.threads)
+        self._pool.do(work, lambda home: (turns, home, self._arrays, *arguments))
+
+    # --- Rare events --------------------------------------------------------------------------------------------------
+
+    def _face(self, number: int) -> DrivingFace:
+        """Returns the face of an environment, with the time and place of its row."""
+        face = self.faces[number]
+        assert face is not None
+        face.live.world.catch_up()
+        return face
+
+    def _look(self, number: int) -> None:
+        """Updates what the ego sees after a change of lights, weather or faults."""
+        world = self._face(number).live.world
+        self._rows[number] = world.sensing_arrays  # the same arrays, with the present visibility
+        if world.faults:
+            self._faulty.add(number)
+        else:
+            self._faulty.discard(number)
+
+    def _interfere(self, playing: NDArray[np.bool_]) -> None:
+        """Lets the Ad-Wizards act that may."""
+        if self._config.exceptions <= 0.0:
+            return
+        acts = playing & (plain(self._worlds.clock)[:, 0]["frame"] / FRAME_RATE >= self._due)
+        for number in np.flatnonzero(acts).tolist():
+            face = self._face(number)
+            assert face.interference is not None
+            face.interference.wait(int(self._waited[number]))
+            face.live.begin_decision()
+            face.live.play_ad_wizard(face.interference.act(LazyObservations(face.live)))
+            self._move_in(number)
+            self._due[number] = face.interference.due
+            self._look(number)
+            weather = tuple(face.live.world.weather.values.values())
+            plain(self._drivers.inputs)["weather"][number, 0] = weather
+            self._note_task(number)
+        self._waited[acts] = 0
+        self._waited[playing & ~acts] += 1
+
+    def _send_note(self, number: int) -> None:
+        """Sends a belief update of the Co-Wizard, which changes where the car slows down."""
+        face = self._face(number)
+        face.live.begin_decision()
+        reason = face.live.update_beliefs(face.notes.pop(0))
+        face.refused = [] if reason is None else [reason]
+        self._decisions["refused"][number] = len(face.refused)
+        self._move_in(number)
+        if not face.notes:
+            self._noted.discard(number)
+
+    def _arrive(self, number: int) -> None:
+        """Completes the subgoals whose waypoint the standing ego has reached."""
+        live = self._face(number).live
+        live.begin_decision()
+        live.note_arrivals()
+        self._note_task(number)
+
+    def _note_task(self, number: int) -> None:
+        """Writes the state of the task into the row after a change."""
+        face = self.faces[number]
+        assert face is not None
+        task = face.live.task
+        if task.version == face.version:
+            return
+        face.version = task.version
+        subgoals = plain(self._guidances.subgoals)[number]
+        for index in range(min(len(task.storyboard.subgoals), len(subgoals))):
+            is_open = index in task.live and not task.reached(index)
+            subgoals[index] = task.landmark_of(index), is_open, task.allowed(index)
+        outcome = self.outcomes[number : number + 1]
+        outcome["reached"] = sum(task.reached(index) for index in task.live)
+        outcome["done"], outcome["succeeded"] = task.done, task.success
+        self._live[number] = len(task.live)
+
+    def _note_goal(self, number: int) -> None:
+        """Queues the belief updates for a goal: a place on the map, or one as far ahead as was said."""
+        face, guidance, state = self._face(number), row_of(self._guidances, number), self._decisions[number]
+        said = plain(guidance.said)[0]
+        if state["fresh"]:
+            face.notes = [Mental(action=MentalAction.GOAL_UPDATE)]
+        if state["said"] and said["landmark"] >= 0:
+            name = LandmarkName(int(said["landmark"]))
+            face.notes = [Mental(action=MentalAction.GOAL_UPDATE, goals=(name,))]
+            mark = plain(guidance.marks)[int(plain(guidance.route)["landmark"][0])]
+            if said["action"] >= 0 and not mark["known"]:
+                planner = face.live.world.planner
+                path = planner.path
+                k = path.index_at(min(planner.s + float(said["distance"]), path.length))
+                place = LanePosition(lane=int(path.lanes[k]), metres=int(float(path.stations[k])))
+                face.notes.append(Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=place))
+        self._noted.add(number)
+
+    def _guidance_of(self, live: LiveSession) -> InstructorArrays:
+        """Returns the instructor of a session that begins."""
+        limits, storyboard = self._limits, live.scenario.storyboard
+        arrays = instructor_arrays(
+            lanes=len(self.town.lanes), subgoals=limits.subgoals, landmarks=limits.landmarks, streets=limits.streets,
+            things=limits.objects,
+        )  # fmt: skip
+        arrays.now["by_name"] = self._config.guidance is Guidance.GOALS
+        arrays.names[: len(live.scenario.street_names)] = _streets(live)
+        landmarks = storyboard.landmarks[: limits.landmarks]
+        known = {(landmark.lane, landmark.station) for landmark in landmarks if not landmark.hidden}
+        marks = plain(arrays.marks)
+        for row, landmark in enumerate(landmarks):
+            place = landmark.lane, landmark.station
+            marks[row] = landmark.station, landmark.lane, landmark.name.value, place in known
+        return arrays
+
+
+def _streets(live: LiveSession) -> list[int]:
+    return [name.value for name in live.scenario.street_names]
+
+
+def _stacked(arrays: Arrays, count: int) -> Arrays:
+    """Returns a tuple of arrays with a leading axis, of `count` copies."""
+    rooms = [np.zeros((count, *array.shape), dtype=array.dtype) for array in arrays]
+    stack: Arrays = type(arrays)._make(room.view(np.recarray) if room.dtype.names else room for room in rooms)  # type: ignore[attr-defined]  # of named tuples
+    for number in range(count):
+        _copy(row_of(stack, number), arrays)
+    return stack
+
+
+def _copy(row: tuple[Any, ...], arrays: tuple[Any, ...]) -> None:
+    """Copies arrays byte by byte: NumPy leaves out the bytes between the fields of records."""
+    for target, source in zip(row, arrays, strict=True):
+        np.copyto(np.asarray(target).view(np.uint8), np.ascontiguousarray(source).view(np.uint8))
