@@ -1,0 +1,34 @@
+"""Navigation-v0 is the same, byte by byte, compiled and in plain Python."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+EPISODE = """
+import hashlib
+import numpy as np
+from dorothie_gym.envs.navigation_v0 import NavigationEnv
+for guidance in ("turns", "goals"):
+    env, rng = NavigationEnv(guidance=guidance, exceptions=4.0), np.random.default_rng(0)
+    observation, info = env.reset(seed=3)
+    digest = hashlib.sha256()
+    for _ in range(8):
+        digest.update(observation.tobytes() + info["action_mask"].tobytes() + repr(info["reward_terms"]).encode())
+        observation, *_, info = env.step(rng.choice(np.flatnonzero(info["action_mask"])))
+    print(digest.hexdigest(), hashlib.sha256(env.drive.session.world.actors.arrays.tobytes()).hexdigest())
+"""
+
+
+def run(disabled: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
+    root = Path(__file__).resolve().parents[2]
+    return subprocess.run([sys.executable, "-c", EPISODE], env=environment, capture_output=True, text=True, cwd=root)
+
+
+def test_episodes_are_the_same_bytes_compiled_and_in_plain_python() -> None:
+    compiled, plain = run("0"), run("1")
+    assert compiled.returncode == plain.returncode == 0, compiled.stderr + plain.stderr
+    assert compiled.stdout == plain.stdout
