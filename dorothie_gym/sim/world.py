@@ -155,7 +155,7 @@ class World(Lookups, Restorable):
 
     def step(self, frames: int) -> list[WorldEvent]:
         """Runs the world for a number of physics frames; returns the events of the ego."""
-        parts = [self._run(min(FRAMES, frames - first)) for first in range(0, frames, FRAMES)]
+        parts = [self._run(min(FRAMES, frames - first)) for first in range(0, max(frames, 1), FRAMES)]
         trace = parts[0] if len(parts) == 1 else np.concatenate(parts)
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
         if self.faults:
