@@ -10,6 +10,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation import direct
 from dorothie_gym.copying import Lookups
 from dorothie_gym.dialogue import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
@@ -40,6 +41,7 @@ WAYPOINT_SPACING = 5.0
 """Distance between the observed waypoints of the planned path [m]."""
 
 _SENSORS = tuple(Sensor)
+_motion_of = direct(motion_of)
 _PROP_NUMBERS = {kind: 1.0 + k for k, kind in enumerate(PropKind)}
 
 
@@ -169,7 +171,7 @@ class ObservationBuilder(Lookups):
 
     def motion(self) -> Motion:
         """Returns the state of motion of the ego."""
-        return Motion(motion_of(self._world.actors.arrays))
+        return Motion(_motion_of(self._world.actors.arrays))
 
     # --- templates --------------------------------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.engine.observations import LazyObservations
@@ -56,6 +57,7 @@ from dorothie_gym.tasks import Landmark, StoryboardTemplate
 from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
 _SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
+_judge = direct(judge)
 
 
 class DrivingSession(Lookups):
@@ -140,7 +142,7 @@ class DrivingSession(Lookups):
         state["left"] = self._cost_to_go()
         state["acted"] = action.physical is not None
         state["refusals"] = len(session.refused[Role.CO_WIZARD])
-        judge(world.actors.arrays, self.episode)
+        _judge(world.actors.arrays, self.episode)
         self.ending = Ending(int(state["ending"]))
         if self.ending:
             session.end(self.ending.label)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation import compiled, direct
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.ontology import SPEED_STEP, PhysicalAction
@@ -105,7 +105,7 @@ def physical_of(action: NavigationAction, driver: DriverArrays) -> Physical | No
         action: action chosen.
         driver: arrays of the driver, with its view.
     """
-    if action is NavigationAction.NOTHING or prepares(driver, int(action)):
+    if action is NavigationAction.NOTHING or _prepares(driver, int(action)):
         return None
     if action is NavigationAction.LIGHTS:
         return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not plain(driver.inputs)[0]["lights"])
@@ -127,6 +127,9 @@ def prepares(driver: DriverArrays, action: int) -> bool:
     if action == _SWITCH_LEFT or action == _SWITCH_RIGHT:
         return bool(view.manoeuvre == _LANE_SWITCH and view.angle == (LEFT if action == _SWITCH_LEFT else RIGHT))
     return bool(action == _ROUND and view.manoeuvre == _U_TURN)
+
+
+_prepares = direct(prepares)
 
 
 @compiled

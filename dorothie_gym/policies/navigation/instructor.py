@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import fields, plain
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps import Town
@@ -27,6 +28,9 @@ from dorothie_gym.tasks import map_label
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
+
+
+_attend = direct(attend)
 
 
 class Guidance(enum.StrEnum):
@@ -145,7 +149,7 @@ class Instructor(Lookups):
 
     def look(self, world: WorldArrays) -> None:
         """Sees the car and what is around it at a decision."""
-        attend(world, self.arrays)
+        _attend(world, self.arrays)
 
     def instruct(self) -> NavigationInstruction | None:
         """Returns an instruction if one is due by what was seen last, or None."""
