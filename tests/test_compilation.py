@@ -174,10 +174,20 @@ def test_function_called_directly_gives_the_same_results():
             assert fast(numbers, more, 4.0) == 4.0 + scaled_sum(numbers, more)
 
 
-@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
-def test_function_of_arrays_is_not_called_directly():
-    with pytest.raises(TypeError, match="sum_of_doubled takes arrays"):
-        direct(sum_of_doubled)(np.zeros(1, dtype=np.int32), np.zeros(1, dtype=np.uint8))
+def test_function_called_directly_distinguishes_arrays_by_their_types():
+    fast, numbers = direct(weighted_sum), np.arange(12)
+    constant = numbers.astype(np.float32)
+    constant.flags.writeable = False
+    for array in (numbers, numbers.astype(np.float64), numbers[::2], numbers.reshape(3, 4)[:, 1], constant):
+        assert fast(array) == (np.arange(len(array)) * array).sum()
+
+
+@compiled
+def weighted_sum(array):
+    total = 0.0
+    for k in range(len(array)):
+        total += k * array[k]
+    return total
 
 
 @compiled

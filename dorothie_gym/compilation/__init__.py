@@ -13,6 +13,7 @@ from typing import TypeVar, cast
 
 import numpy as np
 from numba.core import config
+from numpy.typing import NDArray
 
 from dorothie_gym.compilation.cache import compiled_folder
 from dorothie_gym.compilation.dispatcher import CompiledFunction
@@ -66,26 +67,26 @@ def direct(function: F) -> F:
     """Makes Python call a compiled function without a look at the types inside of its arguments.
 
     Before a call numba compares the types of all arrays in all tuples with those of earlier calls, which takes 7 us for
-    a town and a world. Here only the classes of the arguments decide: all tuples of one class must hold arrays of the
-    same types, as `WorldArrays` and `TownArrays` do.
-
-    Raises:
-        TypeError: (when the function is called) an argument is an array, whose class does not say its type.
+    a town and a world. Here the class of a tuple decides: all tuples of a class must hold arrays of the same types, as
+    `WorldArrays` and `TownArrays` do. Arguments are given by position.
     """
     if not isinstance(function, CompiledFunction):
         return function
-    entries: dict[tuple[type, ...], Callable[..., object]] = {}
+    entries: dict[tuple[object, ...], Callable[..., object]] = {}
 
     def call(*arguments: object) -> object:
-        kinds = tuple(map(type, arguments))
+        kinds = tuple([_kind(each) if isinstance(each, np.ndarray) else type(each) for each in arguments])
         entry = entries.get(kinds)
         if entry is None:
-            if any(issubclass(kind, np.ndarray) for kind in kinds):
-                raise TypeError(f"{function.__name__} takes arrays, and cannot be called directly")
             entry = entries[kinds] = function.entry_for(*arguments)
         return entry(*arguments)
 
     return cast(F, call)
+
+
+def _kind(array: NDArray[np.generic]) -> tuple[object, ...]:
+    """Returns what the type of an array depends on."""
+    return array.dtype, array.ndim, array.flags.num
 
 
 def _compile(function: F, **options: bool) -> F:

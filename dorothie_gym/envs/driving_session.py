@@ -57,7 +57,8 @@ from dorothie_gym.tasks import Landmark, StoryboardTemplate
 from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
 _SILENCE, _INTACT = ParticipantAction(), AdWizardAction()
-_judge = direct(judge)
+
+_judge, _observe = direct(judge), direct(observe)
 
 
 class DrivingSession(Lookups):
@@ -160,7 +161,7 @@ class DrivingSession(Lookups):
             self._weather = self._inputs["weather"] = weather
         self._record["driven"] = self._driven
         self._cost_to_named.aim(named, self.instructor.blocked if named is not None else ())
-        observe(
+        _observe(
             self._town_arrays, self._exit_arrays, world.sensing_arrays, driver, *self._cost_to_named.rows,
             self._config.max_seconds,
         )  # fmt: skip

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
-_attend = direct(attend)
+_attend, _instruct = direct(attend), direct(instruct)
 
 
 class Guidance(enum.StrEnum):
@@ -155,7 +155,7 @@ class Instructor(Lookups):
         """Returns an instruction if one is due by what was seen last, or None."""
         town, arrays = self._town, self.arrays
         search = router(town).search
-        given = instruct(route_tables(town), routing_graph(town), search, exit_sectors(town), arrays)
+        given = _instruct(route_tables(town), routing_graph(town), search, exit_sectors(town), arrays)
         row, closed = self._route.item()
         self.goal = self._marks.get(row)
         if closed != len(self.blocked):
