@@ -188,28 +188,40 @@ def import_report(figures: Figures) -> Report:
 
 def rl_report(figures: Figures) -> Report:
     """Returns the summary of `baselines.rl.throughput.measure`."""
-    names = {
-        "environment": "physics and observations", "partners": "instructor and Ad-Wizard",
-        "policy": "action selection", "learner": "learning",
-    }  # fmt: skip
+    names = {"environment": "environments", "policy": "action selection", "learner": "learning"}
     shares = ", ".join(f"{names[name]} {100 * share:.0f} %" for name, share in figures["shares"].items())
     rows = [
-        Measurement(label="one process\nfor environments and learner", value=figures["one_process_steps_per_second"])
+        Measurement(
+            label=f"training with {figures['algorithm']}\nend to end", value=figures["end_to_end_steps_per_second"]
+        )
     ]
-    if figures["workers_steps_per_second"] is not None:
-        label = f"{_count(figures['workers'], 'worker')} beside the learner\nfor the environments"
-        rows.append(Measurement(label=label, value=figures["workers_steps_per_second"]))
+    notes = [f"training: {shares}"]
+    setting = f"{_count(figures['environments'], 'environment')}, network {figures['network']}"
+    if figures["batch_steps_per_second"] is not None:
+        rows = [
+            Measurement(label="its physics alone", value=figures["kernel_steps_per_second"]),
+            Measurement(
+                label=f"batch of {figures['batch']}\non {_count(figures['threads'], 'thread')}",
+                value=figures["batch_steps_per_second"],
+            ),
+            *rows,
+            Measurement(label="one environment", value=figures["single_steps_per_second"]),
+            Measurement(
+                label="intersection-v0\nof highway-env", value=figures["stock_steps_per_second"], reference=True
+            ),
+        ]  # fmt: skip
+        parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in figures["step_shares"].items())
+        notes.append(f"a step of the batch: {parts}; {figures['of_kernel']:.0%} of the rate of its physics")
+        notes.append(f"memory: {figures['bytes_per_environment'] / 1024:.0f} KB an environment")
+        setting += f"; {figures['town']}, {figures['traffic']} traffic, {figures['exceptions']:g} exceptions"
     return Report(
         title=f"Training {figures['algorithm']} on {figures['env']}",
-        setting=f"{_count(figures['environments'], 'environment')}, network {figures['network']}, "
-        f"{figures['steps']:,} steps each",
-        headline=f"{number(figures['steps_per_second'])} environment steps per second, end to end",
+        setting=setting,
+        headline=f"{number(figures['end_to_end_steps_per_second'])} environment steps per second, end to end",
         unit="environment steps per second",
         rows=tuple(rows),
-        mark=Mark(label="target on two cores", value=figures["target"]),
-        notes=(f"in one process: {shares}",),
+        notes=tuple(notes),
         machine=machine_line(figures["machine"]),
-        logarithmic=False,
     )
 
 

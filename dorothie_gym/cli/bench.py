@@ -128,17 +128,20 @@ def vector(
 def rl(
     env: Annotated[str, typer.Option(metavar="ID", help="Id of the environment.")] = "dorothie_gym/Navigation-v0",
     algorithm: Annotated[str, typer.Option(help="ppo, maskable_ppo or a2c.")] = "ppo",
-    environments: Annotated[int, typer.Option(min=1, max=256, help="Number of parallel environments.")] = 8,
+    environments: Annotated[int, typer.Option(min=1, max=4096, help="Number of parallel environments.")] = 256,
     workers: Annotated[
         int | None,
-        typer.Option(min=0, max=256, help="Processes of a second run; default one per core; 0: none."),
+        typer.Option(min=0, max=256, help="Processes that step them; default none for a batch, else one per core."),
     ] = None,
-    steps: Annotated[int, typer.Option(min=256, help="Steps of a run.")] = 16_384,
+    steps: Annotated[int, typer.Option(min=256, help="Steps of the training.")] = 65_536,
+    town: Town = "brookside",
+    traffic: Annotated[str, typer.Option(help="Traffic of the town: none, light, medium or heavy.")] = "light",
+    exceptions: Annotated[float, typer.Option(min=0.0, max=4.0, help="Average number of exceptions.")] = 0.0,
     seed: Seed = 0,
     picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
-    """Environment steps per second of a whole training, and the shares of its time."""
+    """Environment steps per second of the batch, its physics, one environment, and a whole training."""
 
     def measured(progress: Progress) -> Figures:
         try:
@@ -149,10 +152,10 @@ def rl(
 
         try:
             return measure(
-                env, algorithm=algorithm, environments=environments, workers=workers, steps=steps, seed=seed,
-                progress=progress,
+                env, algorithm=algorithm, environments=environments, workers=workers, steps=steps, town=town,
+                traffic=traffic, exceptions=exceptions, seed=seed, progress=progress,
             )  # fmt: skip
-        except SettingsError as error:
+        except (SettingsError, ValueError) as error:
             fail(str(error))
 
     _bench("rl", measured, picture, as_json)

@@ -63,14 +63,14 @@ def train_rl(
     ] = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Steps of all environments; default: tuned.")] = None,
     environments: Annotated[
-        int | None, typer.Option(min=1, max=256, help="Parallel environments; default: tuned.")
+        int | None, typer.Option(min=1, max=4096, help="Parallel environments; default: tuned.")
     ] = None,
     workers: Annotated[
         int | None,
         typer.Option(
             min=0,
             max=256,
-            help="Worker processes that step the environments; default one per processor; 0: the learner steps them.",
+            help="Worker processes that step the environments; default 0 for Navigation, else one per processor.",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Seed of networks and environments.")] = 0,
@@ -159,10 +159,11 @@ def _train(
         as_json: whether to print one JSON object and nothing else.
     """
     from dorothie_gym.baselines.rl import Training, tuned_settings
+    from dorothie_gym.baselines.rl.environments import has_batch
     from dorothie_gym.baselines.rl.training import best_of
 
     settings = tuned_settings(algorithm, env, env_settings=given, **changes)
-    if changes["workers"] is None and ray is None:
+    if changes["workers"] is None and ray is None and not has_batch(settings.env):
         settings = _with_default_workers(settings)
     if ray is None and settings.env.startswith("dorothie_gym/"):
         compile_first()

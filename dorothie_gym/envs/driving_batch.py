@@ -135,7 +135,7 @@ class DrivingBatch(Lookups):
     @cached_property
     def _rows(self) -> list[WorldArrays]:
         """Rows of the worlds, each the same object as long as the arrays are."""
-        return [row_of(self._worlds, number) for number in range(self._count)]
+        return [row_of(self.worlds, number) for number in range(self._count)]
 
     def __setstate__(self, values: dict[str, object]) -> None:
         self.__dict__.update(values)
@@ -160,7 +160,8 @@ class DrivingBatch(Lookups):
     # --- Arrays of all environments -----------------------------------------------------------------------------------
 
     @property
-    def _worlds(self) -> WorldArrays:
+    def worlds(self) -> WorldArrays:
+        """Arrays of the worlds of all environments."""
         return cast(WorldArrays, self._stacks[0])
 
     @property
@@ -180,6 +181,11 @@ class DrivingBatch(Lookups):
         return cast(DriveArrays, self._stacks[4])
 
     @property
+    def frames(self) -> int:
+        """Substeps of a decision."""
+        return self._common.frames
+
+    @property
     def observations(self) -> Vector:
         """Observations at the present decision (environments, n), to be copied."""
         return self._drivers.vector
@@ -197,13 +203,13 @@ class DrivingBatch(Lookups):
     @property
     def infractions(self) -> NDArray[np.int64]:
         """Numbers of infractions so far (environments, 5), in the order of `INFRACTION_KINDS`, to be copied."""
-        counts: NDArray[np.int64] = plain(self._worlds.watch)[:, 0]["counts"]
+        counts: NDArray[np.int64] = plain(self.worlds.watch)[:, 0]["counts"]
         return counts
 
     @property
     def successes(self) -> NDArray[np.bool_]:
         """Whether every live subgoal was reached, the destination last, without a collision that the ego caused."""
-        outcomes, collisions = self.outcomes, plain(self._worlds.car)[:, 0]["collisions"]
+        outcomes, collisions = self.outcomes, plain(self.worlds.car)[:, 0]["collisions"]
         successes: NDArray[np.bool_] = (collisions == 0) & outcomes["done"] & outcomes["succeeded"]
         return successes
 
@@ -359,14 +365,14 @@ class DrivingBatch(Lookups):
         self._interfere(playing)
         for number in [number for number in self._noted if playing[number]]:
             self._send_note(number)
-        self._share(act_share, self._worlds, self._drivers, self._drives, self._common.frames)
+        self.share(act_share, self.worlds, self._drivers, self._drives, self.frames)
         while (waiting := np.flatnonzero(state["stage"])).size:
             for number in waiting.tolist():
                 if state["stage"][number] == Stage.NO_SPACE:
                     self._make_room(lengthened(self._rows[number]))
                 else:
                     self._look(number)
-            self._share(act_share, self._worlds, self._drivers, self._drives, self._common.frames)
+            self.share(act_share, self.worlds, self._drivers, self._drives, self.frames)
         for number in list(self._faulty):
             self._look(number)
         for number in np.flatnonzero(state["near"] & playing).tolist():
@@ -393,12 +399,13 @@ class DrivingBatch(Lookups):
             self._note_goal(number)
 
     def _share_guide(self, flags: NDArray[np.int8]) -> None:
-        self._share(
-            guide_share, self._exits, self._tables, self._graph, self._searches, self._common, self._worlds,
+        self.share(
+            guide_share, self._exits, self._tables, self._graph, self._searches, self._common, self.worlds,
             self._drivers, self._guidances, self._episodes, self._drives, flags,
         )  # fmt: skip
 
-    def _share(self, work: Callable[..., None], *arguments: object) -> None:
+    def share(self, work: Callable[..., None], *arguments: object) -> None:
+        """Calls `work(turns, home, town, *arguments)` in every thread, and waits for all of them."""
         turns = turns_of(self._count, self.threads)
         self._pool.do(work, lambda home: (turns, home, self._arrays, *arguments))
 
@@ -424,7 +431,7 @@ class DrivingBatch(Lookups):
         """Lets the Ad-Wizards act that may."""
         if self._config.exceptions <= 0.0:
             return
-        acts = playing & (plain(self._worlds.clock)[:, 0]["frame"] / FRAME_RATE >= self._due)
+        acts = playing & (plain(self.worlds.clock)[:, 0]["frame"] / FRAME_RATE >= self._due)
         for number in np.flatnonzero(acts).tolist():
             face = self._face(number)
             assert face.interference is not None

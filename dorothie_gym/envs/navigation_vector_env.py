@@ -82,6 +82,10 @@ class NavigationVectorEnv(DrivingVectorEnv):
 
     ## Version History
     - v0: first version.
+
+    Attributes:
+        config: settings.
+        batches: a batch for each town.
     """
 
     CHANGES: ClassVar[Sequence[str]] = (*DrivingVectorEnv.CHANGES, "_masks")
@@ -118,12 +122,12 @@ class NavigationVectorEnv(DrivingVectorEnv):
         for number, each in enumerate(self.towns):
             towns.setdefault(each, []).append(number)
         self._members = [np.array(numbers) for numbers in towns.values()]
-        self._batches = [
+        self.batches = [
             DrivingBatch(each, template, self.config, len(numbers), threads) for each, numbers in towns.items()
         ]
         self._places = {
             int(number): (batch, place)
-            for batch, numbers in zip(self._batches, self._members, strict=True)
+            for batch, numbers in zip(self.batches, self._members, strict=True)
             for place, number in enumerate(numbers)
         }
         self._masks = np.zeros((num_envs, len(ACTIONS)), dtype=np.int8)
@@ -135,12 +139,12 @@ class NavigationVectorEnv(DrivingVectorEnv):
     @property
     def threads(self) -> int:
         """Number of threads that step the environments."""
-        return max(batch.threads for batch in self._batches)
+        return max(batch.threads for batch in self.batches)
 
     @property
     def nbytes(self) -> int:
         """Memory of the environments' arrays [bytes]."""
-        return sum(batch.nbytes for batch in self._batches)
+        return sum(batch.nbytes for batch in self.batches)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Returns which actions are feasible now (num_envs, 18)."""
@@ -156,13 +160,13 @@ class NavigationVectorEnv(DrivingVectorEnv):
 
     def mutable_values(self) -> dict[str, object]:
         """Returns what changes in the environments."""
-        return {**super().mutable_values(), "batches": [batch.mutable_values() for batch in self._batches]}
+        return {**super().mutable_values(), "batches": [batch.mutable_values() for batch in self.batches]}
 
     def apply_values(self, values: dict[str, object]) -> None:
         """Applies the values of the environments; pictures begin anew."""
         parts = values.pop("batches")
         assert isinstance(parts, list)  # of `mutable_values`
-        for batch, part in zip(self._batches, parts, strict=True):
+        for batch, part in zip(self.batches, parts, strict=True):
             batch.apply_values(part)
         super().apply_values(values)
 
@@ -172,7 +176,7 @@ class NavigationVectorEnv(DrivingVectorEnv):
 
     def close_extras(self, **_kwargs: object) -> None:
         """Ends the threads."""
-        for batch in self._batches:
+        for batch in self.batches:
             batch.close()
 
     # --- Episodes -----------------------------------------------------------------------------------------------------
@@ -186,7 +190,7 @@ class NavigationVectorEnv(DrivingVectorEnv):
         return found.astype(np.int64)
 
     def _start(self, seeds: Mapping[int, int], scenario: Scenario | None) -> None:
-        for batch, members in zip(self._batches, self._members, strict=True):
+        for batch, members in zip(self.batches, self._members, strict=True):
             own = {place: seeds[number] for place, number in enumerate(members.tolist()) if number in seeds}
             if own:
                 batch.begin(own, scenario)
@@ -195,7 +199,7 @@ class NavigationVectorEnv(DrivingVectorEnv):
                 self._note(batch, members, begun)
 
     def _play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
-        for batch, members in zip(self._batches, self._members, strict=True):
+        for batch, members in zip(self.batches, self._members, strict=True):
             if playing[members].any():
                 batch.play(actions[members], playing[members])
                 self._note(batch, members, playing[members])

@@ -5,45 +5,52 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
 from dorothie_gym.baselines.rl.checkpoint import make_model
-from dorothie_gym.baselines.rl.environments import make_training_env
-from dorothie_gym.baselines.rl.settings import ON_POLICY, TrainingSettings, tuned_settings
+from dorothie_gym.baselines.rl.environments import has_batch, make_training_env
+from dorothie_gym.baselines.rl.settings import NAVIGATION, ON_POLICY, TrainingSettings, tuned_settings
+from dorothie_gym.bench import navigation
 from dorothie_gym.bench.timing import Figures, Progress, ignore_progress, machine, rounded
-from dorothie_gym.envs.driving_session import DrivingSession
 from dorothie_gym.errors import SettingsError
-from dorothie_gym.policies.navigation.instructor import Instructor
 from dorothie_gym.processors import available_processors
 
-TARGET = 1000.0
-"""Target of environment steps per second, end to end, on two cores."""
+ALONE = (
+    "batch_steps_per_second", "kernel_steps_per_second", "single_steps_per_second", "stock_steps_per_second",
+)  # fmt: skip
+"""Figures without a learner; None for other environments than `Navigation-v0`."""
 
-SHARES = ("environment", "partners", "policy", "learner")
-"""Shares of the time: physics and observations; scripted partners; action selection; learning."""
+SHARES = ("environment", "policy", "learner")
+"""Shares of the time: steps of the environments; action selection; learning."""
 
 
 def measure(
-    env: str = "dorothie_gym/Navigation-v0",
+    env: str = NAVIGATION,
     *,
     algorithm: str = "ppo",
-    environments: int = 8,
+    environments: int = 256,
     workers: int | None = None,
-    steps: int = 16_384,
+    steps: int = 65_536,
+    town: str = "brookside",
+    traffic: str = "light",
+    exceptions: float = 0.0,
     seed: int = 0,
     progress: Progress = ignore_progress,
 ) -> Figures:
-    """Trains for a while in this process, then with worker processes.
+    """Steps the environments without a learner, where they are a batch, and then trains for a while.
 
     Args:
         env: id of the environment.
         algorithm: one that learns from rollouts: ppo, maskable_ppo or a2c.
         environments: number of parallel environments.
-        workers: number of processes of the second run; None for one per processor, 0 leaves the run out.
-        steps: number of steps of a run, after a first rollout that is not counted.
+        workers: number of processes that step them in training; None for none where they are a batch, else one per
+            processor.
+        steps: number of steps of the training, after a first rollout that is not counted.
+        town: town of the navigation environments.
+        traffic: their traffic density.
+        exceptions: their average number of exceptions in a session.
         seed: seed of networks and environments.
         progress: called with the name of each stage and the share done.
 
@@ -52,30 +59,32 @@ def measure(
     """
     if algorithm not in ON_POLICY:
         raise SettingsError(f"algorithm is {algorithm!r}; it must be one of {', '.join(ON_POLICY)}")
-    settings = tuned_settings(algorithm, env, environments=environments, seed=seed, workers=0)
-    progress("one process", 0.0)
-    alone = _run(settings, steps)
-    workers = min(available_processors(), environments) if workers is None else workers
-    together: dict[str, float] | None = None
-    if workers:
-        progress(f"{workers} worker processes", 0.5)
-        together = _run(replace(settings, workers=workers), steps)
-    total = alone["seconds"]
-    partners = alone["partners"]
-    shares = (alone["step"] - partners, partners, alone["rollout"] - alone["step"], total - alone["rollout"])
-    rates = [steps / run["seconds"] for run in (alone, together) if run is not None]
+    world = {"town": town, "traffic": traffic, "exceptions": exceptions} if env == NAVIGATION else {}
+    if workers is None:
+        workers = 0 if has_batch(env) else min(available_processors(), environments)
+    settings = tuned_settings(
+        algorithm, env, environments=environments, seed=seed, workers=workers, env_settings=world
+    )  # fmt: skip
+    alone: Figures = dict.fromkeys(ALONE)
+    if env == NAVIGATION:
+        alone = navigation.measure(
+            town, traffic=traffic, exceptions=exceptions, environments=environments, seed=seed,
+            progress=lambda part, share: progress(part, 0.5 * share),
+        )  # fmt: skip
+    progress("training", 0.5)
+    run = _run(settings, steps)
+    total = run["seconds"]
+    shares = (run["step"], run["rollout"] - run["step"], total - run["rollout"])
     return {
         "env": env,
         "algorithm": algorithm,
         "environments": environments,
+        "workers": workers,
         "network": list(settings.network),
         "steps": steps,
-        "steps_per_second": rounded(max(rates)),
-        "one_process_steps_per_second": rounded(rates[0]),
-        "workers": workers,
-        "workers_steps_per_second": rounded(rates[1]) if together is not None else None,
+        "end_to_end_steps_per_second": rounded(steps / total),
         "shares": {name: round(value / total, 3) for name, value in zip(SHARES, shares, strict=True)},
-        "target": TARGET,
+        **alone,
         "machine": machine(),
     }
 
@@ -87,13 +96,10 @@ def _run(settings: TrainingSettings, steps: int) -> dict[str, float]:
     try:
         with (
             _timed(vector, "step_wait") as step,
-            _timed(Instructor, "instruct") as instructing,
-            _timed(DrivingSession, "interfere") as interfering,
         ):
             model = make_model(settings, vector)
             model.learn(1, log_interval=None)  # the first rollout compiles and warms up
-            for seconds in (step, instructing, interfering):
-                seconds[0] = 0.0
+            step[0] = 0.0
             clock = _Clock()
             since, done = time.perf_counter(), model.num_timesteps
             model.learn(steps, callback=clock, reset_num_timesteps=False, log_interval=None)
@@ -105,7 +111,6 @@ def _run(settings: TrainingSettings, steps: int) -> dict[str, float]:
         "seconds": spent * scale,
         "rollout": clock.seconds * scale,
         "step": step[0] * scale,
-        "partners": (instructing[0] + interfering[0]) * scale,
     }
 
 

@@ -11,20 +11,26 @@ from dorothie_gym.baselines.rl.throughput import SHARES, measure
 from dorothie_gym.bench.report import rl_report
 from dorothie_gym.cli.app import app
 from dorothie_gym.errors import SettingsError
-from dorothie_gym.policies.navigation.instructor import Instructor
+
+KEYS = ("batch", "kernel", "single", "end_to_end", "stock")
 
 
-def test_shares_of_the_time_sum_to_one() -> None:
-    instruct = Instructor.instruct
-    figures = measure(environments=2, workers=0, steps=512)
-    assert Instructor.instruct is instruct  # the patch is removed
+def test_speeds_and_shares_of_a_training_on_a_batch() -> None:
+    figures = measure(environments=4, steps=512)
     assert set(figures["shares"]) == set(SHARES)
     assert sum(figures["shares"].values()) == pytest.approx(1.0, abs=0.01)
     assert min(figures["shares"].values()) > 0.0
-    assert figures["workers_steps_per_second"] is None
+    assert sum(figures["step_shares"].values()) == pytest.approx(1.0, abs=0.01)
+    assert all(figures[f"{key}_steps_per_second"] > 0.0 for key in KEYS)
     report = rl_report(figures)
-    assert "environment steps per second" in report.headline and len(report.rows) == 1
+    assert "environment steps per second" in report.headline and len(report.rows) == 5
     json.dumps(figures, allow_nan=False)
+
+
+def test_other_environments_are_only_trained_on() -> None:
+    figures = measure("dorothie_gym/CoWizard-v0", environments=2, workers=0, steps=256)
+    assert figures["batch_steps_per_second"] is None and figures["end_to_end_steps_per_second"] > 0.0
+    assert len(rl_report(figures).rows) == 1
 
 
 def test_off_policy_algorithm_is_refused() -> None:
