@@ -79,7 +79,9 @@ def _dtype_of(kind: type) -> np.dtype[np.void]:
     for name in hints:
         if hasattr(np.record, name):
             raise TypeError(f"{kind.__name__}.{name} has the name of an attribute of NumPy's records")
-    return np.dtype([(name, *hint.__metadata__) for name, hint in hints.items()], align=True)
+    fields = np.dtype([(name, *hint.__metadata__) for name, hint in hints.items()], align=True)
+    # of the scalar type of `recarray`: otherwise each array of records would make a dtype of its own
+    return np.dtype((np.record, fields))
 
 
 def empty_records(kind: type[Record], count: int) -> RecordArray[Record]:

@@ -157,7 +157,8 @@ class WorldArrays(NamedTuple):
 
 def _copy_of(array: NDArray[np.generic]) -> NDArray[np.generic]:
     """Returns a copy with all bytes, also those between the fields of records, which NumPy leaves out."""
-    copied = np.frombuffer(bytearray(array.tobytes()), dtype=array.dtype).reshape(array.shape)
+    copied = np.empty(array.shape, dtype=array.dtype)
+    np.copyto(copied.view(np.uint8), np.ascontiguousarray(array).view(np.uint8))
     return copied.view(np.recarray) if array.dtype.names else copied
 
 
