@@ -368,10 +368,7 @@ class DrivingBatch(Lookups):
         self.share(act_share, self.worlds, self._drivers, self._drives, self.frames)
         while (waiting := np.flatnonzero(state["stage"])).size:
             for number in waiting.tolist():
-                if state["stage"][number] == Stage.NO_SPACE:
-                    self._make_room(lengthened(self._rows[number]))
-                else:
-                    self._look(number)
+                self._make_room(lengthened(self._rows[number]))
             self.share(act_share, self.worlds, self._drivers, self._drives, self.frames)
         for number in list(self._faulty):
             self._look(number)
@@ -419,7 +416,7 @@ class DrivingBatch(Lookups):
         return face
 
     def _look(self, number: int) -> None:
-        """Updates what the ego sees after a change of lights, weather or faults."""
+        """Updates what the ego sees after a change of weather or faults."""
         world = self._face(number).live.world
         self._rows[number] = world.sensing_arrays  # the same arrays, with the present visibility
         if world.faults:

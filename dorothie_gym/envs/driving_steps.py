@@ -44,6 +44,7 @@ from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.ego.manoeuvres import command
 from dorothie_gym.sim.network.centre_lines import position_on
+from dorothie_gym.sim.sensing.perception import switch_lamps
 from dorothie_gym.sim.state.codes import J_TURN, LANE_FOLLOW, LANE_SWITCH, START, STOP, U_TURN, Refusal
 from dorothie_gym.sim.step import step
 
@@ -71,15 +72,13 @@ class Stage(enum.IntEnum):
     """The half is done."""
     ACTING = 1
     """The action is still to be carried out."""
-    MOVING = 2
-    """The physics is still to be stepped: the head lights were switched, and with them the ego's sight."""
-    NO_SPACE = 3
+    NO_SPACE = 2
     """The path does not fit into the arrays: to be repeated with longer ones, see `world_arrays.lengthened`."""
-    NO_COSTS = 4
+    NO_COSTS = 3
     """The costs to the goal are missing, because a roadblock has been seen."""
 
 
-_DONE, _ACTING, _MOVING, _NO_SPACE, _NO_COSTS = map(int, Stage)
+_DONE, _ACTING, _NO_SPACE, _NO_COSTS = map(int, Stage)
 
 
 class DriveRecord:
@@ -155,15 +154,11 @@ def act(town: TownArrays, world: WorldArrays, driver: DriverArrays, drive: Drive
     state = drive.state[0]
     if not state.halfway:
         state.speed, state.since = world.vehicles[0].speed, world.clock[0].frame / FRAME_RATE
-        lights = world.plan[0].lights
         refusal = carry_out(town, world, driver, state)
         if refusal == Refusal.NO_SPACE:
             state.stage = _NO_SPACE
             return
         state.refusal, state.halfway = refusal, True
-        if world.plan[0].lights != lights:
-            state.stage = _MOVING
-            return
     if step(town, world, frames, 1.0 / FRAME_RATE) == Refusal.NO_SPACE:
         state.stage = _NO_SPACE
         return
@@ -184,6 +179,7 @@ def carry_out(town: TownArrays, world: WorldArrays, driver: DriverArrays, state:
         return Refusal.NONE
     if number == _LIGHTS:
         plan.lights = not plan.lights
+        switch_lamps(world.eye[0], plan.lights)
         return Refusal.NONE
     if number == _FASTER or number == _SLOWER:
         if not _may_change_cruise(plan.cruise, number == _FASTER):
@@ -306,7 +302,7 @@ def act_share(
     turns: NDArray[np.int64], home: int, town: TownArrays, worlds: WorldArrays, drivers: DriverArrays,
     drives: DriveArrays, frames: int,
 ) -> None:  # fmt: skip
-    """Calls `act` for the environments whose stage is `ACTING`, `MOVING` or `NO_SPACE`, until all are taken.
+    """Calls `act` for the environments whose stage is `ACTING` or `NO_SPACE`, until all are taken.
 
     Args:
         turns: numbers of the environments, see `threads.take`.

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,8 +11,15 @@ from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.sim.ego.limits import MAX_BRAKING
 from dorothie_gym.sim.ego.obstacles import SIDE_MARGIN
-from dorothie_gym.sim.sensing.perception import MOST_SIGMAS, detection_probability, position_error
+from dorothie_gym.sim.sensing.perception import (
+    MOST_SIGMAS,
+    Perception,
+    detection_probability,
+    position_error,
+    switch_lamps,
+)
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, DENSEST_FOG, SHORTEST_SIGHT, Visibility
+from dorothie_gym.sim.state.records import EyeRecord, empty_records
 from dorothie_gym.sim.weather import WET_LOSS, Weather
 
 P = WeatherParameter
@@ -24,6 +32,14 @@ DIMMING = (P.FOG_DENSITY, P.PRECIPITATION, P.CLOUDINESS)
 CLEARING = (P.SUN_ALTITUDE_ANGLE, P.FOG_DISTANCE, P.FOG_FALLOFF)
 IDLE = (P.WIND_INTENSITY, P.SUN_AZIMUTH_ANGLE, P.WETNESS, P.PRECIPITATION_DEPOSITS)
 WETTING = (P.WETNESS, P.PRECIPITATION_DEPOSITS, P.PRECIPITATION)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_before() -> None:
+    """Compiles what the examples of properties call, which hypothesis times."""
+    view = Weather().visibility(lights=True)
+    detection_probability(view, 2 * view.sight)
+    switch_lamps(empty_records(EyeRecord, 1)[0], True)
 
 
 def weather_of(shares: dict[WeatherParameter, float]) -> Weather:
@@ -89,6 +105,25 @@ def test_headlights_never_reduce_sight(sky: dict[WeatherParameter, float], dista
     on, off = weather.visibility(lights=True), weather.visibility(lights=False)
     assert on.sight >= off.sight
     assert on.gain(distance) >= off.gain(distance)
+
+
+@given(SKIES, st.booleans(), st.sampled_from([1.0, 0.25, 0.0]))
+def test_switched_headlights_show_what_the_weather_allows(
+    sky: dict[WeatherParameter, float], on: bool, clarity: float
+) -> None:
+    weather, perception = weather_of(sky), Perception(np.random.default_rng(0))
+    switched, opened = empty_records(EyeRecord, 1), empty_records(EyeRecord, 1)
+    perception.open(switched, weather.visibility(lights=not on, clarity=clarity))
+    switch_lamps(switched[0], on)
+    perception.open(opened, weather.visibility(lights=on, clarity=clarity))
+    assert switched.tolist() == opened.tolist()
+
+
+@given(SKIES, st.booleans())
+def test_sight_ends_where_the_signal_does(sky: dict[WeatherParameter, float], lights: bool) -> None:
+    view = weather_of(sky).visibility(lights=lights)
+    if SHORTEST_SIGHT < view.sight < CLEAR_SIGHT:
+        assert view.signal(view.sight) >= 1.0 > view.signal(view.sight + 1e-6)
 
 
 def test_headlights_help_in_the_dark_only() -> None:

@@ -16,7 +16,15 @@ from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
-from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, SHORTEST_SIGHT, Visibility, gain, signal
+from dorothie_gym.sim.sensing.visibility import (
+    CLEAR_SIGHT,
+    HEAD_LIGHTS,
+    SHORTEST_SIGHT,
+    Visibility,
+    gain,
+    sight_in,
+    signal,
+)
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, Group, Kind, Walk
 from dorothie_gym.sim.state.records import (
     EyeRecord,
@@ -125,6 +133,15 @@ def look_around(world: WorldArrays, frame: int, table: Array) -> int:
         table[k, 4], table[k, 5], table[k, 6] = body.heading, body.length, body.width
         table[k, 7], table[k, 8] = body.speed, body.height
     return count
+
+
+@compiled
+def switch_lamps(eye: EyeRecord, on: bool) -> None:
+    """Switches the head lights in the visibility of an ego; air, light and clarity stay as they are."""
+    eye.lamps = HEAD_LIGHTS if on else 0.0
+    eye.sight = sight_in(eye.fog, eye.fog_start, eye.rain, eye.light, eye.lamps, eye.clarity)
+    far = gain(eye.fog, eye.fog_start, eye.rain, eye.light, eye.lamps, eye.clarity, CLEAR_SIGHT)
+    eye.clear = far >= 1.0
 
 
 @compiled

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.compilation import allocating
+from dorothie_gym.compilation import compiled
 from dorothie_gym.copying import shared
 
 CLEAR_SIGHT = 80.0
@@ -106,13 +106,13 @@ def daylight(altitude: float, cloudiness: float) -> float:
     return float(clear * (1.0 - 0.75 * cloudiness**3.4))
 
 
-@allocating
+@compiled
 def transmission(fog: float, fog_start: float, rain: float, distance: float) -> float:
     """Returns the share of the contrast that the air leaves over a distance [m]; the rest as in `Visibility`."""
     return math.exp(-fog * max(distance - fog_start, 0.0) - rain * distance)
 
 
-@allocating
+@compiled
 def gain(
     fog: float, fog_start: float, rain: float, light: float, lamps: float, clarity: float, distance: float
 ) -> float:
@@ -124,11 +124,26 @@ def gain(
     return clarity * air * min(1.0, math.sqrt(light / FULL_LIGHT))
 
 
-@allocating
+@compiled
 def signal(gain: float, distance: float) -> float:
     """Returns the signal S of a body at a distance [m], 1 at the edge of sight on a clear day, by its gain."""
     nearness = CLEAR_SIGHT / max(distance, 1.0)
     return nearness * nearness * gain
+
+
+@compiled
+def sight_in(fog: float, fog_start: float, rain: float, light: float, lamps: float, clarity: float) -> float:
+    """Returns the range within which all bodies are perceived [m], see `Visibility`."""
+    if signal(gain(fog, fog_start, rain, light, lamps, clarity, CLEAR_SIGHT), CLEAR_SIGHT) >= 1.0:
+        return CLEAR_SIGHT
+    near, far = 0.0, CLEAR_SIGHT
+    for _ in range(_BISECTIONS):
+        middle = (near + far) / 2
+        if signal(gain(fog, fog_start, rain, light, lamps, clarity, middle), middle) >= 1.0:
+            near = middle
+        else:
+            far = middle
+    return max(near, SHORTEST_SIGHT)
 
 
 @shared
@@ -167,13 +182,7 @@ class Visibility:
     @functools.cached_property
     def sight(self) -> float:
         """Range within which all bodies are perceived [m], in [SHORTEST_SIGHT, CLEAR_SIGHT]."""
-        if self.signal(CLEAR_SIGHT) >= 1.0:
-            return CLEAR_SIGHT
-        near, far = 0.0, CLEAR_SIGHT
-        for _ in range(_BISECTIONS):
-            middle = (near + far) / 2
-            near, far = (middle, far) if self.signal(middle) >= 1.0 else (near, middle)
-        return max(near, SHORTEST_SIGHT)
+        return float(sight_in(self.fog, self.fog_start, self.rain, self.light, self.lamps, self.clarity))
 
     @functools.cached_property
     def is_clear(self) -> bool:
