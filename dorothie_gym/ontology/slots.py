@@ -32,6 +32,7 @@ class SlotEnum(Enum):
     """
 
     label: str
+    _hash: int
     _slot: ClassVar[Slot]
 
     # No member uses the default: it lets type checkers accept the look-up by number, `Enum(3)`.
@@ -45,12 +46,14 @@ class SlotEnum(Enum):
     # Enum hashes the name of a member, and Python salts string hashes per process: the order of sets would differ.
     def __hash__(self) -> int:
         """Returns a hash that is equal in all processes."""
-        return 32 * self.slot.value + int(self.value)
+        return self._hash
 
     def __init_subclass__(cls, *, slot: Slot) -> None:
         """Stores the slot of the values of a class."""
         super().__init_subclass__()
         cls._slot = slot
+        for member in cls:
+            member._hash = 32 * slot.value + int(member.value)
 
     @property
     def slot(self) -> Slot:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import LandmarkName
 from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, categories, find_kind, kinds_in, map_labels
 from dorothie_gym.tasks.storyboard import (
+    Dependent,
     Landmark,
     LandmarkSite,
     Storyboard,
@@ -45,42 +47,51 @@ def cast(template: StoryboardTemplate, rng: np.random.Generator | None = None) -
         for ref in template.destinations()
         if variable_of(ref) is None and (kind := find_kind(ref)) is not None
     }
-    _check_categories(template)
-    candidates = [_candidates(template, variable) for variable in template.variables]
-    chosen = _assign(candidates, tuple(fixed.values()), rng)
+    chosen = _assign(_roles(template.variables, template.dependents, template.name), tuple(fixed.values()), rng)
     if chosen is None:
         raise StoryboardError(template.name, "variables", _shortage(template, fixed))
     names = (f"${variable.name}" for variable in template.variables)
     return fixed | dict(zip(names, chosen, strict=True))
 
 
-def _check_categories(template: StoryboardTemplate) -> None:
-    """Raises a `StoryboardError` that lists the kinds of places that the ontology lacks."""
-    lacking = [variable for variable in template.variables if not kinds_in(variable.category)]
+@lru_cache(maxsize=64)
+def _roles(
+    variables: tuple[Variable, ...], dependents: tuple[Dependent, ...], story: str
+) -> tuple[tuple[LandmarkKind, ...], ...]:
+    """Returns the kinds that each variable of a storyboard of a name may stand for.
+
+    Raises:
+        StoryboardError: the ontology has none for one of them.
+    """
+    lacking = [variable for variable in variables if not kinds_in(variable.category)]
     if lacking:
         kinds = ", ".join(f"{variable.category!r} ({variable.name})" for variable in lacking)
         known = ", ".join(("places", *categories()))
         reason = f"no landmark is of category {kinds}; use one of {known}"
-        raise StoryboardError(template.name, f"variables.{lacking[0].name}", reason)
+        raise StoryboardError(story, f"variables.{lacking[0].name}", reason)
+    return tuple(
+        _candidates(variable, [row for row in dependents if row.variable == variable.name], story)
+        for variable in variables
+    )
 
 
-def _candidates(template: StoryboardTemplate, variable: Variable) -> tuple[LandmarkKind, ...]:
+def _candidates(variable: Variable, dependents: Sequence[Dependent], story: str) -> tuple[LandmarkKind, ...]:
+    """Returns the kinds that a variable may stand for, by its own dependents."""
     kinds = kinds_in(variable.category)
-    dependents = [row for row in template.dependents if row.variable == variable.name]
     for attribute, number in Counter(row.attribute for row in dependents).items():
         field = f"dependents.{next(row.name for row in dependents if row.attribute == attribute)}"
         having = tuple(kind for kind in kinds if attribute in kind.attributes)
         if not having:
             known = ", ".join(sorted({name for kind in kinds for name in kind.attributes})) or "none"
             reason = f"no landmark of {variable.category!r} has the attribute {attribute!r}; it has: {known}"
-            raise StoryboardError(template.name, field, reason)
+            raise StoryboardError(story, field, reason)
         kinds = tuple(kind for kind in having if len(kind.attributes[attribute]) >= number)
         if not kinds:
             most = max(len(kind.attributes[attribute]) for kind in having)
             reason = (
                 f"{number} different {variable.name}.{attribute} are requested, but only {most} exist; request fewer"
             )
-            raise StoryboardError(template.name, field, reason)
+            raise StoryboardError(story, field, reason)
     return kinds
 
 
@@ -125,14 +136,18 @@ def spread_places(places: Sequence[LandmarkSite], count: int, rng: np.random.Gen
     Returns:
         Distinct sites, in descending order of spread.
     """
-    shuffled = [places[k] for k in rng.permutation(len(places))]
+    shuffled = [places[k] for k in rng.permutation(len(places)).tolist()]
     chosen: list[LandmarkSite] = []
     for fresh_lane in (True, False):
-        for place in tuple(shuffled):
-            lane_is_taken = fresh_lane and any(place.lane == other.lane for other in chosen)
-            if len(chosen) < count and not lane_is_taken and _gap(place, chosen) >= SITE_SPACING:
+        lanes = {place.lane for place in chosen}
+        left = []
+        for place in shuffled:
+            if len(chosen) == count or (fresh_lane and place.lane in lanes) or _gap(place, chosen) < SITE_SPACING:
+                left.append(place)
+            else:
                 chosen.append(place)
-                shuffled.remove(place)
+                lanes.add(place.lane)
+        shuffled = left
     while len(chosen) < count:
         farthest = max(range(len(shuffled)), key=lambda k: _gap(shuffled[k], chosen))
         chosen.append(shuffled.pop(farthest))
@@ -141,10 +156,10 @@ def spread_places(places: Sequence[LandmarkSite], count: int, rng: np.random.Gen
 
 def _gap(place: LandmarkSite, others: Sequence[LandmarkSite]) -> float:
     """Returns the smallest distance to other sites, between landmarks or between waypoints [m]."""
-    return min(
-        (min(math.dist(place.position, other.position), math.dist(place.waypoint, other.waypoint)) for other in others),
-        default=math.inf,
-    )
+    gap, position, waypoint = math.inf, place.position, place.waypoint
+    for other in others:
+        gap = min(gap, math.dist(position, other.position), math.dist(waypoint, other.waypoint))
+    return gap
 
 
 def bind(

@@ -81,6 +81,11 @@ def map_label(name: LandmarkName) -> str:
 
 def map_labels(names: Sequence[LandmarkName]) -> tuple[str, ...]:
     """Returns the names of landmarks on maps; those that occur more than once are numbered."""
+    return _map_labels(tuple(names))
+
+
+@functools.lru_cache(maxsize=256)
+def _map_labels(names: tuple[LandmarkName, ...]) -> tuple[str, ...]:
     numbers: Counter[LandmarkName] = Counter()
     labels = []
     for name in names:
