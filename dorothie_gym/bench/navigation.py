@@ -13,8 +13,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from dorothie_gym.bench.timing import Figures, Progress, ignore_progress, rounded, wall_seconds
+from dorothie_gym.envs.driving_arrays import row_of
 from dorothie_gym.envs.driving_batch import DrivingBatch
-from dorothie_gym.envs.driving_steps import row_of
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 from dorothie_gym.sim.batch.worlds import VectorWorld

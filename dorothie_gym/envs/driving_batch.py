@@ -16,27 +16,18 @@ from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.engine.session_engine import LiveSession
-from dorothie_gym.envs.driving_steps import (
-    BEGINS,
-    CRUISE_LIMIT,
-    PLAYS,
-    DriveArrays,
-    DriveRecord,
-    DrivingTown,
-    Stage,
-    act_share,
-    guide_share,
-    row_of,
-)
+from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, DriveArrays, DriveRecord, DrivingTown, Stage, row_of
+from dorothie_gym.envs.driving_steps import act_share, guide_share
 from dorothie_gym.envs.episode import EpisodeArrays, episode_arrays
 from dorothie_gym.envs.interference import Interference
 from dorothie_gym.envs.navigation_config import NavigationConfig
+from dorothie_gym.envs.pedals import CONTINUOUS_FIELDS
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.route_arrays import empty_search
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.routing_graph import routing_graph
-from dorothie_gym.ontology import LandmarkName, MentalAction, PhysicalAction
-from dorothie_gym.policies.navigation.actions import ACTIONS, PLAIN_ACTIONS
+from dorothie_gym.ontology import LandmarkName, MentalAction, PhysicalAction, Role
+from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.cost_to_go import cost_table
 from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_arrays
 from dorothie_gym.policies.navigation.instructor import Guidance, NavigationInstruction, exit_sectors, instruction_of
@@ -47,6 +38,7 @@ from dorothie_gym.policies.route_tables import route_tables
 from dorothie_gym.sim.batch.threads import ThreadPool, turns_of
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL
+from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.sim.ego.planner import REASONS
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Refusal
@@ -75,6 +67,7 @@ class DrivingFace:
         notes: belief updates that wait to be sent.
         version: version of the task that the row knows.
         refused: reasons for the refusals of belief updates at the last decision.
+        seen: observations for the Ad-Wizard's next action, if they were built before the path was replaced.
     """
 
     live: LiveSession
@@ -82,6 +75,7 @@ class DrivingFace:
     notes: list[Mental] = field(default_factory=list)
     version: int = -1
     refused: list[str] = field(default_factory=list)
+    seen: LazyObservations | None = None
 
 
 class DrivingBatch(Lookups):
@@ -93,13 +87,16 @@ class DrivingBatch(Lookups):
     Attributes:
         town: the map.
         faces: present session of each environment; None before its first.
+        frames: substeps of a decision.
+        pedals: whether the agents use throttle, steering and brake.
         threads: number of threads, the caller's included.
     """
 
     LOOKED_UP: ClassVar[tuple[str, ...]] = ("_pool", "_rows")
 
     def __init__(
-        self, town: Town, template: StoryboardTemplate | None, config: NavigationConfig, count: int, threads: int
+        self, town: Town, template: StoryboardTemplate | None, config: NavigationConfig, count: int, threads: int,
+        *, pedals: bool = False,
     ) -> None:  # fmt: skip
         """Prepares for sessions.
 
@@ -109,6 +106,7 @@ class DrivingBatch(Lookups):
             config: settings.
             count: number of environments.
             threads: number of threads at most.
+            pedals: whether the agents use throttle, steering and brake; else they choose a `NavigationAction`.
         """
         self.town, self._template, self._config, self._count = town, template, config, count
         self.threads = max(1, min(threads, count))
@@ -120,8 +118,12 @@ class DrivingBatch(Lookups):
         first = town.sites[0]
         self._common = DrivingTown(
             exit_sectors(town), np.zeros((1, len(cost_table(town, (first.lane, first.station)).costs))),
-            config.session_config.frames, float(config.max_seconds),
+            float(config.max_seconds), pedals,
         )  # fmt: skip
+        self.frames, self.pedals = config.session_config.frames, pedals
+        self._size, self._actions = (
+            (sum(CONTINUOUS_FIELDS.values()), 0) if pedals else (sum(FIELDS.values()), len(ACTIONS))
+        )
         self.faces: list[DrivingFace | None] = [None] * count
         self._stacks: list[Any] = []
         self._due, self._waited = np.full(count, math.inf), np.zeros(count, dtype=np.int64)
@@ -181,11 +183,6 @@ class DrivingBatch(Lookups):
         return cast(DriveArrays, self._stacks[4])
 
     @property
-    def frames(self) -> int:
-        """Substeps of a decision."""
-        return self._common.frames
-
-    @property
     def observations(self) -> Vector:
         """Observations at the present decision (environments, n), to be copied."""
         return self._drivers.vector
@@ -228,11 +225,9 @@ class DrivingBatch(Lookups):
         face, state = self.faces[number], self._decisions[number]
         reasons = list(face.refused) if face is not None and state["refused"] else []
         if state["refusal"] > 0:
-            action = PLAIN_ACTIONS.get(int(state["action"]))
-            order = PhysicalAction.J_TURN if action is None else action.action
             known = state["refusal"] != CRUISE_LIMIT
             reason = REASONS[Refusal(int(state["refusal"]))] if known else CRUISE_REFUSAL
-            reasons.append(f"{order.label}: {reason}")
+            reasons.append(f"{PhysicalAction(int(state['order'])).label}: {reason}")
         return reasons
 
     @property
@@ -267,21 +262,20 @@ class DrivingBatch(Lookups):
             seeds: seed of the session by environment.
             scenario: scenario to play instead of drawn ones.
         """
-        flags = np.zeros(self._count, dtype=np.int8)
         for number, seed in seeds.items():
             played = draw_scenario(self.town, self._template, seed) if scenario is None else scenario
             live = LiveSession(self.town, self._network, played, self._config.session_config, self._limits)
             self._put(number, live)
-            flags[number] = BEGINS
-        self._decisions["refusal"][list(seeds)] = self._decisions["refused"][list(seeds)] = 0
-        self._guide(flags)
+        self._guide()
 
     def _put(self, number: int, live: LiveSession) -> None:
         """Moves a session that begins into a row."""
         world, config = live.world, self._config
+        if self.pedals:
+            world.ego.manual = VehicleControl(throttle=0.0, steer=0.0, brake=0.0)
         face = DrivingFace(live, Interference(live, config.exceptions) if config.exceptions > 0.0 else None)
         fresh = (
-            world.sensing_arrays, driver_arrays(sum(FIELDS.values()), len(ACTIONS), _streets(live)),
+            world.sensing_arrays, driver_arrays(self._size, self._actions, _streets(live)),
             self._guidance_of(live), episode_arrays(config), self._drive_of(live),
         )  # fmt: skip
         if not self._stacks:
@@ -332,7 +326,8 @@ class DrivingBatch(Lookups):
             empty_records(DriveRecord, 1), np.zeros(self._limits.landmarks, dtype=np.int32),
             np.full((self._limits.landmarks, 2), math.inf),
         )  # fmt: skip
-        arrays.state["landmark"] = arrays.state["goal_lane"] = -1
+        arrays.state["landmark"] = arrays.state["goal_lane"] = arrays.state["told_lane"] = -1
+        arrays.state["stage"], arrays.state["begins"] = Stage.GUIDING, True
         for row, landmark in enumerate(landmarks):
             arrays.waypoints[row] = landmark.waypoint
             arrays.rows[row] = self._row_of_costs((landmark.lane, landmark.station), ())
@@ -352,35 +347,50 @@ class DrivingBatch(Lookups):
 
     # --- A decision ---------------------------------------------------------------------------------------------------
 
-    def play(self, actions: NDArray[np.int64], playing: NDArray[np.bool_]) -> None:
+    def play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
         """Plays a decision in some environments.
 
         Args:
-            actions: `NavigationAction` of each environment (n,).
+            actions: `NavigationAction` of each environment (n,), or throttle, steering and brake of each (n, 3).
             playing: environments that play (n,).
         """
         state = self._decisions
-        state["action"], state["refused"], state["refusal"] = actions, 0, 0
+        if self.pedals:
+            plan = plain(self.worlds.plan)[:, 0]
+            for k, name in enumerate(("throttle", "steer", "brake")):
+                plan[name][playing] = actions[playing, k]
+        else:
+            state["action"] = actions
+        state["refused"], state["refusal"] = 0, 0
         state["stage"] = np.where(playing, Stage.ACTING, Stage.DONE)
         self._interfere(playing)
         for number in [number for number in self._noted if playing[number]]:
             self._send_note(number)
-        self.share(act_share, self.worlds, self._drivers, self._drives, self.frames)
-        while (waiting := np.flatnonzero(state["stage"])).size:
-            for number in waiting.tolist():
-                self._make_room(lengthened(self._rows[number]))
-            self.share(act_share, self.worlds, self._drivers, self._drives, self.frames)
+        self._act()
         for number in list(self._faulty):
             self._look(number)
         for number in np.flatnonzero(state["near"] & playing).tolist():
             self._arrive(number)
-        self._guide(playing.astype(np.int8) * np.int8(PLAYS))
+        self._foresee(playing)
+        self._guide()
 
-    def _guide(self, flags: NDArray[np.int8]) -> None:
-        """Plays the second half of a decision; `flags` (n,) are `PLAYS`, `BEGINS` or 0."""
-        self._share_guide(flags)
+    def _act(self) -> None:
+        """Plays the first half of a decision, or lays new paths."""
         state = self._decisions
-        missing = np.flatnonzero((state["stage"] == Stage.NO_COSTS) & (flags > 0))
+        self._share_act()
+        while (waiting := np.flatnonzero((state["stage"] == Stage.MOVING) | (state["stage"] == Stage.NO_SPACE))).size:
+            for number in waiting.tolist():
+                if state["stage"][number] == Stage.NO_SPACE:
+                    self._make_room(lengthened(self._rows[number]))
+                else:
+                    self._look(number)
+            self._share_act()
+
+    def _guide(self) -> None:
+        """Plays the second half of a decision."""
+        self._share_guide()
+        state = self._decisions
+        missing = np.flatnonzero(state["stage"] == Stage.NO_COSTS)
         if missing.size:
             for number in missing.tolist():
                 guidance = row_of(self._guidances, number)
@@ -388,17 +398,21 @@ class DrivingBatch(Lookups):
                 closed = plain(guidance.closed)[: int(plain(guidance.route)["closed"][0])]
                 blocked = tuple((lane, station) for station, lane in closed.tolist())
                 state["new_costs"][number] = self._row_of_costs((int(mark["lane"]), float(mark["station"])), blocked)
-            again = np.zeros_like(flags)
-            again[missing] = flags[missing]
-            self._share_guide(again)
-        spoken = (state["said"] & (plain(self._guidances.said)[:, 0]["landmark"] >= 0)) | state["fresh"]
-        for number in np.flatnonzero(spoken & (flags > 0)).tolist():
+            self._share_guide()
+        if self.pedals and (state["stage"] == Stage.LOST).any():
+            self._act()
+            self._share_guide()
+        for number in np.flatnonzero(state["told"]).tolist():
             self._note_goal(number)
+            state["told"][number] = False
 
-    def _share_guide(self, flags: NDArray[np.int8]) -> None:
+    def _share_act(self) -> None:
+        self.share(act_share, self._exits, self.worlds, self._drivers, self._drives, self.frames, self.pedals)
+
+    def _share_guide(self) -> None:
         self.share(
             guide_share, self._exits, self._tables, self._graph, self._searches, self._common, self.worlds,
-            self._drivers, self._guidances, self._episodes, self._drives, flags,
+            self._drivers, self._guidances, self._episodes, self._drives,
         )  # fmt: skip
 
     def share(self, work: Callable[..., None], *arguments: object) -> None:
@@ -419,6 +433,7 @@ class DrivingBatch(Lookups):
         """Updates what the ego sees after a change of weather or faults."""
         world = self._face(number).live.world
         self._rows[number] = world.sensing_arrays  # the same arrays, with the present visibility
+        self._decisions["faulty"][number] = bool(world.faults)
         if world.faults:
             self._faulty.add(number)
         else:
@@ -434,7 +449,8 @@ class DrivingBatch(Lookups):
             assert face.interference is not None
             face.interference.wait(int(self._waited[number]))
             face.live.begin_decision()
-            face.live.play_ad_wizard(face.interference.act(LazyObservations(face.live)))
+            seen, face.seen = face.seen or LazyObservations(face.live), None
+            face.live.play_ad_wizard(face.interference.act(seen))
             self._move_in(number)
             self._due[number] = face.interference.due
             self._look(number)
@@ -443,6 +459,16 @@ class DrivingBatch(Lookups):
             self._note_task(number)
         self._waited[acts] = 0
         self._waited[playing & ~acts] += 1
+
+    def _foresee(self, playing: NDArray[np.bool_]) -> None:
+        """Lets the Ad-Wizards that may act next observe the path that was driven, before it may be replaced."""
+        if self._config.exceptions <= 0.0 or not self.pedals:
+            return
+        acts = playing & (plain(self.worlds.clock)[:, 0]["frame"] / FRAME_RATE >= self._due)
+        for number in np.flatnonzero(acts).tolist():
+            face = self._face(number)
+            face.seen = LazyObservations(face.live)
+            face.seen[Role.AD_WIZARD]
 
     def _send_note(self, number: int) -> None:
         """Sends a belief update of the Co-Wizard, which changes where the car slows down."""
@@ -481,19 +507,16 @@ class DrivingBatch(Lookups):
 
     def _note_goal(self, number: int) -> None:
         """Queues the belief updates for a goal: a place on the map, or one as far ahead as was said."""
-        face, guidance, state = self._face(number), row_of(self._guidances, number), self._decisions[number]
-        said = plain(guidance.said)[0]
+        face, state = self.faces[number], self._decisions[number]
+        assert face is not None
+        said = plain(self._guidances.said)[number, 0]
         if state["fresh"]:
             face.notes = [Mental(action=MentalAction.GOAL_UPDATE)]
         if state["said"] and said["landmark"] >= 0:
             name = LandmarkName(int(said["landmark"]))
             face.notes = [Mental(action=MentalAction.GOAL_UPDATE, goals=(name,))]
-            mark = plain(guidance.marks)[int(plain(guidance.route)["landmark"][0])]
-            if said["action"] >= 0 and not mark["known"]:
-                planner = face.live.world.planner
-                path = planner.path
-                k = path.index_at(min(planner.s + float(said["distance"]), path.length))
-                place = LanePosition(lane=int(path.lanes[k]), metres=int(float(path.stations[k])))
+            if state["told_lane"] >= 0:
+                place = LanePosition(lane=int(state["told_lane"]), metres=int(state["told_station"]))
                 face.notes.append(Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=place))
         self._noted.add(number)
 

@@ -7,21 +7,19 @@ so in `DriveRecord.stage`.
 
 from __future__ import annotations
 
-import enum
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, concurrent
-from dorothie_gym.compilation.by_reference import by_reference, gives_row
-from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray
+from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, DriveArrays, DriveRecord, DrivingTown, Stage, row_of
 from dorothie_gym.envs.episode import EpisodeArrays, judge
-from dorothie_gym.maps.model import Array
+from dorothie_gym.envs.pedals import find_path, has_lost_path, instructed_manoeuvre, observe_path
 from dorothie_gym.maps.route_arrays import RouteSearch
 from dorothie_gym.maps.routing_graph import RoutingGraph
-from dorothie_gym.ontology import ARRIVAL_DISTANCE, SPEED_STEP, DialogueMove
+from dorothie_gym.ontology import ARRIVAL_DISTANCE, SPEED_STEP, DialogueMove, PhysicalAction
 from dorothie_gym.policies.navigation.actions import (
     FIRST_TURN,
     LEFT,
@@ -40,6 +38,7 @@ from dorothie_gym.policies.route_tables import RouteTables
 from dorothie_gym.sim.batch.threads import take
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.briefing import note_props
+from dorothie_gym.sim.ego.course import point_before
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.ego.manoeuvres import command
@@ -47,13 +46,11 @@ from dorothie_gym.sim.network.centre_lines import position_on
 from dorothie_gym.sim.sensing.perception import switch_lamps
 from dorothie_gym.sim.state.codes import J_TURN, LANE_FOLLOW, LANE_SWITCH, START, STOP, U_TURN, Refusal
 from dorothie_gym.sim.step import step
+from dorothie_gym.sim.traffic.parameters import FRAMES
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
-
-CRUISE_LIMIT: Final = 100
-"""Refusal of a cruise speed out of its range; the other codes are those of `codes.Refusal`."""
 
 NEAR_WAYPOINT: Final = ARRIVAL_DISTANCE + 1e-6
 """Distance within which Python looks whether the ego has arrived [m]."""
@@ -62,107 +59,54 @@ _NOTHING, _FOLLOW, _SWITCH_LEFT, _SWITCH_RIGHT, _ROUND, _STOP, _START, _FASTER, 
     int(action) for action in NavigationAction if action < FIRST_TURN
 )
 _INSTRUCT = int(DialogueMove.INSTRUCT.value)
+_SPEED_CHANGE, _LIGHT_CHANGE = int(PhysicalAction.SPEED_CHANGE.value), int(PhysicalAction.LIGHT_CHANGE.value)
 _may_change_cruise = compiled(may_change_cruise)
 
 
-class Stage(enum.IntEnum):
-    """Progress of a decision."""
-
-    DONE = 0
-    """The half is done."""
-    ACTING = 1
-    """The action is still to be carried out."""
-    NO_SPACE = 2
-    """The path does not fit into the arrays: to be repeated with longer ones, see `world_arrays.lengthened`."""
-    NO_COSTS = 3
-    """The costs to the goal are missing, because a roadblock has been seen."""
-
-
-_DONE, _ACTING, _NO_SPACE, _NO_COSTS = map(int, Stage)
-
-
-class DriveRecord:
-    """Decision of an environment."""
-
-    speed: Float  # of the ego at its beginning [m/s]
-    since: Float  # time of its beginning [s]
-    goal_station: Float  # goal that progress is measured to [m]
-    goal_lane: Int32  # -1 for none
-    costs: Int32  # row of the costs to it
-    new_costs: Int32  # row of the costs that were missing
-    closed: Int32  # number of closed places that these costs know
-    landmark: Int32  # landmark of the goal, -1 for none
-    action: Int32  # `NavigationAction`
-    stage: Int32  # `Stage`
-    refusal: Int32  # `codes.Refusal` or `CRUISE_LIMIT`
-    refused: Int32  # belief updates that were refused before
-    acted: Flag  # whether a physical action was chosen
-    halfway: Flag  # whether the action is carried out, and only the physics is to be repeated
-    near: Flag  # whether the ego stands near a waypoint
-    said: Flag  # whether an instruction was given at this decision
-    fresh: Flag  # whether the goal has changed at this decision
-
-
-@by_reference
-class DriveArrays(NamedTuple):
-    """Decision of an environment in arrays, or of each of a batch.
-
-    Attributes:
-        state: (1,) the decision.
-        rows: int32 (landmarks,) row of the costs to each landmark, without roadblocks.
-        waypoints: (landmarks, 2) places where the ego arrives [m].
-    """
-
-    state: RecordArray[DriveRecord]
-    rows: NDArray[np.int32]
-    waypoints: Array
-
-
-@by_reference
-class DrivingTown(NamedTuple):
-    """What all environments of a town share, besides its arrays.
-
-    Attributes:
-        sectors: int32 sector of each exit of the route tables, or -1.
-        costs: (rows, cells + lanes) costs to goals, see `cost_to_go.cost_from`.
-        frames: substeps of a decision.
-        max_seconds: time limit of an episode [s].
-    """
-
-    sectors: NDArray[np.int32]
-    costs: Array
-    frames: int
-    max_seconds: float
-
-
-T = TypeVar("T")
-
-
-@gives_row
-def row_of(batch: T, number: int) -> T:
-    """Returns a row of each array of a named tuple: views, of the same types as those of a single environment."""
-    row: T = type(batch)._make(array[number] for array in batch)  # type: ignore[attr-defined]  # of named tuples
-    return row
+_DONE, _ACTING, _MOVING, _NO_SPACE, _GUIDING, _NO_COSTS, _LOST, _OBSERVING = map(int, Stage)
 
 
 # --- Action and physics -----------------------------------------------------------------------------------------------
 
 
 @compiled
-def act(town: TownArrays, world: WorldArrays, driver: DriverArrays, drive: DriveArrays, frames: int) -> None:
-    """Carries out the action of a decision and steps the physics, as far as Python is not needed."""
+def act(
+    town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: DriverArrays, drive: DriveArrays, frames: int,
+    pedals: bool,
+) -> None:  # fmt: skip
+    """Carries out the action of a decision and steps the physics, or lays a new path, as far as Python is not needed.
+
+    Args:
+        town: arrays of the town.
+        exits: exits of its junctions.
+        world: arrays of the world.
+        driver: arrays of the driver.
+        drive: the decision.
+        frames: substeps of a decision.
+        pedals: whether the driver uses throttle, steering and brake.
+    """
     state = drive.state[0]
+    if state.lost:
+        found = find_path(town, world) != Refusal.NO_SPACE
+        state.lost, state.stage = not found, _OBSERVING if found else _NO_SPACE
+        return
     if not state.halfway:
         state.speed, state.since = world.vehicles[0].speed, world.clock[0].frame / FRAME_RATE
-        refusal = carry_out(town, world, driver, state)
+        refusal = carry_out(town, exits, world, driver, state, pedals)
         if refusal == Refusal.NO_SPACE:
             state.stage = _NO_SPACE
             return
-        state.refusal, state.halfway = refusal, True
-    if step(town, world, frames, 1.0 / FRAME_RATE) == Refusal.NO_SPACE:
-        state.stage = _NO_SPACE
-        return
-    state.halfway, state.stage, state.near = False, _DONE, False
+        state.refusal, state.halfway, state.left = refusal, True, frames
+    while state.left > 0:
+        part = min(int(state.left), FRAMES)
+        if step(town, world, part, 1.0 / FRAME_RATE) == Refusal.NO_SPACE:
+            state.stage = _NO_SPACE
+            return
+        state.left -= part
+        if state.faulty and state.left > 0:
+            state.stage = _MOVING
+            return
+    state.halfway, state.stage, state.near = False, _GUIDING, False
     ego = world.vehicles[0]
     if ego.speed <= EGO_STANDING:
         for k in range(len(drive.waypoints)):
@@ -171,23 +115,42 @@ def act(town: TownArrays, world: WorldArrays, driver: DriverArrays, drive: Drive
 
 
 @compiled
-def carry_out(town: TownArrays, world: WorldArrays, driver: DriverArrays, state: DriveRecord) -> int:
-    """Carries out a navigation action; returns `codes.Refusal` or `CRUISE_LIMIT`."""
-    number, plan = int(state.action), world.plan[0]
-    state.acted = number != _NOTHING and not prepares(driver, number)
-    if not state.acted:
+def carry_out(
+    town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: DriverArrays, state: DriveRecord, pedals: bool
+) -> int:
+    """Carries out a navigation action, or plans the instructed manoeuvre of a driver with pedals.
+
+    Returns:
+        `codes.Refusal` or `CRUISE_LIMIT`.
+    """
+    plan = world.plan[0]
+    if pedals:
+        order, angle = instructed_manoeuvre(town, exits, world, driver)
+    else:
+        order, angle = ordered_manoeuvre(driver, int(state.action))
+    state.order = order
+    if order == 0:
         return Refusal.NONE
-    if number == _LIGHTS:
+    if order == _LIGHT_CHANGE:
         plan.lights = not plan.lights
         switch_lamps(world.eye[0], plan.lights)
         return Refusal.NONE
-    if number == _FASTER or number == _SLOWER:
-        if not _may_change_cruise(plan.cruise, number == _FASTER):
+    if order == _SPEED_CHANGE:
+        faster = state.action == _FASTER
+        if not _may_change_cruise(plan.cruise, faster):
             return CRUISE_LIMIT
-        plan.cruise += SPEED_STEP if number == _FASTER else -SPEED_STEP
+        plan.cruise += SPEED_STEP if faster else -SPEED_STEP
         return Refusal.NONE
+    return command(town, world, order, angle, world.vehicles[0].speed)
+
+
+@compiled
+def ordered_manoeuvre(driver: DriverArrays, number: int) -> tuple[int, int]:
+    """Returns the `PhysicalAction` that a `NavigationAction` stands for, or 0 for none, and its angle [degrees]."""
     order, angle = LANE_FOLLOW, 0
-    if number >= FIRST_TURN:
+    if number == _NOTHING or prepares(driver, number):
+        order = 0
+    elif number >= FIRST_TURN:
         order, angle = J_TURN, turn_angle(driver, number - FIRST_TURN)
     elif number == _SWITCH_LEFT or number == _SWITCH_RIGHT:
         order, angle = LANE_SWITCH, LEFT if number == _SWITCH_LEFT else RIGHT
@@ -197,7 +160,11 @@ def carry_out(town: TownArrays, world: WorldArrays, driver: DriverArrays, state:
         order = STOP
     elif number == _START:
         order = START
-    return command(town, world, order, angle, world.vehicles[0].speed)
+    elif number == _LIGHTS:
+        order = _LIGHT_CHANGE
+    elif number == _FASTER or number == _SLOWER:
+        order = _SPEED_CHANGE
+    return order, angle
 
 
 # --- Guidance, reward and observation ---------------------------------------------------------------------------------
@@ -205,17 +172,16 @@ def carry_out(town: TownArrays, world: WorldArrays, driver: DriverArrays, state:
 
 @compiled
 def guide(
-    town: TownArrays, exits: ExitArrays, tables: RouteTables, graph: RoutingGraph, search: RouteSearch,
-    common: DrivingTown, world: WorldArrays, driver: DriverArrays, guidance: InstructorArrays, drive: DriveArrays,
+    tables: RouteTables, graph: RoutingGraph, search: RouteSearch, town: TownArrays, common: DrivingTown,
+    world: WorldArrays, driver: DriverArrays, guidance: InstructorArrays, drive: DriveArrays,
 ) -> None:  # fmt: skip
-    """Lets the instructor speak after the physics; `NO_COSTS` if the costs to the goal are missing.
+    """Lets the instructor speak after the physics; the stage becomes `NO_COSTS` if those to the goal are missing.
 
     Args:
-        town: arrays of the town.
-        exits: exits of its junctions.
-        tables: its lanes and exits for guidance.
+        tables: lanes and exits of the town for guidance.
         graph: its routing graph.
         search: scratch space for route searches.
+        town: its arrays.
         common: what all environments of the town share.
         world: arrays of the world.
         driver: arrays of the driver.
@@ -239,9 +205,19 @@ def guide(
             mark = guidance.marks[route.landmark]
             heard.goal_lane, heard.goal_station = mark.lane, mark.station
             heard.goal_x, heard.goal_y = position_on(town.points, town.lanes[mark.lane], mark.station)
-    state.stage = _DONE
+    note_told_goal(world, guidance, state)
     if route.landmark >= 0 and route.closed > 0 and (state.fresh or route.closed != state.closed):
         state.stage = _NO_COSTS
+
+
+@compiled
+def note_told_goal(world: WorldArrays, guidance: InstructorArrays, state: DriveRecord) -> None:
+    """Notes whether a goal was told, and its place unless the map shows it: as far ahead on the path as was said."""
+    said, landmark = guidance.said[0], int(guidance.route[0].landmark)
+    state.told, state.told_lane = state.fresh or (state.said and said.landmark >= 0), -1
+    if state.said and said.landmark >= 0 and said.action >= 0 and not guidance.marks[landmark].known:
+        point = world.course[point_before(world, min(world.car[0].s + said.distance, world.plan[0].length))]
+        state.told_lane, state.told_station = point.lane, int(point.station)
 
 
 @compiled
@@ -256,13 +232,13 @@ def note_seen(world: WorldArrays) -> None:
 
 @compiled
 def finish(
-    town: TownArrays, exits: ExitArrays, graph: RoutingGraph, common: DrivingTown, world: WorldArrays,
-    driver: DriverArrays, guidance: InstructorArrays, episode: EpisodeArrays, drive: DriveArrays, begins: bool,
+    graph: RoutingGraph, common: DrivingTown, world: WorldArrays, guidance: InstructorArrays, episode: EpisodeArrays,
+    drive: DriveArrays,
 ) -> None:  # fmt: skip
-    """Measures progress, judges the episode unless it begins, and observes; see `guide`."""
+    """Measures progress, and judges the episode unless it begins; see `guide`."""
     state, route, outcome, plan = drive.state[0], guidance.route[0], episode.state[0], world.plan[0]
     last, lane, station = outcome.left, int(plan.lane), plan.station
-    if not begins:
+    if not state.begins:
         left = _cost_to_go(graph, common, state, lane, station)
         known = math.isfinite(left) and math.isfinite(last)
         outcome.progress = last - left if known else 0.0
@@ -278,12 +254,14 @@ def finish(
             state.costs = state.new_costs
     state.closed = route.closed
     outcome.left = _cost_to_go(graph, common, state, lane, station)
-    if begins:
-        outcome.counted = outcome.reached
-    else:
-        outcome.acted, outcome.refusals = state.acted, state.refused + (1 if state.refusal > 0 else 0)
-        judge(world, episode)
-    observe(town, exits, world, driver, graph.lanes, common.costs[state.costs], common.max_seconds)
+    state.stage = _OBSERVING
+    if state.begins:
+        outcome.counted, state.begins = outcome.reached, False
+        return
+    outcome.acted, outcome.refusals = state.order > 0, state.refused + (1 if state.refusal > 0 else 0)
+    judge(world, episode)
+    if common.pedals and has_lost_path(world):
+        state.lost, state.stage = True, _LOST
 
 
 @compiled
@@ -299,25 +277,28 @@ def _cost_to_go(graph: RoutingGraph, common: DrivingTown, state: DriveRecord, la
 
 @concurrent
 def act_share(
-    turns: NDArray[np.int64], home: int, town: TownArrays, worlds: WorldArrays, drivers: DriverArrays,
-    drives: DriveArrays, frames: int,
+    turns: NDArray[np.int64], home: int, town: TownArrays, exits: ExitArrays, worlds: WorldArrays,
+    drivers: DriverArrays, drives: DriveArrays, frames: int, pedals: bool,
 ) -> None:  # fmt: skip
-    """Calls `act` for the environments whose stage is `ACTING` or `NO_SPACE`, until all are taken.
+    """Calls `act` for the environments whose stage is `ACTING`, `MOVING`, `NO_SPACE` or `LOST`, until all are taken.
 
     Args:
         turns: numbers of the environments, see `threads.take`.
         home: number of the block that is this thread's own.
         town: arrays of the town.
+        exits: exits of its junctions.
         worlds: arrays of all worlds.
         drivers: arrays of all drivers.
         drives: all decisions.
         frames: substeps of a decision.
+        pedals: whether the drivers use throttle, steering and brake.
     """
     number = take(turns, home)
     while number >= 0:
         drive = row_of(drives, number)
-        if drive.state[0].stage != _DONE:
-            act(town, row_of(worlds, number), row_of(drivers, number), drive, frames)
+        stage = drive.state[0].stage
+        if stage == _ACTING or stage == _MOVING or stage == _NO_SPACE or stage == _LOST:
+            act(town, exits, row_of(worlds, number), row_of(drivers, number), drive, frames, pedals)
         number = take(turns, home)
 
 
@@ -325,9 +306,9 @@ def act_share(
 def guide_share(
     turns: NDArray[np.int64], home: int, town: TownArrays, exits: ExitArrays, tables: RouteTables,
     graph: RoutingGraph, searches: RouteSearch, common: DrivingTown, worlds: WorldArrays, drivers: DriverArrays,
-    guidances: InstructorArrays, episodes: EpisodeArrays, drives: DriveArrays, playing: NDArray[np.int8],
+    guidances: InstructorArrays, episodes: EpisodeArrays, drives: DriveArrays,
 ) -> None:  # fmt: skip
-    """Calls `guide` and `finish` for the environments that play, until all are taken.
+    """Guides, judges and observes as the stage of each environment says, until all are taken.
 
     Args:
         turns: numbers of the environments, see `threads.take`.
@@ -343,22 +324,31 @@ def guide_share(
         guidances: arrays of all instructors.
         episodes: arrays of all episodes.
         drives: all decisions.
-        playing: int8 (environments,) `PLAYS`, `BEGINS` or 0; those whose stage is `NO_COSTS` need `finish` only.
     """
     number = take(turns, home)
     while number >= 0:
-        if playing[number] > 0:
-            world, driver, drive = row_of(worlds, number), row_of(drivers, number), row_of(drives, number)
-            guidance, search = row_of(guidances, number), row_of(searches, home)
-            waited = drive.state[0].stage == _NO_COSTS
-            if not waited:
-                guide(town, exits, tables, graph, search, common, world, driver, guidance, drive)
-            if waited or drive.state[0].stage == _DONE:
-                drive.state[0].stage = _DONE
-                episode = row_of(episodes, number)
-                finish(town, exits, graph, common, world, driver, guidance, episode, drive, playing[number] == BEGINS)
+        drive = row_of(drives, number)
+        state = drive.state[0]
+        if state.stage == _GUIDING or state.stage == _NO_COSTS or state.stage == _OBSERVING:
+            world, driver, guidance = row_of(worlds, number), row_of(drivers, number), row_of(guidances, number)
+            waited = state.stage == _NO_COSTS
+            if state.stage == _GUIDING:
+                guide(tables, graph, row_of(searches, home), town, common, world, driver, guidance, drive)
+            if state.stage == _GUIDING or waited:
+                finish(graph, common, world, guidance, row_of(episodes, number), drive)
+            if state.stage == _OBSERVING:
+                look_out(town, exits, graph, common, world, driver, state)
         number = take(turns, home)
 
 
-PLAYS, BEGINS = 1, 2
-"""Environments that play a decision, and those whose episode begins."""
+@compiled
+def look_out(
+    town: TownArrays, exits: ExitArrays, graph: RoutingGraph, common: DrivingTown, world: WorldArrays,
+    driver: DriverArrays, state: DriveRecord,
+) -> None:  # fmt: skip
+    """Writes the observation of a driver, which ends the decision."""
+    if common.pedals:
+        observe_path(world, driver, common.max_seconds)
+    else:
+        observe(town, exits, world, driver, graph.lanes, common.costs[state.costs], common.max_seconds)
+    state.stage = _DONE

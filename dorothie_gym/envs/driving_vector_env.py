@@ -1,4 +1,4 @@
-"""Vectorised navigation environments, the results of `gymnasium.make_vec`: what both have in common."""
+"""Base class of the vectorised navigation environments, the results of `gymnasium.make_vec`."""
 
 from __future__ import annotations
 
@@ -16,12 +16,19 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from dorothie_gym.copying import Restorable
-from dorothie_gym.engine.scenario import Scenario, check_options, scenario_option
-from dorothie_gym.envs.episode import TERMS
+from dorothie_gym.engine.scenario import Scenario, check_options, scenario_option, template_option
+from dorothie_gym.envs.driving_batch import DrivingBatch
+from dorothie_gym.envs.driving_view import DrivingView
+from dorothie_gym.envs.episode import TERMS, Ending
+from dorothie_gym.envs.navigation_config import NavigationConfig
+from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import Town, load_town
+from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation.observation_vector import Vector
+from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.infractions import INFRACTION_KINDS
+from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.vector_infos import Infos, mask_of, masked_infos, seeds_of
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
@@ -43,6 +50,8 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
     Attributes:
         autoreset_mode: when environments that are over begin anew, as `SyncVectorEnv` has it.
         towns: town of each environment.
+        config: settings.
+        batches: a batch for each town.
     """
 
     metadata: dict[str, object] = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -53,21 +62,25 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
     )  # fmt: skip
 
     def __init__(
-        self, num_envs: int, town: Towns, observation_space: spaces.Space[Vector], action_space: spaces.Space[np.int64]
-        | spaces.Space[NDArray[np.float32]], frequency: float, render_mode: str | None,
-        autoreset_mode: str | AutoresetMode,
+        self, num_envs: int, town: Towns, storyboard: str | Path | StoryboardTemplate | None,
+        config: NavigationConfig, observation_space: spaces.Space[Vector],
+        action_space: spaces.Space[np.int64] | spaces.Space[NDArray[np.float32]], render_mode: str | None, view: str,
+        threads: int | None, autoreset_mode: str | AutoresetMode, *, pedals: bool,
     ) -> None:  # fmt: skip
         if num_envs < 1:
             raise ValueError(f"num_envs is {num_envs}; it must be at least 1")
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or 'rgb_array' for several environments")
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads is {threads}; it must be at least 1, or None for one per processor")
         names = [town] if isinstance(town, str | Path | Town) else list(town)
         if not names:
             raise ValueError("town is an empty sequence; it must name at least one town")
-        towns = [each if isinstance(each, Town) else load_town(each) for each in names]
-        self.towns = [towns[i % len(towns)] for i in range(num_envs)]
-        self.num_envs, self.render_mode = num_envs, render_mode
+        loaded = [each if isinstance(each, Town) else load_town(each) for each in names]
+        self.towns = [loaded[i % len(loaded)] for i in range(num_envs)]
+        self.num_envs, self.render_mode, self.config = num_envs, render_mode, config
         self.autoreset_mode = AutoresetMode(autoreset_mode)
+        frequency = config.decision_frequency
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": frequency}
         self.single_observation_space, self.single_action_space = observation_space, action_space
         self.observation_space = batch_space(observation_space, num_envs)
@@ -84,6 +97,34 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         self._begun = np.zeros(num_envs, dtype=np.bool_)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int] = [-1] * num_envs
+        template, threads = template_option(storyboard), threads or available_processors()
+        towns: dict[Town, list[int]] = {}
+        for number, each in enumerate(self.towns):
+            towns.setdefault(each, []).append(number)
+        self._members = [np.array(numbers) for numbers in towns.values()]
+        self.batches = [
+            DrivingBatch(each, template, config, len(numbers), threads, pedals=pedals)
+            for each, numbers in towns.items()
+        ]
+        self._places = {
+            int(number): (batch, place)
+            for batch, numbers in zip(self.batches, self._members, strict=True)
+            for place, number in enumerate(numbers)
+        }
+        self._views = [
+            DrivingView(SessionView.of_role(Role.CO_WIZARD, view, render_mode, frequency))
+            for _ in range(num_envs if render_mode is not None else 0)
+        ]
+
+    @property
+    def threads(self) -> int:
+        """Number of threads that step the environments."""
+        return max(batch.threads for batch in self.batches)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the environments' arrays [bytes]."""
+        return sum(batch.nbytes for batch in self.batches)
 
     # --- Gymnasium's interface ----------------------------------------------------------------------------------------
 
@@ -147,9 +188,16 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         frame = self.render_one(0)
         return None if frame is None else (frame,)
 
-    @abstractmethod
     def render_one(self, number: int) -> NDArray[np.uint8] | None:
         """Draws one of the environments (800, 1280, 3), as the single environment does."""
+        batch, place = self._places[range(self.num_envs)[number]]
+        view = self._views[number].view if self._views else SessionView(None, frames_per_second=1.0)
+        return view.render(batch.catch_up(place))
+
+    def close_extras(self, **_kwargs: object) -> None:
+        """Ends the threads."""
+        for batch in self.batches:
+            batch.close()
 
     # of many environments instead of one, and read-only
     @property  # type: ignore[misc]  # gymnasium's is writable
@@ -162,9 +210,23 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         """The environments' seeds."""
         return tuple(self._seeds[number] for number, _ in enumerate(self.np_random))
 
+    # --- States -------------------------------------------------------------------------------------------------------
+
+    def mutable_values(self) -> dict[str, object]:
+        """Returns what changes in the environments."""
+        return {**super().mutable_values(), "batches": [batch.mutable_values() for batch in self.batches]}
+
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies the values of the environments; pictures begin anew."""
+        parts = values.pop("batches")
+        assert isinstance(parts, list)  # of `mutable_values`
+        for batch, part in zip(self.batches, parts, strict=True):
+            batch.apply_values(part)
+        super().apply_values(values)
+
     def compatibility(self) -> dict[str, object]:
-        """Returns the kind of environment and the towns."""
-        return {**super().compatibility(), "the towns": self.towns}
+        """Returns the kind of environment, the towns and the settings."""
+        return {**super().compatibility(), "the towns": self.towns, "the settings": self.config}
 
     # --- Episodes -----------------------------------------------------------------------------------------------------
 
@@ -172,13 +234,43 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
     def _checked(self, actions: object) -> NDArray[np.generic]:
         """Returns actions as an array; raises `ValueError` if they are none of the action space."""
 
-    @abstractmethod
     def _play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
-        """Plays a decision in the environments of a mask, and notes its outcome in the arrays of this object."""
+        """Plays a decision in the environments of a mask, and notes its outcome."""
+        for batch, members in zip(self.batches, self._members, strict=True):
+            if playing[members].any():
+                batch.play(actions[members], playing[members])
+                self._note(batch, members, playing[members])
 
-    @abstractmethod
     def _start(self, seeds: Mapping[int, int], scenario: Scenario | None) -> None:
         """Begins sessions of environments by their seeds, and notes observations and outcomes."""
+        for batch, members in zip(self.batches, self._members, strict=True):
+            own = {place: seeds[number] for place, number in enumerate(members.tolist()) if number in seeds}
+            if own:
+                batch.begin(own, scenario)
+                begun = np.zeros(len(members), dtype=np.bool_)
+                begun[list(own)] = True
+                self._note(batch, members, begun)
+
+    def _note(self, batch: DrivingBatch, members: NDArray[np.int64], changed: NDArray[np.bool_]) -> None:
+        """Copies the outcomes of some environments of a batch."""
+        numbers, outcomes = members[changed], batch.outcomes[changed]
+        self._observations[numbers] = batch.observations[changed]
+        self._rewards[numbers], self._terms[numbers] = outcomes["reward"], outcomes["terms"]
+        self._infractions[numbers] = batch.infractions[changed]
+        truncated = outcomes["ending"] == Ending.OUT_OF_TIME
+        self._truncations[numbers], self._terminations[numbers] = truncated, (outcomes["ending"] > 0) & ~truncated
+        refused = batch.any_refused
+        for place in np.flatnonzero(changed).tolist():
+            self._refused[members[place]] = batch.refused(place) if refused[place] else []
+        for number in numbers.tolist() if self._views else ():
+            self._views[number].note(*self._places[number])
+        over = numbers[outcomes["ending"] > 0]
+        if over.size:
+            self._success[numbers] = batch.successes[changed]
+            self._subgoals[numbers, 0] = batch.live_subgoals[changed]
+            self._subgoals[numbers, 1] = outcomes["reached"]
+            for number, ending in zip(numbers.tolist(), outcomes["ending"].tolist(), strict=True):
+                self._reasons[number] = Ending(ending).label if ending else None
 
     def _begin(self, seeds: Mapping[int, int | None], scenario: Scenario | None) -> None:
         """Begins episodes of environments; a seed of None continues the environment's own series."""

@@ -13,6 +13,17 @@ from dorothie_gym.action_values import real_numbers
 from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.driving_session import DrivingEnv, DrivingSession
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.pedals import (
+    AHEAD,
+    CONTINUOUS_FIELD_SPECS,
+    CONTINUOUS_FIELDS,
+    END,
+    LOST,
+    OBSERVED_OBJECTS,
+    OFFSET_UNIT,
+    PATH_UNIT,
+    PREPARED_UNTIL,
+)
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ActionValue, ObjectClass, PhysicalAction, Role, WeatherParameter
@@ -31,59 +42,10 @@ from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import CoWizardAction, ObjectColumn, Observation, Physical, StepInfo
-from dorothie_gym.spaces.fields import share, signal, sizes
+from dorothie_gym.spaces.fields import signal
 from dorothie_gym.tasks import StoryboardTemplate
 
-AHEAD = (2.0, 4.0, 7.0, 10.0, 14.0, 19.0, 25.0, 32.0, 40.0, 50.0)
-"""Distances ahead of the path points in the vector [m]."""
-
-PATH_UNIT = 50.0
-"""Unit of the positions of path points [m]."""
-
-OFFSET_UNIT = 4.0
-"""Unit of the distance from the path [m]."""
-
-OBSERVED_OBJECTS = 4
-"""Number of objects in the vector, the nearest first."""
-
 _WET = tuple(WeatherParameter).index(WeatherParameter.WETNESS)
-
-CONTINUOUS_FIELD_SPECS = (
-    signal("speed", 1, unit="25 m/s", meaning="speed of the car"),
-    signal("controls", 3, meaning="throttle, steering angle (positive right) and brake in force"),
-    signal("offset", 1, unit="4 m", meaning="lateral distance from the path, positive right"),
-    signal("course", 2, meaning="sine and cosine of the angle from the path to the heading, positive right"),
-    signal(
-        "path",
-        2 * len(AHEAD),
-        unit="50 m",
-        meaning=f"points of the path {', '.join(f'{ahead:g}' for ahead in AHEAD)} m ahead: "
-        "longitudinal and lateral position relative to the car, positive right",
-    ),
-    share("allowed", 1 + len(AHEAD), unit="25 m/s", meaning="permitted speed here and at each point of the path"),
-    signal("room", 1, unit="100 m", meaning="remaining path before a junction without instruction; 1 for no such end"),
-    signal(
-        "obstacle",
-        4,
-        unit="1, 100 m, 25 m/s, 1",
-        meaning="1 if something is ahead; its distance; its speed; 1 if it is a stop line",
-    ),
-    signal("stop", 3, unit="1, 100 m, 10 m", meaning="1 if the car is to stop; remaining distance in two units"),
-    signal(
-        "objects",
-        OBSERVED_OBJECTS * (4 + len(KINDS)),
-        unit="50 m, 1, 1, 25 m/s, 1",
-        meaning="for each object: distance, sine and cosine of the bearing, speed, one-hot class "
-        "(vehicle, pedestrian, static)",
-    ),
-    share("wetness", 1, meaning="wetness of the road"),
-    share("time", 1, meaning="elapsed share of the time limit"),
-)
-"""Fields of the observation vector, in order. Values are clipped to their range; units are scales of normalised values.
-"""
-
-CONTINUOUS_FIELDS = sizes(CONTINUOUS_FIELD_SPECS)
-"""Sizes of the fields by name, in order."""
 
 
 def observe_continuous(world: World, seen: Observation, heard: HeardInstruction, max_seconds: float) -> Vector:
@@ -162,15 +124,10 @@ def _objects(seen: Observation) -> list[float]:
 
 
 # --- environment ------------------------------------------------------------------------------------------------------
-
-LOST = 4.0
-"""Distance from the path beyond which a new path from the present lane is planned [m]."""
-
-END = 2.0
-"""Distance to the end of the path within which a new one is planned [m]."""
-
-PREPARED_UNTIL = 5.0
-"""Distance behind its planned place beyond which a manoeuvre is no longer prepared [m]."""
+__all__ = [
+    "CONTINUOUS_FIELDS", "CONTINUOUS_FIELD_SPECS", "CONTROL_SPECS", "NavigationContinuousEnv", "control_space",
+    "controls_of", "observe_continuous", "path_space",
+]  # fmt: skip
 
 CONTROL_SPECS = (
     signal("throttle", 1, meaning="share of full throttle; negative values count as 0"),
@@ -178,6 +135,32 @@ CONTROL_SPECS = (
     signal("brake", 1, meaning="share of full braking; negative values count as 0"),
 )
 """Fields of the action, in order."""
+
+
+def control_space() -> spaces.Space[NDArray[np.float32]]:
+    """Returns the action space: throttle, steer and brake."""
+    return spaces.Box(-1.0, 1.0, (len(CONTROL_SPECS),), dtype=np.float32)
+
+
+def path_space() -> spaces.Space[Vector]:
+    """Returns the observation space: a vector of all `CONTINUOUS_FIELDS`."""
+    return spaces.Box(-1.0, 1.0, (sum(CONTINUOUS_FIELDS.values()),), dtype=np.float32)
+
+
+def controls_of(name: str, action: object, shape: tuple[int, ...], meaning: str) -> NDArray[np.float64]:
+    """Returns throttle, steer and brake of actions (..., 3), negative throttle and brake as 0.
+
+    Args:
+        name: name of the argument.
+        action: the actions.
+        shape: of all of them.
+        meaning: their meaning, for messages.
+
+    Raises:
+        ValueError: they are not finite numbers of this shape.
+    """
+    return np.clip(real_numbers(name, action, shape, meaning), (0.0, -1.0, 0.0), 1.0)
+
 
 _MANOEUVRES = {
     ActionValue.J_TURN: PhysicalAction.J_TURN,
@@ -234,8 +217,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
             patience=patience, decision_frequency=decision_frequency,
         )  # fmt: skip
         super().__init__(town, storyboard, config, render_mode, view)
-        self.action_space = spaces.Box(-1.0, 1.0, (len(CONTROL_SPECS),), dtype=np.float32)
-        self.observation_space = spaces.Box(-1.0, 1.0, (sum(CONTINUOUS_FIELDS.values()),), dtype=np.float32)
+        self.action_space, self.observation_space = control_space(), path_space()
 
     def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
         """Begins a session; see `NavigationEnv.reset`."""
@@ -250,8 +232,8 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
             ValueError: the action does not consist of three finite numbers.
             gymnasium.error.ResetNeeded: no session is in progress, or it is over.
         """
-        values = real_numbers("action", action, (3,), "three finite numbers: throttle, steer, brake")
-        throttle, steer, brake = np.clip(values, (0.0, -1.0, 0.0), 1.0).tolist()
+        values = controls_of("action", action, (3,), "three finite numbers: throttle, steer, brake")
+        throttle, steer, brake = values.tolist()
         drive = self.drive
         drive.session.world.ego.manual = VehicleControl(throttle=throttle, steer=steer, brake=brake)
         drive.play(CoWizardAction(physical=self._prepare(drive)))

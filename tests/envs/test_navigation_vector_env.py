@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
+from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
+from dorothie_gym.envs.navigation_continuous_vector_env import NavigationContinuousVectorEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 from tests.envs.navigation_drivers import drive, obey
@@ -62,12 +64,29 @@ def test_batch_is_equal_to_single_environments(mode: AutoresetMode) -> None:
     assert play_both(NAVIGATION, mode, lambda rng: rng.integers(0, 18, 3), 160, **SHORT) >= 4
 
 
+def pedals(rng: np.random.Generator) -> np.ndarray:
+    return rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
+
+
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_batch_with_pedals_is_equal_to_single_environments(mode: AutoresetMode) -> None:
-    def pedals(rng: np.random.Generator) -> np.ndarray:
-        return rng.uniform(-1.0, 1.0, (3, 3)).astype(np.float32)
-
     assert play_both(CONTINUOUS, mode, pedals, 450, **SHORT) >= 3
+
+
+@pytest.mark.parametrize("frequency", [5.0, 0.5])  # several calls of the physics a decision below 2 Hz
+def test_settings_with_pedals_are_those_of_the_single_environment(frequency: float) -> None:
+    settings = {"exceptions": 4.0, "traffic": "medium", "decision_frequency": frequency}
+    play_both(CONTINUOUS, AutoresetMode.NEXT_STEP, pedals, 60, **SHORT, **settings)
+
+
+def test_number_of_threads_changes_nothing_with_pedals() -> None:
+    one, two = (NavigationContinuousVectorEnv(9, max_seconds=10.0, threads=threads) for threads in (1, 2))
+    check_equal(one.reset(seed=2), two.reset(seed=2))
+    rng = np.random.default_rng(5)
+    for _ in range(120):
+        actions = rng.uniform(-1.0, 1.0, (9, 3)).astype(np.float32)
+        check_equal(one.step(actions), two.step(actions))
+    assert (one.threads, two.threads) == (1, 2)
 
 
 @pytest.mark.parametrize(
@@ -141,11 +160,12 @@ def test_obedient_driver_succeeds_in_a_batch() -> None:
     assert outcomes == {seed: drive(NavigationEnv(), obey, seed)["is_success"] for seed in (0, 1)}
 
 
-def test_states_of_a_batch_are_restored() -> None:
-    env = NavigationVectorEnv(2, max_seconds=30.0)
+@pytest.mark.parametrize("kind", [NavigationVectorEnv, NavigationContinuousVectorEnv])
+def test_states_of_a_batch_are_restored(kind: type[DrivingVectorEnv]) -> None:
+    env = kind(2, max_seconds=30.0, exceptions=4.0)  # type: ignore[call-arg]  # arguments of both kinds
     env.reset(seed=4)
-    rng = np.random.default_rng(1)
-    actions = rng.integers(0, 18, (90, 2))
+    env.action_space.seed(1)
+    actions = [env.action_space.sample() for _ in range(90)]
     for action in actions[:20]:
         env.step(action)
     state, twin = env.clone_state(), copy.deepcopy(env)

@@ -222,19 +222,19 @@ def encode(driver: DriverArrays, max_seconds: float) -> None:
     k = _encode_car(view, vector)
     k = _encode_junction(view, heard, vector, k)
     if view.light >= 0:
-        _put(vector, k, view.light_distance / DISTANCE_UNIT)
+        put(vector, k, view.light_distance / DISTANCE_UNIT)
         vector[k + 1 + view.light] = 1.0
     k = _encode_instruction(view, heard, vector, k + 1 + len(COLOURS))
     k = _encode_goal(view, heard, driver.costs[0], vector, k)
     k = _encode_objects(view, vector, k)
     for n in range(len(_WEATHER)):
         low, span = _WEATHER[n]
-        k = _put(vector, k, (view.weather[n] - low) / span)
-    _put(vector, k, view.time / max_seconds)
+        k = put(vector, k, (view.weather[n] - low) / span)
+    put(vector, k, view.time / max_seconds)
 
 
 @inlined
-def _put(vector: Vector, k: int, value: float) -> int:
+def put(vector: Vector, k: int, value: float) -> int:
     """Writes a value, clipped to its range; returns the next index."""
     vector[k] = min(max(value, -1.0), 1.0)
     return k + 1
@@ -242,28 +242,28 @@ def _put(vector: Vector, k: int, value: float) -> int:
 
 @inlined
 def _encode_car(view: DriverView, vector: Vector) -> int:
-    k = _put(vector, 0, view.speed / SPEED_UNIT)
-    k = _put(vector, k, view.cruise / MAX_CRUISE)
+    k = put(vector, 0, view.speed / SPEED_UNIT)
+    k = put(vector, k, view.cruise / MAX_CRUISE)
     vector[k + view.motion] = 1.0
     k += _MOTIONS
     for n in range(len(_MANOEUVRES)):
-        k = _put(vector, k, 1.0 if view.manoeuvre == _MANOEUVRES[n] else 0.0)
+        k = put(vector, k, 1.0 if view.manoeuvre == _MANOEUVRES[n] else 0.0)
     if view.hazard > 0:
         vector[k] = 1.0
-        _put(vector, k + 1, view.hazard_distance / DISTANCE_UNIT)
+        put(vector, k + 1, view.hazard_distance / DISTANCE_UNIT)
     k += 2
     for flag in (view.lights, view.in_junction, view.has_left, view.has_right):
-        k = _put(vector, k, 1.0 if flag else 0.0)
-    k = _put(vector, k, view.limit / SPEED_UNIT)
-    k = _put(vector, k, math.sqrt(view.place_variance) / 10.0)
-    return _put(vector, k, math.sqrt(view.heading_variance) / 0.1)
+        k = put(vector, k, 1.0 if flag else 0.0)
+    k = put(vector, k, view.limit / SPEED_UNIT)
+    k = put(vector, k, math.sqrt(view.place_variance) / 10.0)
+    return put(vector, k, math.sqrt(view.heading_variance) / 0.1)
 
 
 @inlined
 def _encode_junction(view: DriverView, heard: HeardRecord, vector: Vector, k: int) -> int:
     if view.junction >= 0:
         vector[k] = 1.0
-        _put(vector, k + 1, view.junction_distance / DISTANCE_UNIT)
+        put(vector, k + 1, view.junction_distance / DISTANCE_UNIT)
         for n in range(len(SECTORS)):
             if view.exit_lane[n] >= 0:
                 at = k + 2 + 3 * n
@@ -290,9 +290,9 @@ def _encode_instruction(view: DriverView, heard: HeardRecord, vector: Vector, k:
         if heard.landmark >= 0:
             vector[at + heard.landmark] = 1.0
         left = heard.distance - heard.driven
-        at = _put(vector, at + _LANDMARKS, left / DISTANCE_UNIT)
-        at = _put(vector, at, left / CLOSE_UNIT)
-        _put(vector, at, (view.time - heard.time) / AGE_UNIT)
+        at = put(vector, at + _LANDMARKS, left / DISTANCE_UNIT)
+        at = put(vector, at, left / CLOSE_UNIT)
+        put(vector, at, (view.time - heard.time) / AGE_UNIT)
     return k + 4 + _MOVES + _ACTIONS + len(SECTORS) + _LANDMARKS
 
 
@@ -303,19 +303,19 @@ def _encode_goal(view: DriverView, heard: HeardRecord, costs: CostRecord, vector
         dx, dy = heard.goal_x - view.x, heard.goal_y - view.y
         sine, cosine = math.sin(view.heading), math.cos(view.heading)
         vector[k] = 1.0
-        at = _put(vector, k + 1, (dx * cosine + dy * sine) / TOWN_UNIT)
-        at = _put(vector, at, (dy * cosine - dx * sine) / TOWN_UNIT)
-        at = _put(vector, at, costs.here / TOWN_UNIT)
+        at = put(vector, k + 1, (dx * cosine + dy * sine) / TOWN_UNIT)
+        at = put(vector, at, (dy * cosine - dx * sine) / TOWN_UNIT)
+        at = put(vector, at, costs.here / TOWN_UNIT)
         ahead = heard.goal_station - view.station if view.lane == heard.goal_lane else math.inf
-        at = _put(vector, at, ahead / DISTANCE_UNIT)
-        at = _put(vector, at, ahead / CLOSE_UNIT)
+        at = put(vector, at, ahead / DISTANCE_UNIT)
+        at = put(vector, at, ahead / CLOSE_UNIT)
         for other in (costs.back, costs.left, costs.right):
-            at = _put(vector, at, _added_cost(other, costs.here))
+            at = put(vector, at, _added_cost(other, costs.here))
         best = math.inf
         for n in range(len(SECTORS)):
             best = min(best, costs.exits[n])
         for n in range(len(SECTORS)):
-            at = _put(vector, at, _added_cost(costs.exits[n], best))
+            at = put(vector, at, _added_cost(costs.exits[n], best))
     return k + 9 + len(SECTORS)
 
 
@@ -333,9 +333,9 @@ def _encode_objects(view: DriverView, vector: Vector, k: int) -> int:
         kind, at = view.object_kind[n], k + n * (3 + len(_KINDS))
         if kind == 0:
             break
-        at = _put(vector, at, view.object_distance[n] / 50.0)
-        at = _put(vector, at, math.sin(view.object_bearing[n]))
-        at = _put(vector, at, math.cos(view.object_bearing[n]))
+        at = put(vector, at, view.object_distance[n] / 50.0)
+        at = put(vector, at, math.sin(view.object_bearing[n]))
+        at = put(vector, at, math.cos(view.object_bearing[n]))
         vector[at + (1 if kind == _KINDS[1] else 2 if kind == _KINDS[2] else 0)] = 1.0
     return k + OBJECTS * (3 + len(_KINDS))
 
