@@ -27,6 +27,7 @@ from dorothie_gym.recording import Event, EventType, SessionHeader
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.sim.network.network import TownNetwork, network_of
+from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import (
     ActionDecoder,
@@ -44,6 +45,12 @@ from dorothie_gym.spaces import (
 from dorothie_gym.tasks import StoryboardTemplate, TaskState
 
 _INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
+
+
+def session_seeds(scenario: Scenario) -> list[np.random.SeedSequence]:
+    """Returns the seeds of a session: of the world, of words, of the recogniser, and of styles."""
+    # A new subsystem takes a further child at the end: the seeds of the others stay as they are.
+    return np.random.SeedSequence([scenario.seed, 1]).spawn(4)
 
 
 class LiveSession:
@@ -64,12 +71,24 @@ class LiveSession:
     """
 
     def __init__(
-        self, town: Town, network: TownNetwork, scenario: Scenario, config: EnvConfig, limits: SpaceLimits
-    ) -> None:
+        self, town: Town, network: TownNetwork, scenario: Scenario, config: EnvConfig, limits: SpaceLimits,
+        arrays: WorldArrays | None = None,
+    ) -> None:  # fmt: skip
+        """Begins a session, or takes over one of which only the world has been played.
+
+        Args:
+            town: the map.
+            network: its network.
+            scenario: storyboard, street names and departure.
+            config: settings.
+            limits: sizes of the spaces.
+            arrays: arrays of the world of a session that has begun, by `session_seeds` and `start_world`.
+        """
         self.scenario, self.config, self.limits = scenario, config, limits
-        # A new subsystem takes a further child at the end: the seeds of the others stay as they are.
-        world_seed, word_seed, ear_seed, style_seed = np.random.SeedSequence([scenario.seed, 1]).spawn(4)
-        self.world = World(town, config.world, seed=world_seed, departure=scenario.departure, network=network)
+        world_seed, word_seed, ear_seed, style_seed = session_seeds(scenario)
+        self.world = World(
+            town, config.world, seed=world_seed, departure=scenario.departure, network=network, arrays=arrays
+        )  # fmt: skip
         self.task = TaskState(scenario.storyboard)
         self.beliefs = BeliefTracker(town, scenario)
         self._exceptions = ExceptionExecutor(self.world, self.task, limits.props)

@@ -22,7 +22,6 @@ from dorothie_gym.sim.population import (
     add_street_walker,
     add_vehicle,
     move_prop,
-    populate,
     remove_prop,
 )
 from dorothie_gym.sim.road import TownRoad
@@ -47,18 +46,18 @@ class Actors(Lookups):
 
     _present_of: WorldArrays | None = None
 
-    def __init__(self, road: TownRoad, town: TownArrays, arrays: WorldArrays, *, seed: np.random.SeedSequence) -> None:
-        """Takes over the arrays of a world that holds the ego already.
+    def __init__(self, road: TownRoad, town: TownArrays, arrays: WorldArrays, rng: np.random.Generator) -> None:
+        """Shows the actors of a world that has started.
 
         Args:
             road: of the town.
             town: its arrays.
             arrays: of the world.
-            seed: of places, kinds and speeds of new actors.
+            rng: source of kinds and speeds of new actors.
         """
         self.arrays = arrays
         self._road, self._town_arrays, self._town = road, town, road.network.town
-        self._rng = np.random.default_rng(seed)
+        self._rng = rng
 
     @cached_property
     def _bodies(self) -> Bodies:
@@ -89,14 +88,6 @@ class Actors(Lookups):
         return len(self._present) > 0 and bool(self._present.any())
 
     # --- Adding and removing ------------------------------------------------------------------------------------------
-
-    def populate(self, *, vehicles: int, pedestrians: int) -> None:
-        """Adds traffic and pedestrians at random places, as many as fit."""
-        self._make_room(vehicles=vehicles, pedestrians=pedestrians)
-        populate(
-            self._road.network, self._town_arrays, self.arrays,
-            seed=int(self._rng.integers(1 << 62)), vehicles=vehicles, pedestrians=pedestrians,
-        )  # fmt: skip
 
     def add_vehicle(self, lane: int, station: float, *, distance: float) -> bool:
         """Adds a vehicle or cyclist on a lane if there is room and the ego is farther than `distance` [m]."""

@@ -19,8 +19,8 @@ from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
 from dorothie_gym.sim.pedestrians.walking import place_walker
 from dorothie_gym.sim.randomness import POOL, seed_of
 from dorothie_gym.sim.state.codes import NOBODY, Footway, Kind, Walk
-from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, RecordArray, empty_records
-from dorothie_gym.sim.state.town_arrays import TownArrays
+from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, RecordArray, empty_records, plain
+from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import CAR_KEY, WorldArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import (
@@ -272,17 +272,25 @@ def free_places(town: Town, rng: np.random.Generator, count: int) -> list[tuple[
 
 def _draw_places(town: Town, rng: np.random.Generator, count: int) -> tuple[NDArray[np.int64], Array]:
     """As `free_places`: lanes (n,) and stations (n,) [m]."""
-    lanes, lengths = _open_lanes(town)
-    chosen = rng.choice(len(lanes), size=count, p=lengths / lengths.sum())
+    lanes, lengths, ends = _open_lanes(town)
+    chosen = ends.searchsorted(rng.random(count), side="right")  # as `rng.choice` with these weights
     shares = rng.uniform(size=count)
     return lanes[chosen], 5.0 + shares * (lengths[chosen] - 10.0)
 
 
 @lru_cache(maxsize=16)
-def _open_lanes(town: Town) -> tuple[NDArray[np.int64], Array]:
-    """Returns ids and lengths [m] of the lanes on which vehicles appear."""
+def _open_lanes(town: Town) -> tuple[NDArray[np.int64], Array, Array]:
+    """Returns ids and lengths [m] of the lanes on which vehicles appear, and their shares of the road, cumulated."""
     lanes = [lane for lane in town.lanes if not lane.in_junction and lane.length > SHORTEST]
-    return np.array([lane.id for lane in lanes]), np.array([lane.length for lane in lanes])
+    lengths = np.array([lane.length for lane in lanes])
+    return np.array([lane.id for lane in lanes]), lengths, _cumulated(lengths)
+
+
+def _cumulated(weights: Array) -> Array:
+    """Returns the distribution function of weights, exactly that of `numpy.random.Generator.choice`."""
+    ends: Array = (weights / weights.sum()).cumsum()
+    ends /= ends[-1]
+    return ends
 
 
 # --- Initial population -----------------------------------------------------------------------------------------------
@@ -314,21 +322,29 @@ def populate(
     """
     rng = np.random.default_rng(seed)
     _add_traffic(network, town, world, rng, vehicles, cyclists)
-    _add_people(town, world, rng, pedestrians)
+    _add_people(network, town, world, rng, pedestrians)
 
 
 def _add_traffic(
     network: TownNetwork, town: TownArrays, world: WorldArrays, rng: np.random.Generator, vehicles: int, cyclists: float
 ) -> None:
-    room = min(vehicles, int((world.vehicles["kind"] == Kind.EMPTY).sum()))
-    rideable = town.lanes["cycling"] & (town.lanes["right"] < 0) & (town.lanes["junction"] < 0)
+    room = min(vehicles, int((plain(world.vehicles)["kind"] == Kind.EMPTY).sum()))
+    rideable = _rideable(network)
     cycles = rng.random(room) < cyclists * rideable.any()
     lanes, stations = _draw_places(network.town, rng, TRIES * vehicles)
-    state = rng.bit_generator.state
     shares = rng.random(room)
     count = _fill_lanes(town, world, lanes, stations, rideable, cycles, shares, np.zeros(POOL, dtype=np.int64))
-    rng.bit_generator.state = state
-    rng.random(count)  # as many numbers as there are new vehicles, for those that draw after them
+    if count < room:  # those that draw after them have the numbers of the vehicles for which there was no place
+        assert isinstance(rng.bit_generator, np.random.PCG64)
+        rng.bit_generator.advance(count - room)
+
+
+@lru_cache(maxsize=16)
+def _rideable(network: TownNetwork) -> NDArray[np.bool_]:
+    """Returns the lanes on which cyclists may begin (lanes,)."""
+    lanes = plain(town_arrays(network).lanes)
+    rideable: NDArray[np.bool_] = lanes["cycling"] & (lanes["right"] < 0) & (lanes["junction"] < 0)
+    return rideable
 
 
 @compiled
@@ -364,16 +380,27 @@ def _fill_lanes(
     return count
 
 
-def _add_people(town: TownArrays, world: WorldArrays, rng: np.random.Generator, pedestrians: int) -> None:
-    lengths = np.where(town.walks["kind"] == Footway.PAVEMENT, town.walks["length"], 0.0)
-    if not lengths.any():
-        lengths = np.where(town.walks["kind"] == Footway.STREET, town.walks["length"], 0.0)
-    room = min(pedestrians, int((world.pedestrians["state"] == Walk.EMPTY).sum()))
-    if room == 0 or not lengths.any():
+def _add_people(
+    network: TownNetwork, town: TownArrays, world: WorldArrays, rng: np.random.Generator, pedestrians: int
+) -> None:
+    ends = _footways(network)
+    room = min(pedestrians, int((plain(world.pedestrians)["state"] == Walk.EMPTY).sum()))
+    if room == 0 or not len(ends):
         return
-    walks = rng.choice(len(lengths), size=TRIES * room, p=lengths / lengths.sum())
+    walks = ends.searchsorted(rng.random(TRIES * room), side="right")  # as `rng.choice` with these weights
     place = empty_records(PedestrianRecord, 1)
     _fill_footways(town, world, walks, rng.random(len(walks) + room), room, place, np.zeros(POOL, dtype=np.int64))
+
+
+@lru_cache(maxsize=16)
+def _footways(network: TownNetwork) -> Array:
+    """Returns the shares of the footways on which pedestrians begin, cumulated; (0,) where there are none."""
+    walks = plain(town_arrays(network).walks)
+    for kind in (Footway.PAVEMENT, Footway.STREET):
+        lengths = np.where(walks["kind"] == kind, walks["length"], 0.0)
+        if lengths.any():
+            return _cumulated(lengths)
+    return np.zeros(0)
 
 
 @compiled

@@ -22,9 +22,8 @@ from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car, CarRecord
 from dorothie_gym.sim.infractions import WorldEvent, WorldEventLog
 from dorothie_gym.sim.network.network import TownNetwork, network_of
-from dorothie_gym.sim.population import add_car
 from dorothie_gym.sim.road import TownRoad
-from dorothie_gym.sim.sensing.localizer import Localizer, switch_on
+from dorothie_gym.sim.sensing.localizer import Localizer
 from dorothie_gym.sim.sensing.perception import BODY, Perception, look_around
 from dorothie_gym.sim.sensing.visibility import Visibility
 from dorothie_gym.sim.state.codes import NO_SPACE
@@ -38,10 +37,11 @@ from dorothie_gym.sim.state.records import (
     plain,
 )
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world, lengthened
+from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
 from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import FRAMES
 from dorothie_gym.sim.weather import Weather, Wind
+from dorothie_gym.sim.world_start import OwnArrays, WorldSeeds, start_world
 
 _step = direct(step)
 
@@ -92,42 +92,38 @@ class World(Lookups, Restorable):
 
     def __init__(
         self, town: Town, config: WorldConfig, *, seed: np.random.SeedSequence, departure: tuple[int, float],
-        network: TownNetwork | None = None,
+        network: TownNetwork | None = None, arrays: WorldArrays | None = None,
     ) -> None:  # fmt: skip
         """Builds the world.
 
         Args:
             town: the map.
             config: settings.
-            seed: source of the generators of traffic, pedestrians, localisation, perception and wind, one each.
+            seed: source of the seeds of traffic, pedestrians, localisation, perception and wind, one each.
             departure: lane and distance along it [m] of the ego.
             network: the town's network, if it was built already; it is never changed.
+            arrays: arrays of the world, if it was started already (`start_world`) with the same arguments.
         """
-        chance_seed, crowd_seed, locate_seed, perceive_seed, wind_seed = seed.spawn(5)
+        seeds = WorldSeeds(*seed.spawn(5))
         self.town, self.config = town, config
         self.network = network or network_of(town)
         self._arrays = town_arrays(self.network)
-        lane, station = departure
-        state = empty_world(
-            self._arrays, vehicles=1 + config.vehicles, pedestrians=config.pedestrians, props=0, seed=chance_seed,
-            driven=True,
-        )  # fmt: skip
-        add_car(self._arrays, state, lane, station)
-        state.car["collision_stop"] = round(config.collisions_stop * FRAME_RATE)
-        self.road = TownRoad(self.network, np_random=np.random.default_rng(crowd_seed))
-        self.actors = Actors(self.road, self._arrays, state, seed=crowd_seed)
+        if arrays is None:
+            own = OwnArrays(self.network, config)
+            start_world(self.network, own, config, seeds, departure)
+            arrays = own.arrays
+        self.road = TownRoad(self.network, np_random=np.random.default_rng(seeds.crowd))
+        self.actors = Actors(self.road, self._arrays, arrays, seeds.places()[0])
         self.car = Car(self.road, self.actors)
         self.road.vehicles.append(self.car)
-        self.planner = LocalPlanner(town, self._arrays, self.actors, lane, station)
-        self.ego = EgoController(self.planner, self.car, self.actors, cruise=config.cruise_speed)
+        self.planner = LocalPlanner(town, self._arrays, self.actors)
+        self.ego = EgoController(self.planner, self.car, self.actors)
         self.weather = Weather()
-        self.wind = Wind(np.random.default_rng(wind_seed))
-        self._perception = Perception(np.random.default_rng(perceive_seed))
-        self.actors.populate(vehicles=config.vehicles, pedestrians=config.pedestrians)
-        switch_on(self.actors.arrays, np.random.default_rng(locate_seed))
+        self.wind = Wind(np.random.default_rng(seeds.wind))
+        self._perception = Perception(np.random.default_rng(seeds.perception))
         self.localizer = Localizer(self.actors)
         self.faults: dict[Sensor, int] = {}
-        self.frame = 0
+        self.frame = int(plain(arrays.clock)["frame"][0])
         self.frames: Array = np.zeros((0, len(FRAME_COLUMNS)))
         self.offsets: Array = np.zeros(0)
         self.reports = WorldEventLog(self.network, self.actors)

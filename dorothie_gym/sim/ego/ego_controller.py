@@ -35,18 +35,16 @@ class EgoController:
     `apply` takes a physical action. All state lies in the arrays of the world (`PlanRecord`).
     """
 
-    def __init__(self, planner: LocalPlanner, car: Car, holder: ArrayHolder, *, cruise: float = 40.0) -> None:
-        """Sets the cruise speed [km/h].
+    def __init__(self, planner: LocalPlanner, car: Car, holder: ArrayHolder) -> None:
+        """Shows the control of an ego.
 
         Args:
             planner: local planner of the ego.
             car: the ego.
             holder: owner of the arrays of the world.
-            cruise: desired speed [km/h].
         """
         self.planner = planner
         self._car, self._holder = car, holder
-        self.cruise = cruise
 
     @property
     def cruise(self) -> float:

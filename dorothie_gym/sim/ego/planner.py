@@ -57,6 +57,20 @@ _FLAGS: Final = tuple(int(flag) for flag in Feasible)
 _find_feasible, _request = direct(find_feasible), direct(request)
 
 
+def request_path(
+    town: TownArrays, holder: ArrayHolder, action: int, *, angle: int = 0, speed: float = 0.0, lane: int = 0,
+    station: float = 0.0, offset: float = 0.0,
+) -> int:  # fmt: skip
+    """Calls `manoeuvres.request`, again with longer arrays where they have no room for the path; returns its answer."""
+    while True:
+        answer = _request(
+            town, holder.arrays, action, int(angle), float(speed), int(lane), float(station), float(offset)
+        )  # fmt: skip
+        if answer != NO_SPACE:
+            return answer
+        holder.arrays = lengthened(holder.arrays)
+
+
 class LocalPlanner(Lookups):
     """Path of the ego, changed by navigation actions: a view on the plan in the arrays of its world."""
 
@@ -65,29 +79,15 @@ class LocalPlanner(Lookups):
     _shown: WorldArrays | None = None
     _laid = 0
 
-    def __init__(self, town: Town, arrays: TownArrays, holder: ArrayHolder, lane: int, station: float) -> None:
-        """Lays the first path.
+    def __init__(self, town: Town, arrays: TownArrays, holder: ArrayHolder) -> None:
+        """Shows the plan of a world that has started.
 
         Args:
             town: the map.
             arrays: its arrays.
             holder: owner of the arrays of the world; they are replaced where a path needs more room.
-            lane: lane of the ego.
-            station: distance along it [m].
         """
         self._town, self._arrays, self._holder = town, arrays, holder
-        self.restart(lane, station, 0.0)
-
-    def _request(
-        self, action: int, *, angle: int = 0, speed: float = 0.0, lane: int = 0, station: float = 0.0,
-        offset: float = 0.0,
-    ) -> int:  # fmt: skip
-        """Calls `request`, again with longer arrays where they have no room for the path."""
-        while True:
-            answer = _request(self._arrays, self._holder.arrays, action, angle, speed, lane, station, offset)
-            if answer != NO_SPACE:
-                return answer
-            self._holder.arrays = lengthened(self._holder.arrays)
 
     def _look_up(self) -> np.void:
         """Returns the plan in the present arrays."""
@@ -227,7 +227,7 @@ class LocalPlanner(Lookups):
             station: distance along it [m].
             offset: distance from it, positive right [m].
         """
-        self._request(BEGIN, lane=int(lane), station=float(station), offset=float(offset))
+        request_path(self._arrays, self._holder, BEGIN, lane=lane, station=station, offset=offset)
 
     def command(self, action: PhysicalAction, angle: int, speed: float) -> str | None:
         """Applies a navigation action.
@@ -240,7 +240,7 @@ class LocalPlanner(Lookups):
         Returns:
             None, or the reason of the refusal; then nothing has changed.
         """
-        answer = self._request(int(action), angle=int(angle), speed=float(speed))
+        answer = request_path(self._arrays, self._holder, int(action), angle=angle, speed=speed)
         if answer == CARRIED_OUT:
             return None
         return REASONS.get(answer, f"{action.label} is no navigation action")

@@ -38,6 +38,7 @@ from dorothie_gym.sim.state.records import (
     VehicleRecord,
     WatchRecord,
     empty_records,
+    plain,
     record_dtype,
 )
 from dorothie_gym.sim.state.town_arrays import TownArrays
@@ -246,9 +247,13 @@ def empty_world(
     world.lamps["until"] = -math.inf
     world.props["lane"] = NOBODY
     world.vehicles["lane"] = world.vehicles["approach"] = world.vehicles["claim"] = world.vehicles["inside"] = NOBODY
-    source = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-    world.clock["random"] = int(source.generate_state(1)[0]) | 1
+    sow(world, seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed))
     return world
+
+
+def sow(world: WorldArrays, seed: np.random.SeedSequence) -> None:
+    """Sets the seed of all random numbers in a world."""
+    plain(world.clock)["random"] = int(seed.generate_state(1)[0]) | 1
 
 
 def grown(town: TownArrays, world: WorldArrays, *, vehicles: int, pedestrians: int, props: int) -> WorldArrays:
