@@ -29,11 +29,14 @@ ENVIRONMENTS_OF_MODELS: Final = frozenset(
 )
 """Ids of environments that the folder of a model may name."""
 
+TOWN: Final = "town"
+"""Argument of environments; a list of several towns is one of batches only."""
+
 _PLAIN = (spaces.Discrete, spaces.MultiDiscrete, spaces.Box)
 
 
 def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
-    """Makes an environment whose observations are vectors.
+    """Makes an environment whose observations are vectors, of several towns in the first.
 
     Environments with other spaces are flattened (`dorothie_gym.flatten`), and their observations squashed.
 
@@ -47,13 +50,21 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
     if ":" in name:
         raise SettingsError(f"env is {short_repr(name)}; it must be a registered id, without a module to import")
     try:
-        env: AnyEnv = gym.make(name, disable_env_checker=True, **(settings or {}))
+        env: AnyEnv = gym.make(name, disable_env_checker=True, **each_town(settings or {})[0])
     except (gym.error.Error, TypeError, ValueError) as error:
         raise SettingsError(f"env {name}: {error}") from error
     observed, acted = env.observation_space, env.action_space
     if isinstance(observed, spaces.Box) and len(observed.shape) == 1 and isinstance(acted, _PLAIN):
         return env
     return SquashedObservation(dorothie_gym.flatten(env))
+
+
+def each_town(settings: Arguments) -> list[Arguments]:
+    """Returns the arguments of an environment for each of its towns, which several environments take in turn."""
+    towns = settings.get(TOWN)
+    if not isinstance(towns, list | tuple) or not towns:
+        return [settings]
+    return [{**settings, TOWN: town} for town in towns]
 
 
 def make_env_of_model(name: str, settings: Arguments | None, folder: Path) -> AnyEnv:
@@ -188,6 +199,9 @@ def make_training_env(settings: TrainingSettings, ray: str | None = None) -> Vec
     """Returns the vector environment of a training with stable-baselines3.
 
     Without worker processes the environments are one batch if their id has one; else see `make_vector_env`.
+
+    Raises:
+        SettingsError: the environment does not accept its arguments, or several towns are given where there is no batch.
     """
     make = RepeatableEnvFactory(settings.env, settings.env_settings)
     make().close()  # reports invalid settings in this process
@@ -196,6 +210,8 @@ def make_training_env(settings: TrainingSettings, ray: str | None = None) -> Vec
         batch = make_batch(settings.env, settings.env_settings, settings.environments, AutoresetMode.SAME_STEP)
         vector = RepeatableVecEnv(batch)
     else:
+        if len(each_town(settings.env_settings)) > 1:
+            raise SettingsError(f"{TOWN}: only the navigation environments without workers play several towns at once")
         vector = make_vector_env(make, settings.environments, settings.workers, ray)
     monitor = _Monitor(vector)
     monitor.seed(settings.seed)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
 from dorothie_gym.analysis.intervals import wilson_interval
 from dorothie_gym.baselines.rl.checkpoint import Model, load_model
-from dorothie_gym.baselines.rl.environments import masks_of
-from dorothie_gym.baselines.rl.settings import NAVIGATION
+from dorothie_gym.baselines.rl.environments import EnvFactory, each_town, has_batch, make_batch, masks_of
+from dorothie_gym.baselines.rl.settings import NAVIGATION, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import MakeEnv
 from dorothie_gym.errors import SettingsError
 from dorothie_gym.policies.navigation import NavigationPolicy
@@ -24,7 +26,10 @@ FIRST_SEED: Final = 1_000_000
 """Seed of the first episode of an evaluation; training uses smaller seeds."""
 
 PARALLEL_EPISODES: Final = 8
-"""Number of episodes played in parallel: networks are faster on batches."""
+"""Number of episodes that single environments play in parallel: networks are faster on batches."""
+
+BATCHED_EPISODES: Final = 128
+"""Largest number of episodes that a batch plays in parallel."""
 
 
 Action: TypeAlias = Any
@@ -32,6 +37,9 @@ Action: TypeAlias = Any
 
 Act: TypeAlias = Callable[[Vector, NDArray[np.bool_] | None], Sequence[Action]]
 """Function from observations (n, ...) and masks (n, m), if environments have them, to actions."""
+
+MakeBatch: TypeAlias = Callable[[int], VectorEnv[Any, Any, Any]]
+"""Function from a number of environments to a batch of them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +63,64 @@ class EpisodeStatistics:
     episodes: int
 
 
+@dataclass(frozen=True)
+class Episodes:
+    """Outcomes of episodes.
+
+    Attributes:
+        successes: whether each succeeded (episodes,).
+        rewards: sum of its rewards (episodes,).
+        lengths: its number of steps (episodes,).
+    """
+
+    successes: NDArray[np.bool_]
+    rewards: NDArray[np.float64]
+    lengths: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, count: int) -> Episodes:
+        """Returns episodes without outcomes."""
+        return cls(np.zeros(count, dtype=np.bool_), np.zeros(count), np.zeros(count, dtype=np.int64))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Episodes]) -> Episodes:
+        """Returns the episodes of several parts."""
+        return cls(
+            np.concatenate([part.successes for part in parts]), np.concatenate([part.rewards for part in parts]),
+            np.concatenate([part.lengths for part in parts]),
+        )  # fmt: skip
+
+    @property
+    def statistics(self) -> EpisodeStatistics:
+        """Means over the episodes."""
+        low, high = wilson_interval(int(self.successes.sum()), len(self.successes))
+        return EpisodeStatistics(
+            success=float(self.successes.mean()), low=low, high=high, reward=float(self.rewards.mean()),
+            length=float(self.lengths.mean()), episodes=len(self.successes),
+        )  # fmt: skip
+
+
+def evaluate_settings(
+    settings: TrainingSettings, act: Act, episodes: int, seed: int = FIRST_SEED
+) -> EpisodeStatistics:  # fmt: skip
+    """Plays episodes of the environment of a training, with consecutive seeds; of several towns, so many in each.
+
+    Args:
+        settings: settings of the training.
+        act: policy.
+        episodes: number of episodes.
+        seed: seed of the first episode.
+    """
+    parts = []
+    for arguments in each_town(settings.env_settings):
+        if has_batch(settings.env):
+            make_vector = partial(make_batch, settings.env, arguments, mode=AutoresetMode.DISABLED)
+            parts.append(play_batch(make_vector, act, episodes, seed))
+        else:
+            parts.append(play_singles(EnvFactory(settings.env, arguments), act, episodes, seed))
+    return Episodes.joined(parts).statistics
+
+
 def evaluate_policy(make: MakeEnv, act: Act, episodes: int, seed: int = FIRST_SEED) -> EpisodeStatistics:
     """Plays episodes with consecutive seeds.
 
@@ -64,8 +130,13 @@ def evaluate_policy(make: MakeEnv, act: Act, episodes: int, seed: int = FIRST_SE
         episodes: number of episodes.
         seed: seed of the first episode.
     """
+    return play_singles(make, act, episodes, seed).statistics
+
+
+def play_singles(make: MakeEnv, act: Act, episodes: int, seed: int) -> Episodes:
+    """Plays the episodes of `evaluate_policy` in some single environments."""
     envs = [make() for _ in range(min(PARALLEL_EPISODES, episodes))]
-    successes, rewards, lengths = np.zeros(episodes), np.zeros(episodes), np.zeros(episodes)
+    outcomes = Episodes.of(episodes)
     playing = dict(enumerate(range(len(envs))))  # environment: episode
     observations = {k: env.reset(seed=seed + k)[0] for k, env in enumerate(envs)}
     following = len(envs)
@@ -76,10 +147,10 @@ def evaluate_policy(make: MakeEnv, act: Act, episodes: int, seed: int = FIRST_SE
         actions = act(np.stack([observations[k] for k in playing]), stacked)
         for (k, episode), action in zip(list(playing.items()), actions, strict=True):
             observations[k], reward, terminated, truncated, info = envs[k].step(action)
-            rewards[episode] += float(reward)
-            lengths[episode] += 1
+            outcomes.rewards[episode] += float(reward)
+            outcomes.lengths[episode] += 1
             if terminated or truncated:
-                successes[episode] = bool(info.get("is_success", False))
+                outcomes.successes[episode] = bool(info.get("is_success", False))
                 del playing[k]
                 if following < episodes:
                     playing[k] = following
@@ -87,11 +158,35 @@ def evaluate_policy(make: MakeEnv, act: Act, episodes: int, seed: int = FIRST_SE
                     following += 1
     for env in envs:
         env.close()
-    low, high = wilson_interval(int(successes.sum()), episodes)
-    return EpisodeStatistics(
-        success=float(successes.mean()), low=low, high=high, reward=float(rewards.mean()),
-        length=float(lengths.mean()), episodes=episodes,
-    )  # fmt: skip
+    return outcomes
+
+
+def play_batch(make: MakeBatch, act: Act, episodes: int, seed: int) -> Episodes:
+    """Plays the episodes of `evaluate_policy` in a batch.
+
+    Args:
+        make: makes a batch of a number of environments in the autoreset mode `DISABLED`.
+        act: policy.
+        episodes: number of episodes.
+        seed: seed of the first episode.
+    """
+    envs = make(min(BATCHED_EPISODES, episodes))
+    outcomes = Episodes.of(episodes)
+    playing = np.arange(envs.num_envs)  # episode of each environment; those after the last one do not count
+    observations, _ = envs.reset(seed=(seed + playing).tolist())
+    while (counting := playing < episodes).any():
+        masks = envs.action_masks() if hasattr(envs, "action_masks") else None
+        observations, rewards, terminated, truncated, infos = envs.step(np.asarray(act(observations, masks)))
+        outcomes.rewards[playing[counting]] += rewards[counting]
+        outcomes.lengths[playing[counting]] += 1
+        over = terminated | truncated
+        if over.any():
+            ended = over & counting
+            outcomes.successes[playing[ended]] = infos["is_success"][ended]
+            playing[over] = playing.max() + 1 + np.arange(over.sum())
+            observations, _ = envs.reset(seed=(seed + playing).tolist(), options={"reset_mask": over})
+    envs.close()
+    return outcomes
 
 
 def greedy_policy(model: Model, *, masked: bool) -> Act:

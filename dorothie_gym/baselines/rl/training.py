@@ -14,8 +14,8 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from dorothie_gym.baselines.learning_curves import draw_reward_curve
 from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, CriticWarmUp, clone, read_demonstrations
 from dorothie_gym.baselines.rl.checkpoint import Model, make_model, save_model
-from dorothie_gym.baselines.rl.environments import EnvFactory, make_training_env
-from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics, evaluate_policy, greedy_policy
+from dorothie_gym.baselines.rl.environments import make_training_env
+from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics, evaluate_settings, greedy_policy
 from dorothie_gym.baselines.rl.resumption import restore_state, state_of
 from dorothie_gym.baselines.rl.run import (
     BEST,
@@ -167,7 +167,7 @@ class Training(Run[TrainingEvaluation]):
         """Plays the episodes of an evaluation, and saves the model and the result."""
         settings = self.settings
         act = greedy_policy(self.model, masked=settings.masked)
-        outcome = evaluate_policy(EnvFactory(settings.env, settings.env_settings), act, settings.episodes)
+        outcome = evaluate_settings(settings, act, settings.episodes)
         row = TrainingEvaluation(steps=int(self.model.num_timesteps), seconds=round(self.seconds, 2), outcome=outcome)
         self.rows.append(row)
         for name in ("success", "reward", "length"):
