@@ -18,7 +18,15 @@ from safetensors.torch import load_file
 from stable_baselines3.common.vec_env import VecEnv
 
 from dorothie_gym.baselines.rl.environments import make_env_of_model
-from dorothie_gym.baselines.rl.settings import ALGORITHMS, FINAL_RATE, ON_POLICY, Page, RunSettings, TrainingSettings
+from dorothie_gym.baselines.rl.settings import (
+    ALGORITHMS,
+    FINAL_ENTROPY,
+    FINAL_RATE,
+    ON_POLICY,
+    Page,
+    RunSettings,
+    TrainingSettings,
+)
 from dorothie_gym.baselines.rl.vector_env import AnyEnv
 from dorothie_gym.baselines.tensor_files import save_tensors
 from dorothie_gym.errors import InputFileError, ModelFileError, SettingsError, one_line
@@ -57,6 +65,7 @@ def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv) -> Model:
     package, name = ALGORITHMS[settings.algorithm]
     parameters = dict(settings.parameters)
     last = parameters.pop(FINAL_RATE, None)
+    parameters.pop(FINAL_ENTROPY, None)  # see `training.EntropySchedule`
     if last is not None:
         parameters["learning_rate"] = LinearSchedule(float(parameters["learning_rate"]), float(last))
     try:

@@ -201,7 +201,7 @@ def make_training_env(settings: TrainingSettings, ray: str | None = None) -> Vec
     Without worker processes the environments are one batch if their id has one; else see `make_vector_env`.
 
     Raises:
-        SettingsError: the environment does not accept its arguments, or several towns are given where there is no batch.
+        SettingsError: the environment does not accept its arguments, or there are several towns but no batch.
     """
     make = RepeatableEnvFactory(settings.env, settings.env_settings)
     make().close()  # reports invalid settings in this process

@@ -173,7 +173,8 @@ def play_batch(make: MakeBatch, act: Act, episodes: int, seed: int) -> Episodes:
     envs = make(min(BATCHED_EPISODES, episodes))
     outcomes = Episodes.of(episodes)
     playing = np.arange(envs.num_envs)  # episode of each environment; those after the last one do not count
-    observations, _ = envs.reset(seed=(seed + playing).tolist())
+    seeds: Any = (seed + playing).tolist()  # one for each environment, which gymnasium's annotation leaves out
+    observations, _ = envs.reset(seed=seeds)
     while (counting := playing < episodes).any():
         masks = envs.action_masks() if hasattr(envs, "action_masks") else None
         observations, rewards, terminated, truncated, infos = envs.step(np.asarray(act(observations, masks)))
@@ -184,7 +185,8 @@ def play_batch(make: MakeBatch, act: Act, episodes: int, seed: int) -> Episodes:
             ended = over & counting
             outcomes.successes[playing[ended]] = infos["is_success"][ended]
             playing[over] = playing.max() + 1 + np.arange(over.sum())
-            observations, _ = envs.reset(seed=(seed + playing).tolist(), options={"reset_mask": over})
+            seeds = (seed + playing).tolist()
+            observations, _ = envs.reset(seed=seeds, options={"reset_mask": over})
     envs.close()
     return outcomes
 

@@ -39,6 +39,9 @@ DEFAULT: Final = "default"
 FINAL_RATE: Final = "final_learning_rate"
 """Additional parameter: the learning rate falls linearly from `learning_rate` to this."""
 
+FINAL_ENTROPY: Final = "final_ent_coef"
+"""Additional parameter: the weight of the entropy falls linearly from `ent_coef` to this."""
+
 MAX_ENVIRONMENTS: Final = 4096
 """Largest number of parallel environments."""
 
@@ -64,7 +67,7 @@ class RunSettings:
         evaluate_every: number of steps between evaluations.
         episodes: number of episodes of an evaluation.
         network: widths of the hidden layers.
-        parameters: parameters of the algorithm, as stable-baselines3 names them; see `FINAL_RATE`.
+        parameters: parameters of the algorithm, as stable-baselines3 names them; see `FINAL_RATE` and `FINAL_ENTROPY`.
         warm_start: folder of a corpus for behaviour cloning before the training; None for none.
     """
 
@@ -140,6 +143,13 @@ class TrainingSettings(RunSettings):
     def __post_init__(self) -> None:
         _check_algorithm(self.algorithm)
         super().__post_init__()
+        entropy = self.parameters.get("ent_coef")
+        falls = self.algorithm in ON_POLICY and isinstance(entropy, int | float)
+        if FINAL_ENTROPY in self.parameters and not falls:
+            raise SettingsError(
+                f"parameters.{FINAL_ENTROPY} needs a number ent_coef of {', '.join(ON_POLICY)}; "
+                f"ent_coef of {self.algorithm} is {short_repr(entropy)}"
+            )
         if self.warm_start is not None and (self.algorithm not in ON_POLICY or self.env != NAVIGATION):
             raise SettingsError(
                 f"warm_start: {self.algorithm} on {self.env} cannot learn from a corpus; {', '.join(ON_POLICY)} "

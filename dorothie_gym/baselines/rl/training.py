@@ -8,12 +8,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
+import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from dorothie_gym.baselines.learning_curves import draw_reward_curve
 from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, CriticWarmUp, clone, read_demonstrations
-from dorothie_gym.baselines.rl.checkpoint import Model, make_model, save_model
+from dorothie_gym.baselines.rl.checkpoint import LinearSchedule, Model, make_model, save_model
 from dorothie_gym.baselines.rl.environments import make_training_env
 from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics, evaluate_settings, greedy_policy
 from dorothie_gym.baselines.rl.resumption import restore_state, state_of
@@ -27,7 +28,7 @@ from dorothie_gym.baselines.rl.run import (
     TrainingResult,
     ignore_stage,
 )
-from dorothie_gym.baselines.rl.settings import Page, TrainingSettings
+from dorothie_gym.baselines.rl.settings import FINAL_ENTROPY, Page, TrainingSettings
 from dorothie_gym.input_files import checked
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
 from dorothie_gym.recording import Fold
@@ -37,6 +38,9 @@ LOGGED_STEPS: Final = 1024
 
 CHECKPOINT_SHARE: Final = 0.005
 """Largest share of the time that the writing of checkpoints takes."""
+
+SMALL_NETWORK: Final = 256
+"""Greatest width of layers up to which torch uses one thread: more would wait for each other longer than they work."""
 
 LOGGED_EPISODES: Final = 4
 """Number of episodes between TensorBoard records of off-policy algorithms."""
@@ -126,9 +130,15 @@ class Training(Run[TrainingEvaluation]):
         settings, model = self.settings, self.model
         left = settings.steps - int(model.num_timesteps)
         finished = False
+        threads = torch.get_num_threads()
+        if max(settings.network, default=0) <= SMALL_NETWORK:
+            torch.set_num_threads(1)
         try:
             if left > 0:
                 callbacks: list[BaseCallback] = [_Evaluations(self)]
+                if FINAL_ENTROPY in settings.parameters:
+                    first, last = (float(settings.parameters[name]) for name in ("ent_coef", FINAL_ENTROPY))
+                    callbacks.append(EntropySchedule(first, last))
                 if settings.warm_start is not None:
                     callbacks.append(CriticWarmUp())
                 # stable-baselines3 would count rollouts anew in a resumed run: they are logged by `_Evaluations`
@@ -140,6 +150,7 @@ class Training(Run[TrainingEvaluation]):
             pass  # the steps since the last checkpoint are repeated when the run is resumed
         finally:
             self._vector.close()
+            torch.set_num_threads(threads)
         return self._result(finished=finished)
 
     def checkpoint(self, *, sparingly: bool = False) -> None:
@@ -187,6 +198,24 @@ class Training(Run[TrainingEvaluation]):
 
     def _draw_curve(self) -> None:
         draw_reward_curve([row.as_json() for row in self.rows], _title(self.settings), self.folder / CURVE)
+
+
+class EntropySchedule(BaseCallback):
+    """Lets the weight of the entropy fall linearly over the steps of a training.
+
+    A policy that need not explore any more becomes decided, so that its most likely actions do as well as sampled ones.
+    """
+
+    def __init__(self, first: float, last: float) -> None:
+        super().__init__()
+        self._schedule = LinearSchedule(first, last)
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        model: Model = self.model
+        model.ent_coef = self._schedule(1.0 - model.num_timesteps / model._total_timesteps)
 
 
 class _Evaluations(BaseCallback):

@@ -24,7 +24,7 @@ from dorothie_gym.spaces import SpaceLimits
 DISCRETE = "dorothie_gym/Navigation-v0"
 CONTINUOUS = "dorothie_gym/Navigation-continuous-v0"
 SMALL: dict[str, dict[str, Any]] = {
-    "ppo": {"n_steps": 16, "batch_size": 32, "n_epochs": 1},
+    "ppo": {"n_steps": 16, "batch_size": 32, "n_epochs": 1, "ent_coef": 0.01, "final_ent_coef": 0.002},
     "maskable_ppo": {"n_steps": 16, "batch_size": 32, "n_epochs": 1},
     "a2c": {"n_steps": 8},
     "dqn": {"learning_starts": 16, "buffer_size": 200, "batch_size": 8},
@@ -58,6 +58,17 @@ def test_saved_model_acts_like_the_trained_one(algorithm: str, tmp_path: Path) -
         path.name for path in tmp_path.iterdir()
     }
     assert not list(tmp_path.rglob("*.zip")) and not list(tmp_path.rglob("*.pkl"))
+
+
+def test_weight_of_the_entropy_falls_to_its_last_value(tmp_path: Path) -> None:
+    training = Training(settings_for("ppo"), tmp_path)
+    assert training.model.ent_coef == 0.01
+    training.run()
+    assert training.model.ent_coef == pytest.approx(0.002)
+    with pytest.raises(SettingsError, match="final_ent_coef"):
+        settings_for("sac", parameters={**SMALL["sac"], "final_ent_coef": 0.0})
+    with pytest.raises(SettingsError, match="final_ent_coef"):
+        settings_for("ppo", parameters={"final_ent_coef": 0.0})
 
 
 def test_resumed_run_keeps_weights_optimiser_and_evaluations(tmp_path: Path) -> None:
