@@ -174,6 +174,16 @@ class MapNames:
         )
 
 
+def goals_on_map(scenario: Scenario, names: Sequence[LandmarkName]) -> list[GoalAhead]:
+    """Returns the places of goals on the Co-Wizard's map, in the order of the names."""
+    return [
+        GoalAhead(lane=landmark.lane, station=landmark.station)
+        for name in names
+        for landmark in scenario.storyboard.landmarks
+        if landmark.name is name and not landmark.hidden
+    ]
+
+
 # --- Belief tracker ---------------------------------------------------------------------------------------------------
 
 MARK = 20.0
@@ -233,11 +243,7 @@ class BeliefTracker:
         self.version = 0
         self._topic: LandmarkName | None = None  # the hidden landmark mentioned last
         self._said: dict[LandmarkName, set[frozenset[LandmarkName | StreetName]]] = {}
-        self._map_places: dict[LandmarkName, list[GoalAhead]] = {}
-        for landmark in scenario.storyboard.landmarks:
-            if not landmark.hidden:
-                place = GoalAhead(lane=landmark.lane, station=landmark.station)
-                self._map_places.setdefault(landmark.name, []).append(place)
+        self._scenario = scenario
 
     def update(self, mental: Mental, localizer: Localizer, sight: float) -> Outcome:
         """Applies a belief update of the Co-Wizard.
@@ -333,7 +339,7 @@ class BeliefTracker:
         places: list[GoalAhead] = []
         for name in self.goals:
             guess = self.guesses.get(name)
-            places.extend(self._map_places.get(name, []))
+            places.extend(goals_on_map(self._scenario, (name,)))
             if guess is not None:
                 places.append(GoalAhead(lane=guess.lane, station=guess.station))
         return places

@@ -11,41 +11,41 @@ from typing import Any, ClassVar, Final, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation.records import empty_records, plain
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
+from dorothie_gym.engine.beliefs import goals_on_map
 from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
-from dorothie_gym.engine.session_engine import LiveSession
-from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, DriveArrays, DriveRecord, DrivingTown, Stage, row_of
+from dorothie_gym.engine.session_engine import LiveSession, session_seeds
+from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, DriveArrays, DrivingTown, Stage, row_of
+from dorothie_gym.envs.driving_start import Blanks, blank_parts, blank_world, copy_row, stacked, write_scenario
 from dorothie_gym.envs.driving_steps import act_share, guide_share
-from dorothie_gym.envs.episode import EpisodeArrays, episode_arrays
+from dorothie_gym.envs.episode import EpisodeArrays
 from dorothie_gym.envs.interference import Interference
 from dorothie_gym.envs.navigation_config import NavigationConfig
-from dorothie_gym.envs.pedals import CONTINUOUS_FIELDS
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.route_arrays import empty_search
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.routing_graph import routing_graph
 from dorothie_gym.ontology import LandmarkName, MentalAction, PhysicalAction, Role
-from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.cost_to_go import cost_table
-from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_arrays
-from dorothie_gym.policies.navigation.instructor import Guidance, NavigationInstruction, exit_sectors, instruction_of
-from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
+from dorothie_gym.policies.navigation.driver_view import DriverArrays
+from dorothie_gym.policies.navigation.instructor import NavigationInstruction, exit_sectors, instruction_of
+from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
 from dorothie_gym.policies.navigation.junction_exits import exit_arrays
-from dorothie_gym.policies.navigation.observation_vector import FIELDS, Vector
+from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.policies.route_tables import route_tables
 from dorothie_gym.sim.batch.threads import ThreadPool, turns_of
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL
-from dorothie_gym.sim.ego.limits import VehicleControl
+from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL, set_goals
 from dorothie_gym.sim.ego.planner import REASONS
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_room_of
+from dorothie_gym.sim.world_start import WorldSeeds, start_world
 from dorothie_gym.spaces import LanePosition, Mental, SpaceLimits
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.tasks import StoryboardTemplate, TaskState
 
 Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
 
@@ -59,23 +59,43 @@ CHANGES: Final = ("faces", "_stacks", "_due", "_waited", "_live", "_noted", "_fa
 
 @dataclass
 class DrivingFace:
-    """What a session of a batch has besides its row: objects for rare events.
+    """What a session of a batch has besides its row.
 
     Attributes:
-        live: the session, whose world shows the row.
+        scenario: storyboard, street names and departure.
+        live: the session with objects for rare events, whose world shows the row; None before the first of them.
         interference: scripted Ad-Wizard; None without exceptions.
+        goals: goals of the Co-Wizard as long as there is no `live`.
         notes: belief updates that wait to be sent.
         version: version of the task that the row knows.
         refused: reasons for the refusals of belief updates at the last decision.
         seen: observations for the Ad-Wizard's next action, if they were built before the path was replaced.
     """
 
-    live: LiveSession
-    interference: Interference | None
+    scenario: Scenario
+    live: LiveSession | None = None
+    interference: Interference | None = None
+    goals: tuple[LandmarkName, ...] = ()
     notes: list[Mental] = field(default_factory=list)
     version: int = -1
     refused: list[str] = field(default_factory=list)
     seen: LazyObservations | None = None
+
+
+class RowHolder:
+    """Holder of the world in a row of a batch; arrays with more room make room in all rows."""
+
+    def __init__(self, batch: DrivingBatch, number: int) -> None:
+        self._batch, self._number = batch, number
+
+    @property
+    def arrays(self) -> WorldArrays:
+        """Arrays of the world."""
+        return self._batch.row(self._number)
+
+    @arrays.setter
+    def arrays(self, arrays: WorldArrays) -> None:
+        self._batch.make_room(arrays)
 
 
 class DrivingBatch(Lookups):
@@ -92,7 +112,7 @@ class DrivingBatch(Lookups):
         threads: number of threads, the caller's included.
     """
 
-    LOOKED_UP: ClassVar[tuple[str, ...]] = ("_pool", "_rows")
+    LOOKED_UP: ClassVar[tuple[str, ...]] = ("_pool", "_rows", "_blanks")
 
     def __init__(
         self, town: Town, template: StoryboardTemplate | None, config: NavigationConfig, count: int, threads: int,
@@ -113,17 +133,15 @@ class DrivingBatch(Lookups):
         self._limits, self._network = SpaceLimits.for_town(town), network_of(town)
         self._arrays, self._exits = town_arrays(self._network), exit_arrays(town)
         self._tables, self._graph = route_tables(town), routing_graph(town)
-        self._searches = _stacked(empty_search(self._graph), self.threads)
+        self._searches = stacked(empty_search(self._graph), self.threads)
         self._cost_rows: dict[tuple[Place, tuple[Place, ...]], int] = {}
         first = town.sites[0]
         self._common = DrivingTown(
             exit_sectors(town), np.zeros((1, len(cost_table(town, (first.lane, first.station)).costs))),
             float(config.max_seconds), pedals,
         )  # fmt: skip
-        self.frames, self.pedals = config.session_config.frames, pedals
-        self._size, self._actions = (
-            (sum(CONTINUOUS_FIELDS.values()), 0) if pedals else (sum(FIELDS.values()), len(ACTIONS))
-        )
+        self._session_config = config.session_config
+        self.frames, self.pedals = self._session_config.frames, pedals
         self.faces: list[DrivingFace | None] = [None] * count
         self._stacks: list[Any] = []
         self._due, self._waited = np.full(count, math.inf), np.zeros(count, dtype=np.int64)
@@ -138,6 +156,14 @@ class DrivingBatch(Lookups):
     def _rows(self) -> list[WorldArrays]:
         """Rows of the worlds, each the same object as long as the arrays are."""
         return [row_of(self.worlds, number) for number in range(self._count)]
+
+    @cached_property
+    def _blanks(self) -> Blanks:
+        world = blank_world(self._network, self._config, pedals=self.pedals)
+        parts = blank_parts(self.town, self._limits, self._config, pedals=self.pedals)
+        if not self._stacks:
+            self._stacks = [stacked(arrays, self._count) for arrays in (world, *parts)]
+        return Blanks(self._stacks, (with_room_of(self._arrays, world, self._rows[0]), *parts))
 
     def __setstate__(self, values: dict[str, object]) -> None:
         self.__dict__.update(values)
@@ -154,10 +180,14 @@ class DrivingBatch(Lookups):
 
     def bind(self) -> None:
         """Lets the faces show their rows, after the arrays or the faces were replaced."""
-        self.__dict__.pop("_rows", None)
+        self._forget_views()
         for number, face in enumerate(self.faces):
-            if face is not None:
+            if face is not None and face.live is not None:
                 face.live.world.actors.arrays = self._rows[number]
+
+    def _forget_views(self) -> None:
+        self.__dict__.pop("_rows", None)
+        self.__dict__.pop("_blanks", None)
 
     # --- Arrays of all environments -----------------------------------------------------------------------------------
 
@@ -247,7 +277,7 @@ class DrivingBatch(Lookups):
 
     def catch_up(self, number: int) -> LiveSession:
         """Returns the session of an environment, as it is after the last decision."""
-        return self._face(number).live
+        return self._live_session(number)
 
     def close(self) -> None:
         """Ends the threads."""
@@ -263,75 +293,57 @@ class DrivingBatch(Lookups):
             scenario: scenario to play instead of drawn ones.
         """
         for number, seed in seeds.items():
-            played = draw_scenario(self.town, self._template, seed) if scenario is None else scenario
-            live = LiveSession(self.town, self._network, played, self._config.session_config, self._limits)
-            self._put(number, live)
+            self._put(number, draw_scenario(self.town, self._template, seed) if scenario is None else scenario)
         self._guide()
 
-    def _put(self, number: int, live: LiveSession) -> None:
-        """Moves a session that begins into a row."""
-        world, config = live.world, self._config
-        if self.pedals:
-            world.ego.manual = VehicleControl(throttle=0.0, steer=0.0, brake=0.0)
-        face = DrivingFace(live, Interference(live, config.exceptions) if config.exceptions > 0.0 else None)
-        fresh = (
-            world.sensing_arrays, driver_arrays(self._size, self._actions, _streets(live)),
-            self._guidance_of(live), episode_arrays(config), self._drive_of(live),
+    def _put(self, number: int, scenario: Scenario) -> None:
+        """Starts a session in a row."""
+        face = self.faces[number] = DrivingFace(scenario)
+        self._blanks.write(number)
+        seeds = WorldSeeds(*session_seeds(scenario)[0].spawn(5))
+        start_world(self._network, RowHolder(self, number), self._session_config.world, seeds, scenario.departure)
+        marks = scenario.storyboard.landmarks[: self._limits.landmarks]
+        write_scenario(
+            scenario, [self._row_of_costs((mark.lane, mark.station), ()) for mark in marks],
+            number, self._drivers, self._guidances, self._drives,
         )  # fmt: skip
-        if not self._stacks:
-            self._stacks = [_stacked(arrays, self._count) for arrays in fresh]
-        self.faces[number] = face
-        plain(fresh[1].inputs)["weather"][0] = tuple(world.weather.values.values())
-        self._move_in(number)
-        for stack, arrays in zip(self._stacks[1:], fresh[1:], strict=True):
-            _copy(row_of(stack, number), arrays)
-        self._due[number] = face.interference.due if face.interference is not None else math.inf
-        self._waited[number] = 0
+        self._due[number], self._waited[number] = math.inf, 0
         self._noted.discard(number)
         self._faulty.discard(number)
-        self._note_task(number)
+        self._note_task(number, TaskState(scenario.storyboard))
+        if self._config.exceptions > 0.0:
+            face.interference = Interference(self._live_session(number), self._config.exceptions)
+            self._due[number] = face.interference.due
 
     def _move_in(self, number: int) -> None:
         """Copies the world of a session into its row, and makes the session show the row."""
-        face = self.faces[number]
-        assert face is not None
-        actors = face.live.world.actors
+        actors = self._live_session(number).world.actors
         if actors.arrays is self._rows[number]:
             return
-        self._make_room(actors.arrays)
-        _copy(self._rows[number], with_room_of(self._arrays, actors.arrays, self._rows[number]))
+        self.make_room(actors.arrays)
+        copy_row(self._rows[number], with_room_of(self._arrays, actors.arrays, self._rows[number]))
         actors.arrays = self._rows[number]
 
-    def _make_room(self, world: WorldArrays) -> None:
+    def row(self, number: int) -> WorldArrays:
+        """Returns the arrays of the world of an environment."""
+        return self._rows[number]
+
+    def make_room(self, world: WorldArrays) -> None:
         """Gives all rows the room of a world, if they have less."""
         if all(len(getattr(self._rows[0], name)) >= len(getattr(world, name)) for name in ROOMS):
             return
         rows = [with_room_of(self._arrays, row, world) for row in self._rows]
         shown = [
-            face is not None and face.live.world.actors.arrays is row
+            face is not None and face.live is not None and face.live.world.actors.arrays is row
             for face, row in zip(self.faces, self._rows, strict=True)
         ]
-        self._stacks[0] = _stacked(rows[0], self._count)
-        del self.__dict__["_rows"]
+        self._stacks[0] = stacked(rows[0], self._count)
+        self._forget_views()
         for number, row in enumerate(rows):
-            _copy(self._rows[number], row)
+            copy_row(self._rows[number], row)
             face = self.faces[number]
-            if face is not None and shown[number]:
+            if face is not None and face.live is not None and shown[number]:
                 face.live.world.actors.arrays = self._rows[number]
-
-    def _drive_of(self, live: LiveSession) -> DriveArrays:
-        """Returns the decision arrays of a session that begins."""
-        landmarks = live.scenario.storyboard.landmarks[: self._limits.landmarks]
-        arrays = DriveArrays(
-            empty_records(DriveRecord, 1), np.zeros(self._limits.landmarks, dtype=np.int32),
-            np.full((self._limits.landmarks, 2), math.inf),
-        )  # fmt: skip
-        arrays.state["landmark"] = arrays.state["goal_lane"] = arrays.state["told_lane"] = -1
-        arrays.state["stage"], arrays.state["begins"] = Stage.GUIDING, True
-        for row, landmark in enumerate(landmarks):
-            arrays.waypoints[row] = landmark.waypoint
-            arrays.rows[row] = self._row_of_costs((landmark.lane, landmark.station), ())
-        return arrays
 
     def _row_of_costs(self, goal: Place, blocked: tuple[Place, ...]) -> int:
         """Returns the row of the costs to a goal; new ones are added."""
@@ -381,7 +393,7 @@ class DrivingBatch(Lookups):
         while (waiting := np.flatnonzero((state["stage"] == Stage.MOVING) | (state["stage"] == Stage.NO_SPACE))).size:
             for number in waiting.tolist():
                 if state["stage"][number] == Stage.NO_SPACE:
-                    self._make_room(lengthened(self._rows[number]))
+                    self.make_room(lengthened(self._rows[number]))
                 else:
                     self._look(number)
             self._share_act()
@@ -423,15 +435,26 @@ class DrivingBatch(Lookups):
     # --- Rare events --------------------------------------------------------------------------------------------------
 
     def _face(self, number: int) -> DrivingFace:
-        """Returns the face of an environment, with the time and place of its row."""
+        """Returns the face of an environment."""
         face = self.faces[number]
         assert face is not None
-        face.live.world.catch_up()
         return face
+
+    def _live_session(self, number: int) -> LiveSession:
+        """Returns the session of an environment, with the time and place of its row."""
+        face = self._face(number)
+        if face.live is None:
+            face.live = LiveSession(
+                self.town, self._network, face.scenario, self._session_config, self._limits, self._rows[number]
+            )
+            face.live.beliefs.goals = face.goals
+        else:
+            face.live.world.catch_up()
+        return face.live
 
     def _look(self, number: int) -> None:
         """Updates what the ego sees after a change of weather or faults."""
-        world = self._face(number).live.world
+        world = self._live_session(number).world
         self._rows[number] = world.sensing_arrays  # the same arrays, with the present visibility
         self._decisions["faulty"][number] = bool(world.faults)
         if world.faults:
@@ -445,18 +468,18 @@ class DrivingBatch(Lookups):
             return
         acts = playing & (plain(self.worlds.clock)[:, 0]["frame"] / FRAME_RATE >= self._due)
         for number in np.flatnonzero(acts).tolist():
-            face = self._face(number)
+            face, live = self._face(number), self._live_session(number)
             assert face.interference is not None
             face.interference.wait(int(self._waited[number]))
-            face.live.begin_decision()
-            seen, face.seen = face.seen or LazyObservations(face.live), None
-            face.live.play_ad_wizard(face.interference.act(seen))
+            live.begin_decision()
+            seen, face.seen = face.seen or LazyObservations(live), None
+            live.play_ad_wizard(face.interference.act(seen))
             self._move_in(number)
             self._due[number] = face.interference.due
             self._look(number)
-            weather = tuple(face.live.world.weather.values.values())
+            weather = tuple(live.world.weather.values.values())
             plain(self._drivers.inputs)["weather"][number, 0] = weather
-            self._note_task(number)
+            self._note_task(number, live.task)
         self._waited[acts] = 0
         self._waited[playing & ~acts] += 1
 
@@ -466,33 +489,36 @@ class DrivingBatch(Lookups):
             return
         acts = playing & (plain(self.worlds.clock)[:, 0]["frame"] / FRAME_RATE >= self._due)
         for number in np.flatnonzero(acts).tolist():
-            face = self._face(number)
-            face.seen = LazyObservations(face.live)
-            face.seen[Role.AD_WIZARD]
+            self._face(number).seen = seen = LazyObservations(self._live_session(number))
+            seen[Role.AD_WIZARD]  # builds them
 
     def _send_note(self, number: int) -> None:
         """Sends a belief update of the Co-Wizard, which changes where the car slows down."""
         face = self._face(number)
-        face.live.begin_decision()
-        reason = face.live.update_beliefs(face.notes.pop(0))
+        note, reason = face.notes.pop(0), None
+        if face.live is None and note.action is MentalAction.GOAL_UPDATE:
+            face.goals = note.goals
+            set_goals(RowHolder(self, number), goals_on_map(face.scenario, note.goals))
+        else:
+            live = self._live_session(number)
+            live.begin_decision()
+            reason = live.update_beliefs(note)
+            self._move_in(number)
         face.refused = [] if reason is None else [reason]
         self._decisions["refused"][number] = len(face.refused)
-        self._move_in(number)
         if not face.notes:
             self._noted.discard(number)
 
     def _arrive(self, number: int) -> None:
         """Completes the subgoals whose waypoint the standing ego has reached."""
-        live = self._face(number).live
+        live = self._live_session(number)
         live.begin_decision()
         live.note_arrivals()
-        self._note_task(number)
+        self._note_task(number, live.task)
 
-    def _note_task(self, number: int) -> None:
+    def _note_task(self, number: int, task: TaskState) -> None:
         """Writes the state of the task into the row after a change."""
-        face = self.faces[number]
-        assert face is not None
-        task = face.live.task
+        face = self._face(number)
         if task.version == face.version:
             return
         face.version = task.version
@@ -507,8 +533,7 @@ class DrivingBatch(Lookups):
 
     def _note_goal(self, number: int) -> None:
         """Queues the belief updates for a goal: a place on the map, or one as far ahead as was said."""
-        face, state = self.faces[number], self._decisions[number]
-        assert face is not None
+        face, state = self._face(number), self._decisions[number]
         said = plain(self._guidances.said)[number, 0]
         if state["fresh"]:
             face.notes = [Mental(action=MentalAction.GOAL_UPDATE)]
@@ -519,39 +544,3 @@ class DrivingBatch(Lookups):
                 place = LanePosition(lane=int(state["told_lane"]), metres=int(state["told_station"]))
                 face.notes.append(Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=place))
         self._noted.add(number)
-
-    def _guidance_of(self, live: LiveSession) -> InstructorArrays:
-        """Returns the instructor of a session that begins."""
-        limits, storyboard = self._limits, live.scenario.storyboard
-        arrays = instructor_arrays(
-            lanes=len(self.town.lanes), subgoals=limits.subgoals, landmarks=limits.landmarks, streets=limits.streets,
-            things=limits.objects,
-        )  # fmt: skip
-        arrays.now["by_name"] = self._config.guidance is Guidance.GOALS
-        arrays.names[: len(live.scenario.street_names)] = _streets(live)
-        landmarks = storyboard.landmarks[: limits.landmarks]
-        known = {(landmark.lane, landmark.station) for landmark in landmarks if not landmark.hidden}
-        marks = plain(arrays.marks)
-        for row, landmark in enumerate(landmarks):
-            place = landmark.lane, landmark.station
-            marks[row] = landmark.station, landmark.lane, landmark.name.value, place in known
-        return arrays
-
-
-def _streets(live: LiveSession) -> list[int]:
-    return [name.value for name in live.scenario.street_names]
-
-
-def _stacked(arrays: Arrays, count: int) -> Arrays:
-    """Returns a tuple of arrays with a leading axis, of `count` copies."""
-    rooms = [np.zeros((count, *array.shape), dtype=array.dtype) for array in arrays]
-    stack: Arrays = type(arrays)._make(room.view(np.recarray) if room.dtype.names else room for room in rooms)  # type: ignore[attr-defined]  # of named tuples
-    for number in range(count):
-        _copy(row_of(stack, number), arrays)
-    return stack
-
-
-def _copy(row: tuple[Any, ...], arrays: tuple[Any, ...]) -> None:
-    """Copies arrays byte by byte: NumPy leaves out the bytes between the fields of records."""
-    for target, source in zip(row, arrays, strict=True):
-        np.copyto(np.asarray(target).view(np.uint8), np.ascontiguousarray(source).view(np.uint8))

@@ -61,7 +61,7 @@ def add_vehicle(
     Raises:
         ValueError: the world has no room for another one.
     """
-    empty = np.flatnonzero(world.vehicles["kind"] == Kind.EMPTY)
+    empty = np.flatnonzero(plain(world.vehicles)["kind"] == Kind.EMPTY)
     if not len(empty):
         raise ValueError(f"the world has room for {len(world.vehicles)} vehicles, and all are there")
     number = int(empty[0])
@@ -101,7 +101,7 @@ def add_car(town: TownArrays, world: WorldArrays, lane: int, station: float) -> 
         station: along it [m].
     """
     add_vehicle(town, world, lane, station, kind=Kind.DRIVEN, desired=0.0)
-    world.vehicles[0].key = CAR_KEY
+    plain(world.vehicles)["key"][0] = CAR_KEY
 
 
 def remove_vehicle(town: TownArrays, world: WorldArrays, number: int) -> None:

@@ -209,3 +209,22 @@ def test_mistakes_are_explained() -> None:
     assert truncated.all()
     with pytest.raises(gym.error.ResetNeeded, match="wait for a reset"):
         env.step(np.array([0, 0]))
+
+
+def test_session_that_is_looked_up_late_is_the_one_that_was_played() -> None:
+    watched, alone = (NavigationVectorEnv(3, guidance="goals", max_seconds=60.0) for _ in range(2))
+    check_equal(watched.reset(seed=21), alone.reset(seed=21))
+    rng = np.random.default_rng(2)
+    for _ in range(40):
+        mask = alone.action_masks()
+        actions = (rng.random(mask.shape) * mask).argmax(axis=1)
+        check_equal(watched.step(actions), alone.step(actions))
+        sessions = [watched.batches[0].catch_up(number) for number in range(3)]
+    for number, session in enumerate(sessions):
+        late = alone.batches[0].catch_up(number)
+        assert (late.world.time, late.beliefs.goals) == (session.world.time, session.beliefs.goals)
+        assert late.world.ego.goals == session.world.ego.goals
+        assert late.infractions == session.infractions
+        np.testing.assert_array_equal(late.world.localizer.pose, session.world.localizer.pose)
+        np.testing.assert_array_equal(late.world.seen(), session.world.seen())
+    assert any(session.beliefs.goals for session in sessions)

@@ -14,7 +14,7 @@ from dorothie_gym.sim.ego.limits import KMH, MAX_CRUISE, MIN_CRUISE, VehicleCont
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car
 from dorothie_gym.sim.state.record_views import ArrayHolder
-from dorothie_gym.sim.state.records import GoalRecord, filled_records
+from dorothie_gym.sim.state.records import GoalRecord, filled_records, plain
 
 CRUISE_REFUSAL = f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
 """Reason of the refusal of a cruise speed."""
@@ -27,6 +27,16 @@ class GoalAhead:
 
     lane: int
     station: float
+
+
+def set_goals(holder: ArrayHolder, goals: Sequence[GoalAhead]) -> None:
+    """Sets the places where the ego of a world is expected to stop."""
+    rows = filled_records(GoalRecord, [(goal.station, goal.lane) for goal in goals])
+    if len(goals) > len(holder.arrays.goals):
+        holder.arrays = holder.arrays._replace(goals=rows)
+    plain(holder.arrays.goals)[: len(goals)] = plain(rows)[: len(goals)]
+    plan = plain(holder.arrays.plan)[0]
+    plan["goals"], plan["written"] = len(goals), 0
 
 
 class EgoController:
@@ -115,13 +125,7 @@ class EgoController:
 
     def set_goals(self, goals: Sequence[GoalAhead]) -> None:
         """Sets the places where the ego is expected to stop."""
-        rows = filled_records(GoalRecord, [(goal.station, goal.lane) for goal in goals])
-        arrays = self._holder.arrays
-        if len(goals) > len(arrays.goals):
-            self._holder.arrays = arrays = arrays._replace(goals=rows)
-        arrays.goals[: len(goals)] = rows[: len(goals)]
-        plan = self.planner.plan
-        plan["goals"], plan["written"] = len(goals), 0
+        set_goals(self._holder, goals)
 
     def speed_at(self, s: float) -> float:
         """Returns the speed that curves, limits and the end of the path allow at a distance along the path [m/s].

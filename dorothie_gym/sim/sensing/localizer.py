@@ -164,6 +164,9 @@ class Localizer(Lookups):
         self._record["gps_from"] = until
 
 
+_FIRST_COVARIANCE = np.diag(np.square([*DEPARTURE_SIGMAS, SCALE_SIGMA, BIAS_SIGMA]))
+
+
 def switch_on(world: WorldArrays, rng: np.random.Generator) -> None:
     """Begins to localize the ego of a world, where it is now.
 
@@ -171,12 +174,12 @@ def switch_on(world: WorldArrays, rng: np.random.Generator) -> None:
         world: arrays of the world.
         rng: source of the errors of its sensors, which continue the generator's numbers.
     """
-    record, car = world.localizer[0], world.vehicles[0]
+    record, car = plain(world.localizer)[0], plain(world.vehicles)[0]
     scale, bias = rng.standard_normal(2)
-    record.estimate[:] = car.x, car.y, car.heading, 1.0, 0.0
-    record.covariance[:] = np.diag(np.square([*DEPARTURE_SIGMAS, SCALE_SIGMA, BIAS_SIGMA]))
-    record.truth[:] = 1.0 + SCALE_SIGMA * scale, BIAS_SIGMA * bias
-    begin_stream(record, rng)
+    record["estimate"] = car["x"], car["y"], car["heading"], 1.0, 0.0
+    record["covariance"] = _FIRST_COVARIANCE
+    record["truth"] = 1.0 + SCALE_SIGMA * scale, BIAS_SIGMA * bias
+    begin_stream(world.localizer[0], rng)
 
 
 @compiled
