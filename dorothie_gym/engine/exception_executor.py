@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
 from dorothie_gym.engine.session_log import Outcome
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.maps.model import Array, LinkType
+from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import ExceptionKind, GoalStatus, PropKind
 from dorothie_gym.sim.bodies import Prop
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
+from dorothie_gym.sim.population import kerb
 from dorothie_gym.sim.roadblocks import crowds, cuts_off
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import AdWizardAction
@@ -119,21 +122,9 @@ class ExceptionExecutor:
 
     def _places_within(self, middle: Array, half: float, *, driving: bool) -> list[tuple[int, float]]:
         """Returns candidate places in a square: on lanes away from waypoints for vehicles, else at the right kerb."""
-        world, town = self._world, self._world.town
-        places = []
-        for lane in town.lanes:
-            if lane.in_junction or lane.length < 12.0:
-                continue
-            if not driving and town.neighbour(lane.id, LinkType.LANE_CHANGE_RIGHT) is not None:
-                continue
-            waypoints = [site.station for site in town.sites if site.lane == lane.id] if driving else []
-            for station in np.arange(6.0, lane.length - 5.0, SPAWN_STEP).tolist():
-                x, y = lane.position(station) if driving else world.actors.kerb(lane.id, station)
-                if max(abs(x - middle[0]), abs(y - middle[1])) > half:
-                    continue
-                if all(abs(waypoint - station) >= FROM_WAYPOINT for waypoint in waypoints):
-                    places.append((lane.id, station))
-        return places
+        places, points = _spawn_places(self._world.town, driving)
+        inside = np.abs(points - middle).max(axis=1) <= half
+        return [places[k] for k in np.flatnonzero(inside).tolist()]
 
     def _place_prop(self, action: AdWizardAction) -> Outcome:
         if len(self._world.actors.props) >= self._max_props:
@@ -249,3 +240,20 @@ class ExceptionExecutor:
 
 def _xy(prop: Prop) -> dict[str, float]:
     return {"x": round(float(prop.position[0]), 3), "y": round(float(prop.position[1]), 3)}
+
+
+@lru_cache(maxsize=16)
+def _spawn_places(town: Town, driving: bool) -> tuple[list[tuple[int, float]], Array]:
+    """Returns the candidate places of a town, lanes and stations [m], and their positions (n, 2) [m]."""
+    places, points = [], []
+    for lane in town.lanes:
+        if lane.in_junction or lane.length < 12.0:
+            continue
+        if not driving and town.neighbour(lane.id, LinkType.LANE_CHANGE_RIGHT) is not None:
+            continue
+        waypoints = [site.station for site in town.sites if site.lane == lane.id] if driving else []
+        for station in np.arange(6.0, lane.length - 5.0, SPAWN_STEP).tolist():
+            if all(abs(waypoint - station) >= FROM_WAYPOINT for waypoint in waypoints):
+                places.append((lane.id, station))
+                points.append(lane.position(station) if driving else kerb(lane, station))
+    return places, np.array(points).reshape(-1, 2)

@@ -10,12 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from dorothie_gym.copying import Lookups
-from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.bodies import Bodies, Pedestrian, Prop, TrafficVehicle
-from dorothie_gym.sim.pedestrians.pacing import (
-    KERB,
-)
 from dorothie_gym.sim.population import (
     SPEEDS,
     add_prop,
@@ -108,12 +104,6 @@ class Actors(Lookups):
         self._make_room(pedestrians=1)
         found = add_street_walker(self._road.network, self._town_arrays, self.arrays, lane, station)
         return found is not None
-
-    def kerb(self, lane: int, station: float) -> Array:
-        """Returns the place of a pedestrian beside a lane (2,) [m]; `lane` is the rightmost one of its direction."""
-        town_lane = self._town.lanes[lane]
-        place: Array = town_lane.position(station, town_lane.width_at(station) / 2 + KERB)
-        return place
 
     def add_prop(self, kind: PropKind, lane: int, station: float) -> Prop:
         """Adds a prop on a lane; the caller has checked that it may stand there.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled
 from dorothie_gym.maps.lane_neighbours import rightmost
-from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.network.network import TownNetwork
@@ -168,13 +168,18 @@ def add_street_walker(
     """
     beside = network.town.lanes[rightmost(network.town, lane)]
     station = min(station, beside.length)
-    x, y = (float(value) for value in beside.position(station, beside.width_at(station) / 2 + KERB))
+    x, y = (float(value) for value in kerb(beside, station))
     walk, at, _ = closest_walk(town, Footway.STREET, x, y, STREET_WAY_REACH)
     if walk < 0 or town.walks[walk].lane != beside.id or not is_clear_of_people(world, x, y, NOBODY, CLEAR_OF_WALKER):
         return None
     if (world.pedestrians["state"] != Walk.EMPTY).all():
         return None
     return add_pedestrian(town, world, walk, at, pace=WALKING_SPEED)
+
+
+def kerb(lane: Lane, station: float) -> Array:
+    """Returns the place of a pedestrian beside a lane (2,) [m]; the lane is the rightmost one of its direction."""
+    return lane.position(station, lane.width_at(station) / 2 + KERB)
 
 
 def remove_pedestrian(world: WorldArrays, number: int) -> None:
