@@ -136,6 +136,16 @@ def test_an_environment_takes_at_most_a_hundred_kilobytes() -> None:
     assert env.nbytes / 4 < 100 * 1024
 
 
+def test_long_paths_of_many_environments_make_room_once() -> None:
+    env = NavigationVectorEnv(64, "millbrook", threads=1)
+    env.reset(seed=5)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        mask = env.action_masks()
+        env.step((rng.random(mask.shape) * mask).argmax(axis=1))
+    assert env.nbytes / 64 < 120 * 1024
+
+
 def test_masks_are_those_of_infos() -> None:
     env = NavigationVectorEnv(4)
     _, infos = env.reset(seed=1)

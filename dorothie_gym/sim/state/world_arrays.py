@@ -299,10 +299,11 @@ def with_room_of(town: TownArrays, world: WorldArrays, other: WorldArrays) -> Wo
 
 def lengthened(world: WorldArrays) -> WorldArrays:
     """Returns the same world with the room for the path of the ego that was missing last."""
-    points = int(world.plan[0].needed)
-    if points > len(world.course):
-        return world._replace(course=_extended(world.course, math.ceil(points / ROWS) * ROWS))
-    return world._replace(steps=_extended(world.steps, 2 * len(world.steps)))
+    points = int(plain(world.plan)["needed"][0])
+    if points == 0:
+        return world._replace(steps=_extended(world.steps, 2 * len(world.steps)))
+    room = max(math.ceil(points / ROWS) * ROWS, len(world.course))  # a batch may have made room for another world
+    return world._replace(course=_extended(world.course, room))
 
 
 def _extended(records: RecordArray[Record], count: int) -> RecordArray[Record]:
