@@ -9,6 +9,7 @@ written, every process compiles again, and one ``RuntimeWarning`` explains how t
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import update_wrapper
 from typing import TypeVar, cast
 
 import numpy as np
@@ -81,7 +82,7 @@ def direct(function: F) -> F:
             entry = entries[kinds] = function.entry_for(*arguments)
         return entry(*arguments)
 
-    return cast(F, call)
+    return cast(F, update_wrapper(call, function.py_func))
 
 
 def _kind(array: NDArray[np.generic]) -> tuple[object, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from typing import Final, NamedTuple, TypeVar
+from typing import Annotated, Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,9 +37,27 @@ class Stage(enum.IntEnum):
     """Only the observation is to be written."""
 
 
+class Event(enum.IntFlag):
+    """Rare events of a decision, which Python handles."""
+
+    WAITS = 1
+    """A stage needs Python: `MOVING`, `NO_SPACE` or `NO_COSTS`."""
+    NEAR = 2
+    """The ego stands near a waypoint."""
+    LOST = 4
+    """The stage is `LOST`."""
+    TOLD = 8
+    """An instruction changes what the Co-Wizard believes."""
+
+
+EVENTS: Final = 2
+"""Column of `threads.turns_of` in which a thread notes the events of its environments."""
+
+
 class DriveRecord:
     """Decision of an environment."""
 
+    controls: Annotated[NDArray[np.float64], "f8", (3,)]  # throttle, steer (positive right), brake
     speed: Float  # of the ego at its beginning [m/s]
     since: Float  # time of its beginning [s]
     goal_station: Float  # goal that progress is measured to [m]

@@ -11,13 +11,14 @@ from typing import Any, ClassVar, Final, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.beliefs import goals_on_map
 from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.engine.session_engine import LiveSession, session_seeds
-from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, DriveArrays, DrivingTown, Stage, row_of
+from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, EVENTS, DriveArrays, DrivingTown, Event, Stage, row_of
 from dorothie_gym.envs.driving_start import Blanks, blank_parts, blank_world, copy_row, stacked, write_scenario
 from dorothie_gym.envs.driving_steps import act_share, guide_share
 from dorothie_gym.envs.episode import EpisodeArrays
@@ -30,15 +31,16 @@ from dorothie_gym.maps.routing_graph import routing_graph
 from dorothie_gym.ontology import LandmarkName, MentalAction, PhysicalAction, Role
 from dorothie_gym.policies.navigation.cost_to_go import cost_table
 from dorothie_gym.policies.navigation.driver_view import DriverArrays
-from dorothie_gym.policies.navigation.instructor import NavigationInstruction, exit_sectors, instruction_of
+from dorothie_gym.policies.navigation.instructor import exit_sectors, instruction_of
 from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
 from dorothie_gym.policies.navigation.junction_exits import exit_arrays
-from dorothie_gym.policies.navigation.observation_vector import Vector
+from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, Vector
 from dorothie_gym.policies.route_tables import route_tables
 from dorothie_gym.sim.batch.threads import ThreadPool, turns_of
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL, set_goals
 from dorothie_gym.sim.ego.planner import REASONS
+from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.state.town_arrays import town_arrays
@@ -53,8 +55,15 @@ ROOMS: Final = ("vehicles", "pedestrians", "props", "course", "steps", "goals")
 """Arrays of a world whose lengths differ between worlds of a town."""
 
 
-CHANGES: Final = ("faces", "_stacks", "_due", "_waited", "_live", "_noted", "_faulty", "_common", "_cost_rows")
+CHANGES: Final = ("faces", "_stacks", "_due", "_waited", "_live", "_noted", "_faulty")
 """Attributes of a batch that hold what changes."""
+
+
+INFRACTIONS: Final = tuple(kind.value for kind in INFRACTION_KINDS)
+"""Names of the infractions that infos count."""
+
+_WAITS, _NEAR, _LOST, _TOLD = map(int, Event)
+_act_share, _guide_share = direct(act_share), direct(guide_share)
 
 
 @dataclass
@@ -112,7 +121,7 @@ class DrivingBatch(Lookups):
         threads: number of threads, the caller's included.
     """
 
-    LOOKED_UP: ClassVar[tuple[str, ...]] = ("_pool", "_rows", "_blanks")
+    LOOKED_UP: ClassVar[tuple[str, ...]] = ("_pool", "_rows", "_blanks", "_decisions", "outcomes", "infractions")
 
     def __init__(
         self, town: Town, template: StoryboardTemplate | None, config: NavigationConfig, count: int, threads: int,
@@ -146,6 +155,7 @@ class DrivingBatch(Lookups):
         self._stacks: list[Any] = []
         self._due, self._waited = np.full(count, math.inf), np.zeros(count, dtype=np.int64)
         self._live = np.zeros(count, dtype=np.int64)
+        self._turns = turns_of(count, self.threads)
         self._noted, self._faulty = set[int](), set[int]()
 
     @cached_property
@@ -167,18 +177,29 @@ class DrivingBatch(Lookups):
 
     def __setstate__(self, values: dict[str, object]) -> None:
         self.__dict__.update(values)
-        self.bind()
+        self._show_rows()
 
     def mutable_values(self) -> dict[str, object]:
         """Returns what changes in the sessions."""
         values = self.__getstate__()
-        return {name: values[name] for name in CHANGES}
+        used = {*self._decisions["costs"].tolist(), *self._drives.rows.ravel().tolist()} if self._stacks else set()
+        goals = {row: goal for goal, row in self._cost_rows.items() if row in used}
+        return {"goals": goals, **{name: values[name] for name in CHANGES}}
 
     def apply_values(self, values: dict[str, object]) -> None:
-        """Applies the values of `mutable_values`."""
+        """Applies the values of `mutable_values`; the costs to the goals may be in other rows here."""
+        goals = values.pop("goals")
+        assert isinstance(goals, dict)  # of `mutable_values`
         self.__setstate__(values)
+        if not self._stacks:
+            return
+        rows = np.zeros(1 + max(goals, default=0), dtype=np.int32)
+        for row, goal in goals.items():
+            rows[row] = self._row_of_costs(*goal)
+        self._drives.rows[...] = rows[self._drives.rows]
+        self._decisions["costs"] = rows[self._decisions["costs"]]
 
-    def bind(self) -> None:
+    def _show_rows(self) -> None:
         """Lets the faces show their rows, after the arrays or the faces were replaced."""
         self._forget_views()
         for number, face in enumerate(self.faces):
@@ -186,8 +207,9 @@ class DrivingBatch(Lookups):
                 face.live.world.actors.arrays = self._rows[number]
 
     def _forget_views(self) -> None:
-        self.__dict__.pop("_rows", None)
-        self.__dict__.pop("_blanks", None)
+        for name in self.LOOKED_UP:
+            if name != "_pool":
+                self.__dict__.pop(name, None)
 
     # --- Arrays of all environments -----------------------------------------------------------------------------------
 
@@ -222,12 +244,12 @@ class DrivingBatch(Lookups):
         """Feasible actions at the present decision (environments, 18), to be copied."""
         return self._drivers.mask
 
-    @property
+    @cached_property
     def outcomes(self) -> NDArray[np.void]:
         """`EpisodeRecord` of each environment (environments,)."""
         return plain(self._episodes.state)[:, 0]
 
-    @property
+    @cached_property
     def infractions(self) -> NDArray[np.int64]:
         """Numbers of infractions so far (environments, 5), in the order of `INFRACTION_KINDS`, to be copied."""
         counts: NDArray[np.int64] = plain(self.worlds.watch)[:, 0]["counts"]
@@ -266,14 +288,32 @@ class DrivingBatch(Lookups):
         refused: NDArray[np.bool_] = (self._decisions["refusal"] > 0) | (self._decisions["refused"] > 0)
         return refused
 
-    @property
+    @cached_property
     def _decisions(self) -> NDArray[np.void]:
         return plain(self._drives.state)[:, 0]
 
-    def instruction(self, number: int) -> NavigationInstruction | None:
-        """Returns the last instruction of an environment; None if none was given yet."""
+    def heard(self, number: int) -> HeardInstruction:
+        """Returns the last instruction of an environment, as its driver remembers it."""
+        guidance, record = row_of(self._guidances, number), plain(self._drivers.heard)[number, 0]
+        goal = (int(record["goal_lane"]), float(record["goal_station"])) if record["goal_lane"] >= 0 else None
+        given = instruction_of(guidance) if plain(guidance.said)["given"][0] else None
+        return HeardInstruction(instruction=given, driven=float(record["driven"]), goal=goal)
+
+    def goal(self, number: int) -> Place | None:
+        """Returns the place that progress in an environment is measured to, or None."""
+        state = self._decisions[number]
+        return (int(state["goal_lane"]), float(state["goal_station"])) if state["goal_lane"] >= 0 else None
+
+    def blocked(self, number: int) -> tuple[Place, ...]:
+        """Returns the places behind the roadblocks that the instructor of an environment has seen."""
         guidance = row_of(self._guidances, number)
-        return instruction_of(guidance) if plain(guidance.said)["given"][0] else None
+        closed = plain(guidance.closed)[: int(plain(guidance.route)["closed"][0])]
+        return tuple((lane, station) for station, lane in closed.tolist())
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether every environment has a session."""
+        return None not in self.faces
 
     def catch_up(self, number: int) -> LiveSession:
         """Returns the session of an environment, as it is after the last decision."""
@@ -349,7 +389,9 @@ class DrivingBatch(Lookups):
         """Returns the row of the costs to a goal; new ones are added."""
         row = self._cost_rows.get((goal, blocked))
         if row is None:
-            row = self._cost_rows[goal, blocked] = len(self._cost_rows)
+            taken = set(self._cost_rows.values())
+            row = next(free for free in range(len(taken) + 1) if free not in taken)
+            self._cost_rows[goal, blocked] = row
             if row == len(self._common.costs):
                 more = np.zeros((2 * row, self._common.costs.shape[1]))
                 more[:row] = self._common.costs
@@ -359,7 +401,7 @@ class DrivingBatch(Lookups):
 
     # --- A decision ---------------------------------------------------------------------------------------------------
 
-    def play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
+    def play(self, actions: NDArray[np.generic] | int, playing: NDArray[np.bool_]) -> None:
         """Plays a decision in some environments.
 
         Args:
@@ -367,70 +409,75 @@ class DrivingBatch(Lookups):
             playing: environments that play (n,).
         """
         state = self._decisions
-        if self.pedals:
-            plan = plain(self.worlds.plan)[:, 0]
-            for k, name in enumerate(("throttle", "steer", "brake")):
-                plan[name][playing] = actions[playing, k]
-        else:
-            state["action"] = actions
+        state["controls" if self.pedals else "action"] = actions
         state["refused"], state["refusal"] = 0, 0
-        state["stage"] = np.where(playing, Stage.ACTING, Stage.DONE)
+        state["stage"] = playing * np.int32(Stage.ACTING)
         self._interfere(playing)
         for number in [number for number in self._noted if playing[number]]:
             self._send_note(number)
-        self._act()
+        events = self._act()
         for number in list(self._faulty):
             self._look(number)
-        for number in np.flatnonzero(state["near"] & playing).tolist():
-            self._arrive(number)
+        if events & _NEAR:
+            for number in np.flatnonzero(state["near"] & playing).tolist():
+                self._arrive(number)
         self._foresee(playing)
         self._guide()
 
-    def _act(self) -> None:
-        """Plays the first half of a decision, or lays new paths."""
+    def _act(self) -> int:
+        """Plays the first half of a decision, or lays new paths; returns the `Event` flags."""
         state = self._decisions
-        self._share_act()
-        while (waiting := np.flatnonzero((state["stage"] == Stage.MOVING) | (state["stage"] == Stage.NO_SPACE))).size:
-            for number in waiting.tolist():
+        events = all_events = self._share_act()
+        while events & _WAITS:
+            for number in np.flatnonzero(np.isin(state["stage"], (Stage.MOVING, Stage.NO_SPACE))).tolist():
                 if state["stage"][number] == Stage.NO_SPACE:
                     self.make_room(lengthened(self._rows[number]))
                 else:
                     self._look(number)
-            self._share_act()
+            events = self._share_act()
+            all_events |= events
+        return all_events
 
     def _guide(self) -> None:
         """Plays the second half of a decision."""
-        self._share_guide()
+        events = self._share_guide()
         state = self._decisions
-        missing = np.flatnonzero(state["stage"] == Stage.NO_COSTS)
-        if missing.size:
-            for number in missing.tolist():
-                guidance = row_of(self._guidances, number)
-                mark = plain(guidance.marks)[int(plain(guidance.route)["landmark"][0])]
-                closed = plain(guidance.closed)[: int(plain(guidance.route)["closed"][0])]
-                blocked = tuple((lane, station) for station, lane in closed.tolist())
-                state["new_costs"][number] = self._row_of_costs((int(mark["lane"]), float(mark["station"])), blocked)
-            self._share_guide()
-        if self.pedals and (state["stage"] == Stage.LOST).any():
+        if events & _WAITS:
+            self._add_costs()
+            events |= self._share_guide()
+        if events & _LOST:
             self._act()
             self._share_guide()
-        for number in np.flatnonzero(state["told"]).tolist():
-            self._note_goal(number)
-            state["told"][number] = False
+        if events & _TOLD:
+            for number in np.flatnonzero(state["told"]).tolist():
+                self._note_goal(number)
+                state["told"][number] = False
 
-    def _share_act(self) -> None:
-        self.share(act_share, self._exits, self.worlds, self._drivers, self._drives, self.frames, self.pedals)
+    def _add_costs(self) -> None:
+        """Adds the costs to goals that roadblocks have changed; those that nobody needs any more are dropped."""
+        state = self._decisions
+        used = set(state["costs"].tolist())
+        self._cost_rows = {goal: row for goal, row in self._cost_rows.items() if not goal[1] or row in used}
+        for number in np.flatnonzero(state["stage"] == Stage.NO_COSTS).tolist():
+            guidance = row_of(self._guidances, number)
+            mark = plain(guidance.marks)[int(plain(guidance.route)["landmark"][0])]
+            goal = int(mark["lane"]), float(mark["station"])
+            state["new_costs"][number] = self._row_of_costs(goal, self.blocked(number))
 
-    def _share_guide(self) -> None:
-        self.share(
-            guide_share, self._exits, self._tables, self._graph, self._searches, self._common, self.worlds,
+    def _share_act(self) -> int:
+        return self.share(_act_share, self._exits, self.worlds, self._drivers, self._drives, self.frames, self.pedals)
+
+    def _share_guide(self) -> int:
+        return self.share(
+            _guide_share, self._exits, self._tables, self._graph, self._searches, self._common, self.worlds,
             self._drivers, self._guidances, self._episodes, self._drives,
         )  # fmt: skip
 
-    def share(self, work: Callable[..., None], *arguments: object) -> None:
-        """Calls `work(turns, home, town, *arguments)` in every thread, and waits for all of them."""
-        turns = turns_of(self._count, self.threads)
+    def share(self, work: Callable[..., None], *arguments: object) -> int:
+        """Calls `work(turns, home, town, *arguments)` in every thread, and waits for all; returns the `Event` flags."""
+        turns = self._turns.copy()
         self._pool.do(work, lambda home: (turns, home, self._arrays, *arguments))
+        return int(turns[0, EVENTS]) if len(turns) == 1 else int(np.bitwise_or.reduce(turns[:, EVENTS]))
 
     # --- Rare events --------------------------------------------------------------------------------------------------
 

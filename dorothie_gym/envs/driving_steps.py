@@ -14,7 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, concurrent
-from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, DriveArrays, DriveRecord, DrivingTown, Stage, row_of
+from dorothie_gym.envs.driving_arrays import (
+    CRUISE_LIMIT,
+    EVENTS,
+    DriveArrays,
+    DriveRecord,
+    DrivingTown,
+    Event,
+    Stage,
+    row_of,
+)
 from dorothie_gym.envs.episode import EpisodeArrays, judge
 from dorothie_gym.envs.pedals import find_path, has_lost_path, instructed_manoeuvre, observe_path
 from dorothie_gym.maps.route_arrays import RouteSearch
@@ -64,6 +73,7 @@ _may_change_cruise = compiled(may_change_cruise)
 
 
 _DONE, _ACTING, _MOVING, _NO_SPACE, _GUIDING, _NO_COSTS, _LOST, _OBSERVING = map(int, Stage)
+_WAITS, _NEAR, _IS_LOST, _TOLD = map(int, Event)
 
 
 # --- Action and physics -----------------------------------------------------------------------------------------------
@@ -125,6 +135,7 @@ def carry_out(
     """
     plan = world.plan[0]
     if pedals:
+        plan.throttle, plan.steer, plan.brake = state.controls[0], state.controls[1], state.controls[2]
         order, angle = instructed_manoeuvre(town, exits, world, driver)
     else:
         order, angle = ordered_manoeuvre(driver, int(state.action))
@@ -283,7 +294,7 @@ def act_share(
     """Calls `act` for the environments whose stage is `ACTING`, `MOVING`, `NO_SPACE` or `LOST`, until all are taken.
 
     Args:
-        turns: numbers of the environments, see `threads.take`.
+        turns: numbers of the environments, see `threads.take`; events are noted in the column `EVENTS`.
         home: number of the block that is this thread's own.
         town: arrays of the town.
         exits: exits of its junctions.
@@ -299,6 +310,9 @@ def act_share(
         stage = drive.state[0].stage
         if stage == _ACTING or stage == _MOVING or stage == _NO_SPACE or stage == _LOST:
             act(town, exits, row_of(worlds, number), row_of(drivers, number), drive, frames, pedals)
+            stage = drive.state[0].stage
+            turns[home, EVENTS] |= _WAITS if stage == _MOVING or stage == _NO_SPACE else 0
+            turns[home, EVENTS] |= _NEAR if drive.state[0].near else 0
         number = take(turns, home)
 
 
@@ -311,7 +325,7 @@ def guide_share(
     """Guides, judges and observes as the stage of each environment says, until all are taken.
 
     Args:
-        turns: numbers of the environments, see `threads.take`.
+        turns: numbers of the environments, see `threads.take`; events are noted in the column `EVENTS`.
         home: number of the block that is this thread's own, and of its scratch space.
         town: arrays of the town.
         exits: exits of its junctions.
@@ -338,6 +352,9 @@ def guide_share(
                 finish(graph, common, world, guidance, row_of(episodes, number), drive)
             if state.stage == _OBSERVING:
                 look_out(town, exits, graph, common, world, driver, state)
+            turns[home, EVENTS] |= _WAITS if state.stage == _NO_COSTS else 0
+            turns[home, EVENTS] |= _IS_LOST if state.stage == _LOST else 0
+            turns[home, EVENTS] |= _TOLD if state.told else 0
         number = take(turns, home)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.scenario import Scenario, check_options, scenario_option, template_option
-from dorothie_gym.envs.driving_batch import DrivingBatch
+from dorothie_gym.envs.driving_batch import INFRACTIONS, DrivingBatch
 from dorothie_gym.envs.driving_view import DrivingView
 from dorothie_gym.envs.episode import TERMS, Ending
 from dorothie_gym.envs.navigation_config import NavigationConfig
@@ -27,15 +27,11 @@ from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.processors import available_processors
-from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.vector_infos import Infos, mask_of, masked_infos, seeds_of
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
 """A town, or several that the environments of a batch play in turn."""
-
-INFRACTIONS: Final = tuple(kind.value for kind in INFRACTION_KINDS)
-"""Names of the infractions that infos count."""
 
 LARGEST_SEED: Final = 2**31
 """Seeds of sessions that follow without a seed of their own are below."""

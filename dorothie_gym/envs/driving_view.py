@@ -23,9 +23,21 @@ class DrivingView:
         self._live: LiveSession | None = None
         self._shown = -math.inf  # time of the last instruction that was noted [s]
 
+    @property
+    def notes(self) -> tuple[object, float]:
+        """What was noted of the session, for a state of the environment."""
+        return self.view.notes, self._shown
+
+    def apply_values(self, notes: object, live: LiveSession) -> None:
+        """Applies the notes of a state to the same session, see `SessionView.apply_values`."""
+        assert isinstance(notes, tuple)  # of `notes`
+        self._live = live
+        drawn, self._shown = notes
+        self.view.apply_values(drawn, live)
+
     def note(self, batch: DrivingBatch, place: int) -> None:
         """Notes the present decision of an environment."""
-        live, said = batch.catch_up(place), batch.instruction(place)
+        live, said = batch.catch_up(place), batch.heard(place).instruction
         if live is self._live:
             live.begin_decision()
             live.note_place()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -12,14 +10,14 @@ from numpy.typing import NDArray
 
 from dorothie_gym.action_values import whole_number
 from dorothie_gym.engine.scenario import ResetOptions
-from dorothie_gym.envs.driving_session import DrivingEnv
+from dorothie_gym.envs.driving_env import DrivingEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps import Town
-from dorothie_gym.policies.navigation.actions import ACTIONS, NavigationAction, physical_of
+from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, Vector, navigation_space
-from dorothie_gym.spaces import CoWizardAction, StepInfo
+from dorothie_gym.spaces import StepInfo
 from dorothie_gym.tasks import StoryboardTemplate
 
 
@@ -72,7 +70,6 @@ class NavigationEnv(DrivingEnv[np.int64]):
     """
 
     metadata = metadata_at(DECISION_FREQUENCY)
-    CHANGES: ClassVar[Sequence[str]] = (*DrivingEnv.CHANGES, "_mask")
 
     def __init__(
         self,
@@ -92,10 +89,9 @@ class NavigationEnv(DrivingEnv[np.int64]):
             guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
             max_seconds=max_seconds, patience=patience,
         )  # fmt: skip
-        super().__init__(town, storyboard, config, render_mode, view)
+        super().__init__(town, storyboard, config, render_mode, view, pedals=False)
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = navigation_space()
-        self._mask = np.zeros(len(ACTIONS), dtype=np.int8)
 
     def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
         """Begins a session.
@@ -104,8 +100,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
             seed: seed of the session; None draws one.
             options: `scenario` plays a given `Scenario`; other options cause a warning.
         """
-        self.begin(seed, options)
-        return self._observe(), self._info()
+        return self._begin(seed, options)
 
     def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, StepInfo]:
         """Plays one decision.
@@ -114,21 +109,15 @@ class NavigationEnv(DrivingEnv[np.int64]):
             ValueError: the action is not a `NavigationAction`.
             gymnasium.error.ResetNeeded: no session is in progress, or it is over.
         """
-        drive = self.drive
-        number = whole_number("action", action, 0, len(ACTIONS) - 1)
-        physical = physical_of(NavigationAction(number), drive.driver)
-        drive.play(CoWizardAction(physical=physical))
-        self.show()
-        return self._observe(), drive.reward, drive.terminated, drive.truncated, self._info()
+        self._check_begun()
+        return self._play(whole_number("action", action, 0, len(ACTIONS) - 1))
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Returns which actions are feasible now (18,); called by the algorithms of sb3-contrib."""
-        return self._mask.astype(np.bool_)
-
-    def _observe(self) -> Vector:
-        vector = self.drive.observe()
-        self._mask = self.drive.driver.mask.copy()
-        return vector
+        mask: NDArray[np.bool_] = np.zeros(len(ACTIONS), dtype=np.bool_)
+        if self.batch.has_begun:
+            mask[:] = self.batch.masks[0]
+        return mask
 
     def _info(self) -> StepInfo:
-        return {"action_mask": self._mask.copy(), **self.drive.info()}
+        return {"action_mask": self.batch.masks[0].copy(), **super()._info()}

@@ -234,7 +234,7 @@ def _interpolated(world: WorldArrays, s: float) -> tuple[float, float, float]:
 
 @compiled
 def _allowed_speed(world: WorldArrays, s: float) -> float:
-    """Returns the speed that the path allows at a distance along it, as `EgoController.speed_at` [m/s]."""
+    """Returns the speed that the path allows at a distance along it [m/s]; before the first step, the cruise speed."""
     plan, course = world.plan[0], world.course
     if plan.written == 0:
         return float(plan.cruise * KMH)

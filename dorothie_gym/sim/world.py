@@ -205,12 +205,6 @@ class World(Lookups, Restorable):
         *_, collisions = self._record.outcome.item()
         return int(collisions)
 
-    def find_path(self) -> None:
-        """Lays a new path from the ego's lane, after an outside driver has left the old one."""
-        vehicle = plain(self.actors.arrays.vehicles)[0]
-        lane, station, offset = (vehicle[name].item() for name in ("lane", "own_station", "own_lateral"))
-        self.planner.restart(lane, min(max(station, 0.0), self.town.lanes[lane].length), offset)
-
     # --- Perception ---------------------------------------------------------------------------------------------------
 
     @property

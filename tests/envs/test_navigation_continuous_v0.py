@@ -36,7 +36,7 @@ def test_car_moves_only_by_throttle_and_brake(env: NavigationContinuousEnv) -> N
     assert observation[FIELD["speed"]] == 0.0
     for _ in range(20):
         observation, _, _, _, _ = env.step(np.array((1.0, 0.0, -1.0), dtype=np.float32))
-    assert float(env.drive.session.world.car.speed) == pytest.approx(6.0, abs=0.2)  # 3 m/s^2 for 2 s
+    assert float(env.session.world.car.speed) == pytest.approx(6.0, abs=0.2)  # 3 m/s^2 for 2 s
     assert observation[FIELD["controls"]][0] == 1.0
     for _ in range(15):
         observation, _, _, _, _ = env.step(np.array((0.0, 0.0, 1.0), dtype=np.float32))
@@ -53,7 +53,7 @@ def test_steering_to_the_right_leaves_the_path_to_the_right(env: NavigationConti
 
 def test_car_off_its_path_gets_new_path(env: NavigationContinuousEnv) -> None:
     env.reset(seed=2)
-    planner = env.drive.session.world.planner
+    planner = env.session.world.planner
     paths = {id(planner.path)}
     for k in range(300):
         wheel = 0.12 if k % 40 < 20 else -0.12
@@ -81,7 +81,7 @@ def test_decision_frequency_is_respected() -> None:
     env.reset(seed=0)
     for _ in range(5):
         env.step(np.zeros(3, dtype=np.float32))
-    assert env.drive.session.world.time == pytest.approx(1.0)
+    assert env.session.world.time == pytest.approx(1.0)
     with pytest.raises(ValueError, match="decision_frequency"):
         NavigationContinuousEnv(decision_frequency=7.0)
 

@@ -14,6 +14,7 @@ from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import DialogueMove
 from dorothie_gym.policies.navigation import FIELD_SPECS, FIELDS, NavigationAction, layout
+from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from tests.envs.navigation_drivers import drive, follow_lane, obey
 
 FIELD = layout()
@@ -52,10 +53,13 @@ def test_participant_gives_up_on_lane_following() -> None:
 
 def test_episode_is_truncated_at_time_limit() -> None:
     env = NavigationEnv(max_seconds=12.0)
-    info = drive(env, follow_lane, 1)
+    _, info = env.reset(seed=1)
+    terminated = truncated = False
+    while not (terminated or truncated):
+        _, _, terminated, truncated, info = env.step(0)
     assert info["reason"] == "out of time"
-    assert env.drive.session.world.time == pytest.approx(12.0)
-    assert env.drive.truncated and not env.drive.terminated
+    assert env.session.world.time == pytest.approx(12.0)
+    assert truncated and not terminated
 
 
 def play(env: NavigationEnv, seed: int, steps: int) -> list[tuple[Any, float]]:
@@ -95,7 +99,7 @@ def test_masked_actions_are_not_refused(settings: dict[str, Any]) -> None:
 
 def test_planned_turn_may_be_repeated(env: NavigationEnv) -> None:
     env.reset(seed=0)
-    planner, again = env.drive.session.world.planner, 0
+    planner, again = env.session.world.planner, 0
     for _ in range(60):
         turns = np.flatnonzero(env.action_masks()[NavigationAction.turn(0) :])
         planned = planner.turn_ahead
@@ -125,12 +129,13 @@ def test_the_reward_is_the_sum_of_its_terms(env: NavigationEnv) -> None:
 def test_progress_adds_up_to_decrease_of_cost_to_go(env: NavigationEnv) -> None:
     """Progress is a difference of potentials, so detours do not earn more."""
     env.reset(seed=0)
-    left, rng, total = env.drive.instructor.cost_to_go, np.random.default_rng(1), 0.0
-    planner = env.drive.session.world.planner
+    left, rng, total = CostToGo(env.town), np.random.default_rng(1), 0.0
+    left.aim(env.batch.goal(0))
+    planner = env.session.world.planner
     before = left.from_place(planner.lane, planner.station)
     for _ in range(40):
         _, _, _, _, info = env.step(rng.choice(np.flatnonzero(env.action_masks())))
-        assert not env.drive.instructor.blocked and not info["reward_terms"]["subgoal"]
+        assert not env.batch.blocked(0) and not info["reward_terms"]["subgoal"]
         total += info["reward_terms"]["progress"]
     after = left.from_place(planner.lane, planner.station)
     assert total == pytest.approx(NavigationWeights().progress * (before - after))
@@ -145,10 +150,10 @@ def test_sparse_reward_is_given_for_subgoals_only() -> None:
 
 def test_scenario_of_seed_is_that_of_all_environments(env: NavigationEnv) -> None:
     env.reset(seed=17)
-    assert env.drive.session.scenario == draw_scenario(env.town, None, 17)
+    assert env.session.scenario == draw_scenario(env.town, None, 17)
     scenario = draw_scenario(env.town, None, 18)
     env.reset(seed=17, options={"scenario": scenario})
-    assert env.drive.session.scenario == scenario
+    assert env.session.scenario == scenario
     with pytest.raises(ValueError, match="scenario"):
         env.reset(options={"scenario": 3})
 
@@ -183,11 +188,11 @@ def test_named_places_off_the_map_are_not_revealed() -> None:
     for seed in range(6):
         observation, info = env.reset(seed=seed)
         for _ in range(150):
-            goal = env.drive.instructor.goal
-            hidden = {mark.site for mark in env.drive.session.scenario.storyboard.landmarks if mark.hidden}
-            place = {(mark.lane, mark.station): mark.site for mark in env.drive.session.scenario.storyboard.landmarks}
+            goal = env.batch.goal(0)
+            hidden = {mark.site for mark in env.session.scenario.storyboard.landmarks if mark.hidden}
+            place = {(mark.lane, mark.station): mark.site for mark in env.session.scenario.storyboard.landmarks}
             if goal is not None:
-                is_hidden = place[goal.place] in hidden
+                is_hidden = place[goal] in hidden
                 seen[is_hidden] += 1
                 assert bool(observation[FIELD["goal"]][0]) != is_hidden
             observation, _, terminated, _, info = env.step(obey(observation, info["action_mask"]))
@@ -199,7 +204,7 @@ def test_named_places_off_the_map_are_not_revealed() -> None:
 def test_exceptions_happen_when_enabled() -> None:
     env = NavigationEnv(exceptions=4.0)
     drive(env, obey, 1)
-    assert env.drive.session.summary()["exceptions"] > 0
+    assert env.session.summary()["exceptions"] > 0
 
 
 def test_returned_objects_may_be_changed(env: NavigationEnv) -> None:

@@ -18,7 +18,7 @@ for guidance in ("turns", "goals"):
     for _ in range(8):
         digest.update(observation.tobytes() + info["action_mask"].tobytes() + repr(info["reward_terms"]).encode())
         observation, *_, info = env.step(rng.choice(np.flatnonzero(info["action_mask"])))
-    print(digest.hexdigest(), hashlib.sha256(env.drive.session.world.actors.arrays.tobytes()).hexdigest())
+    print(digest.hexdigest(), hashlib.sha256(env.session.world.actors.arrays.tobytes()).hexdigest())
 """
 
 

@@ -3,31 +3,24 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import direct
-from dorothie_gym.compilation.records import fields, plain
-from dorothie_gym.copying import Lookups
+from dorothie_gym.compilation.records import fields
 from dorothie_gym.maps import Town
-from dorothie_gym.maps.routing import Place, router
-from dorothie_gym.maps.routing_graph import routing_graph
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, StreetName
-from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.guidance_steps import attend, instruct
-from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
+from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
-from dorothie_gym.policies.observation_parser import SeenLandmark
-from dorothie_gym.policies.route_tables import route_tables
 from dorothie_gym.tasks import map_label
 
 if TYPE_CHECKING:
-    from dorothie_gym.sim.state.world_arrays import WorldArrays
+    pass
 
 
 _attend, _instruct = direct(attend), direct(instruct)
@@ -97,78 +90,6 @@ def exit_sectors(town: Town) -> NDArray[np.int32]:
     exits = JunctionExits(town)
     found = [exits.sector_of(lane.id, way.connector) for lane in town.lanes for way in town.exits(lane.id)]
     return np.array([-1 if sector is None else sector for sector in found] or [-1], dtype=np.int32)
-
-
-class Instructor(Lookups):
-    """Participant that guides the car to one subgoal after another: a face of `guidance_steps.instruct`.
-
-    Attributes:
-        goal: landmark of the present subgoal, or None when all are done.
-        blocked: places behind the roadblocks seen.
-        cost_to_go: cost of the route to it from anywhere; progress is measured by it.
-        instruction: last instruction given.
-        arrays: what it sees, its route, and the last instruction.
-    """
-
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_route",)
-
-    def __init__(
-        self, town: Town, guidance: Guidance, marks: Sequence[SeenLandmark], known: frozenset[Place],
-        streets: Sequence[int], *, subgoals: int, things: int,
-    ) -> None:  # fmt: skip
-        """Begins a session.
-
-        Args:
-            town: the map.
-            guidance: level of the guidance.
-            marks: landmarks.
-            known: places of those on the Co-Wizard's map.
-            streets: names of the town's streets: ids of `StreetName`.
-            subgoals: number of subgoals.
-            things: number of bodies in sight, the nearest first, among which static ones are noticed.
-        """
-        self._town = town
-        self._marks = {mark.row: mark for mark in marks}
-        self.goal: SeenLandmark | None = None
-        self.blocked: tuple[Place, ...] = ()
-        self.cost_to_go = CostToGo(town)
-        self.instruction: NavigationInstruction | None = None
-        self.arrays = instructor_arrays(
-            lanes=len(town.lanes), subgoals=subgoals, landmarks=max(self._marks, default=-1) + 1, streets=len(streets),
-            things=things,
-        )  # fmt: skip
-        self.arrays.names[:] = streets
-        self.arrays.now["by_name"] = guidance is Guidance.GOALS
-        for row, mark in self._marks.items():
-            self.arrays.marks[row] = mark.station, mark.lane, mark.name.value, mark.place in known
-
-    def note_subgoals(self, subgoals: Iterable[tuple[int, bool, bool]]) -> None:
-        """Notes a change of the task: landmark of each subgoal, whether it is open, and may be reached now."""
-        for row, subgoal in enumerate(subgoals):
-            self.arrays.subgoals[row] = subgoal
-
-    def look(self, world: WorldArrays) -> None:
-        """Sees the car and what is around it at a decision."""
-        _attend(world, self.arrays)
-
-    def instruct(self) -> NavigationInstruction | None:
-        """Returns an instruction if one is due by what was seen last, or None."""
-        town, arrays = self._town, self.arrays
-        search = router(town).search
-        given = _instruct(route_tables(town), routing_graph(town), search, exit_sectors(town), arrays)
-        row, closed = self._route.item()
-        self.goal = self._marks.get(row)
-        if closed != len(self.blocked):
-            self.blocked = tuple((lane, station) for station, lane in plain(arrays.closed)[:closed].tolist())
-        self.cost_to_go.aim(self.goal.place if self.goal is not None else None, self.blocked)
-        if not given:
-            return None
-        self.instruction = instruction_of(arrays)
-        return self.instruction
-
-    @cached_property
-    def _route(self) -> NDArray[np.void]:
-        return fields(self.arrays.route, "landmark", "closed")
 
 
 def instruction_of(arrays: InstructorArrays) -> NavigationInstruction:

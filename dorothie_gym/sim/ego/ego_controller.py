@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from dorothie_gym.copying import shared
 from dorothie_gym.ontology import SPEED_STEP, PhysicalAction
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
-from dorothie_gym.sim.ego.limits import KMH, MAX_CRUISE, MIN_CRUISE, VehicleControl
+from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE, VehicleControl
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car
 from dorothie_gym.sim.state.record_views import ArrayHolder
@@ -126,13 +124,3 @@ class EgoController:
     def set_goals(self, goals: Sequence[GoalAhead]) -> None:
         """Sets the places where the ego is expected to stop."""
         set_goals(self._holder, goals)
-
-    def speed_at(self, s: float) -> float:
-        """Returns the speed that curves, limits and the end of the path allow at a distance along the path [m/s].
-
-        Before the first step of the world it is the cruise speed.
-        """
-        if not self.planner.plan["written"]:
-            return self.cruise * KMH
-        path = self.planner.path
-        return float(np.interp(s, path.s, path.speeds))

@@ -14,6 +14,7 @@ from dorothie_gym.policies.navigation import NavigationAction, NavigationPolicy
 from dorothie_gym.policies.navigation.actions import physical_of
 from dorothie_gym.policies.navigation.demonstrations import DemonstrationRecorder, action_of
 from dorothie_gym.policies.navigation.driver_view import driver_of
+from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.spaces import CoWizardAction, Physical, noop
 from tests.envs.navigation_drivers import obey
@@ -55,17 +56,17 @@ def test_recorded_observations_equal_those_of_the_driver() -> None:
 
 
 def test_action_of_inverts_physical_of(env: NavigationEnv) -> None:
-    rng = np.random.default_rng(0)
+    rng, exits = np.random.default_rng(0), JunctionExits(env.town)
     count = 0
     for seed in range(4):
         _, info = env.reset(seed=seed)
         for _ in range(60):
             action = NavigationAction(rng.choice(np.flatnonzero(info["action_mask"])))
-            seen = env.drive.seen[Role.CO_WIZARD]
-            physical = physical_of(action, driver_of(seen, env.drive.exits))
+            seen = env.session.observations((Role.CO_WIZARD,))[Role.CO_WIZARD]
+            physical = physical_of(action, driver_of(seen, exits))
             set_as_asked = action in (NavigationAction.FASTER, NavigationAction.SLOWER, NavigationAction.LIGHTS)
             expected = NavigationAction.NOTHING if set_as_asked or physical is None else action
-            assert action_of(physical, seen, env.drive.exits) is expected
+            assert action_of(physical, seen, exits) is expected
             count += expected is not NavigationAction.NOTHING
             _, _, over, cut, info = env.step(action)
             if over or cut:

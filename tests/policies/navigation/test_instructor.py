@@ -10,11 +10,21 @@ import numpy as np
 import pytest
 
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
+from dorothie_gym.maps.route_arrays import empty_search
 from dorothie_gym.maps.routing import LaneEntry, Place, Route, router
+from dorothie_gym.maps.routing_graph import routing_graph
 from dorothie_gym.ontology import ActionValue, ObjectClass, Role
-from dorothie_gym.policies.navigation.instructor import Guidance, Instructor, NavigationInstruction
+from dorothie_gym.policies.navigation.guidance_steps import instruct
+from dorothie_gym.policies.navigation.instructor import (
+    Guidance,
+    NavigationInstruction,
+    exit_sectors,
+    instruction_of,
+)
+from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
 from dorothie_gym.policies.navigation.junction_exits import SECTORS
-from dorothie_gym.policies.observation_parser import read_landmarks, read_subgoals
+from dorothie_gym.policies.observation_parser import SeenLandmark, read_landmarks, read_subgoals
+from dorothie_gym.policies.route_tables import route_tables
 from dorothie_gym.spaces import ObjectColumn, SubgoalColumn
 
 
@@ -25,19 +35,35 @@ class Talk:
         env = NavigationEnv(town)
         env.reset(seed=seed)
         self.town = env.town
-        self.seen: dict[str, Any] = copy.deepcopy(dict(env.drive.seen[Role.PARTICIPANT]))
+        self.seen: dict[str, Any] = env.session.observations((Role.PARTICIPANT,))[Role.PARTICIPANT]
         self.seen["objects"][:] = 0.0
         self.seen["speed"] = np.array([8.0])
         self.known: frozenset[Place] = frozenset()
         self.guidance, self.time = guidance, 0.0
 
     @functools.cached_property
-    def instructor(self) -> Instructor:
+    def arrays(self) -> InstructorArrays:
         """The instructor, which knows the landmarks of the session."""
-        return Instructor(
-            self.town, self.guidance, read_landmarks(self.seen, self.town), self.known,
-            self.seen["street_names"].tolist(), subgoals=len(self.seen["subgoals"]), things=len(self.seen["objects"]),
+        marks, streets = read_landmarks(self.seen, self.town), self.seen["street_names"].tolist()
+        arrays = instructor_arrays(
+            lanes=len(self.town.lanes), subgoals=len(self.seen["subgoals"]), landmarks=1 + max(m.row for m in marks),
+            streets=len(streets), things=len(self.seen["objects"]),
         )  # fmt: skip
+        arrays.names[:] = streets
+        arrays.now["by_name"] = self.guidance is Guidance.GOALS
+        for mark in marks:
+            arrays.marks[mark.row] = mark.station, mark.lane, mark.name.value, mark.place in self.known
+        return arrays
+
+    @property
+    def goal(self) -> SeenLandmark | None:
+        row = int(self.arrays.route["landmark"][0])
+        return next((mark for mark in read_landmarks(self.seen, self.town) if mark.row == row), None)
+
+    @property
+    def blocked(self) -> tuple[Place, ...]:
+        closed = self.arrays.closed[: int(self.arrays.route["closed"][0])].tolist()
+        return tuple((lane, station) for station, lane in closed)
 
     @property
     def place(self) -> Place:
@@ -47,20 +73,25 @@ class Talk:
         """Moves the car to a place; returns what is said there."""
         self.time += wait
         self.seen.update(lane=np.array(lane), station=np.array([station]), time=np.array([self.time]))
-        arrays = self.instructor.arrays
-        self.instructor.note_subgoals((row.landmark, row.open, row.allowed) for row in read_subgoals(self.seen))
+        arrays = self.arrays
+        for number, subgoal in enumerate(read_subgoals(self.seen)):
+            arrays.subgoals[number] = subgoal.landmark, subgoal.open, subgoal.allowed
         static = self.seen["objects"][self.seen["objects"][:, ObjectColumn.KIND] == ObjectClass.STATIC.value]
         for name, column in (("x", ObjectColumn.X), ("y", ObjectColumn.Y), ("distance", ObjectColumn.DISTANCE)):
             arrays.things[name][: len(static)] = static[:, column]
         now = {"lane": lane, "station": station, "speed": 8.0, "time": self.time, "waits": waits, "things": len(static)}
         for name, value in now.items():
             arrays.now[name] = value
-        return self.instructor.instruct()
+        town = self.town
+        given = instruct(
+            route_tables(town), routing_graph(town), empty_search(routing_graph(town)), exit_sectors(town), arrays
+        )
+        return instruction_of(arrays) if given else None
 
     def route(self, blocked: tuple[Place, ...] = ()) -> Route:
         """The route from the car to the goal."""
-        assert self.instructor.goal is not None
-        found = router(self.town).route(self.place, self.instructor.goal.place, blocked)
+        assert self.goal is not None
+        found = router(self.town).route(self.place, self.goal.place, blocked)
         assert found is not None
         return found
 
@@ -99,7 +130,7 @@ def test_closest_open_subgoal_is_the_goal() -> None:
         goals = [marks[goal.landmark] for goal in read_subgoals(talk.seen) if goal.open and goal.landmark in marks]
         for _ in range(len(goals)):
             talk.at(*talk.place)
-            chosen = talk.instructor.goal
+            chosen = talk.goal
             assert chosen is not None
             routes = [router(talk.town).route(talk.place, mark.place) for mark in goals]
             assert talk.route().cost == min(route.cost for route in routes if route is not None)
@@ -107,8 +138,7 @@ def test_closest_open_subgoal_is_the_goal() -> None:
             talk.seen["subgoals"][done, SubgoalColumn.REACHED] = 1.0
             goals = [mark for mark in goals if mark.row != chosen.row]
         talk.at(*talk.place)
-        assert not goals and talk.instructor.goal is None
-        assert np.isinf(talk.instructor.cost_to_go.from_place(*talk.place))
+        assert not goals and talk.goal is None
 
 
 def test_instruction_is_repeated_after_nine_seconds() -> None:
@@ -137,7 +167,7 @@ def test_goal_on_the_map_is_only_named() -> None:
     talk = Talk(guidance=Guidance.GOALS)
     talk.known = frozenset(mark.place for mark in read_landmarks(talk.seen, talk.town))
     said = talk.at(*talk.place)
-    goal = talk.instructor.goal
+    goal = talk.goal
     assert said is not None and goal is not None
     assert (said.action, said.landmark, said.sector) == (None, goal.name, None)
 
@@ -156,17 +186,16 @@ def test_roadblock_in_sight_on_the_route_is_planned_around(town: str) -> None:
         row[ObjectColumn.X], row[ObjectColumn.Y], row[ObjectColumn.DISTANCE] = x, y, 35.0
         row[ObjectColumn.KIND] = ObjectClass.VEHICLES.value
         talk.at(*talk.place)
-        assert not talk.instructor.blocked
+        assert not talk.blocked
         row[ObjectColumn.KIND] = ObjectClass.STATIC.value
         talk.at(*talk.place)
-        blocked = talk.instructor.blocked
+        blocked = talk.blocked
         assert blocked == (
             (leg.lane, pytest.approx(leg.start + 35.0)),
             (leg.lane, pytest.approx(leg.start + 43.0)),
         )
-        assert talk.instructor.cost_to_go.blocked == blocked
         talk.at(*talk.place)
-        assert talk.instructor.blocked == blocked  # known now
+        assert talk.blocked == blocked  # known now
         around = talk.route(blocked)
         assert around.cost >= talk.route().cost
         changed += around.legs[0] != leg
@@ -187,6 +216,6 @@ def test_car_off_the_route_gets_another_one_at_the_third_decision() -> None:
 def test_copy_goes_on_as_the_original() -> None:
     one, two = Talk("midtown"), Talk("midtown")
     one.at(*one.place)
-    two.instructor = copy.deepcopy(one.instructor)
+    two.arrays = copy.deepcopy(one.arrays)
     two.time = one.time
     assert list(one.drive()) == list(two.drive())

@@ -11,13 +11,13 @@ from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation import NavigationAction, NavigationPolicy, layout
-from dorothie_gym.policies.navigation.actions import EstimatedActionMask
+from dorothie_gym.policies.navigation.actions import EstimatedActionMask, physical_of
 from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.observation_vector import NavigationEncoder
 from dorothie_gym.policies.observation_parser import read_landmarks
 from dorothie_gym.rollout import play_session
-from dorothie_gym.spaces import ParticipantAction, Speech, noop
+from dorothie_gym.spaces import AdWizardAction, CoWizardAction, ParticipantAction, Speech, noop
 from tests.envs.navigation_drivers import obey
 
 FIELD = layout()
@@ -36,22 +36,30 @@ def test_obedient_driver_completes_tasks_by_dialogue(seed: int, observe_acts: bo
 
 
 @pytest.mark.parametrize(("town", "guidance"), [("brookside", "turns"), ("brookside", "goals"), ("midtown", "goals")])
-def test_observation_equals_that_of_training(town: str, guidance: str) -> None:
+def test_observation_equals_that_of_training(town: str, guidance: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The vector depends only on the Co-Wizard's observation, in both environments."""
     learning = NavigationEnv(town, guidance=guidance, exceptions=4.0)
     observation, info = learning.reset(seed=3)
-    drive = learning.drive
     playing = DuoWizardEnv(learning.town, config=learning.config.session_config)
     observations, _ = playing.reset(seed=3)
     viewpoint = NavigationEncoder(learning.town, JunctionExits(learning.town), learning.config.max_seconds)
-    done: dict[Role, Any] = {}
-    play = drive.session.step
-    drive.session.step = lambda actions: (done.update(actions), play(actions))  # type: ignore[assignment,func-returns-value]  # a replaced method that records its actions
+    session, exits = learning.session, JunctionExits(learning.town)
+    others: dict[str, Any] = {}
+    believe, interfere = session.update_beliefs, session.play_ad_wizard
+    monkeypatch.setattr(session, "update_beliefs", lambda mental: (others.update(mental=mental), believe(mental))[1])
+    monkeypatch.setattr(session, "play_ad_wizard", lambda action: (others.update(trick=action), interfere(action))[1])
     for _ in range(160):
-        seen = viewpoint.observe(observations["co_wizard"], drive.heard, drive.instructor.blocked)
+        seen = viewpoint.observe(observations["co_wizard"], learning.batch.heard(0), learning.batch.blocked(0))
         np.testing.assert_array_equal(seen, observation)
-        observation, _, terminated, truncated, info = learning.step(obey(observation, info["action_mask"]))
-        observations, *_ = playing.step({str(role): action.encode(playing.limits) for role, action in done.items()})
+        chosen = obey(observation, info["action_mask"])
+        physical = physical_of(NavigationAction(chosen), driver_of(observations["co_wizard"], exits))
+        observation, _, terminated, truncated, info = learning.step(chosen)
+        actions = {
+            Role.PARTICIPANT: ParticipantAction(),
+            Role.CO_WIZARD: CoWizardAction(mental=others.pop("mental", None), physical=physical),
+            Role.AD_WIZARD: others.pop("trick", AdWizardAction()),
+        }
+        observations, *_ = playing.step({str(role): action.encode(playing.limits) for role, action in actions.items()})
         assert not (terminated or truncated)
 
 
@@ -138,7 +146,8 @@ def test_estimated_mask_agrees_with_environment() -> None:
         observation, info = env.reset(seed=seed)
         likely = EstimatedActionMask(env.town)
         for _ in range(80):
-            mask = likely.mask(driver_of(env.drive.seen[Role.CO_WIZARD], env.drive.exits))
+            seen = env.session.observations((Role.CO_WIZARD,))[Role.CO_WIZARD]
+            mask = likely.mask(driver_of(seen, JunctionExits(env.town)))
             same, total = same + int((mask == info["action_mask"]).sum()), total + len(mask)
             observation, _, over, cut, info = env.step(obey(observation, info["action_mask"]))
             if over or cut:
