@@ -170,10 +170,11 @@ def _timed_shares(seconds: dict[str, float]) -> Iterator[None]:
     """Adds the time of the compiled halves of decisions to `seconds`, by the name of the function."""
     share: Any = DrivingBatch.share  # replaced for the time of the measurement
 
-    def timed(batch: DrivingBatch, work: Callable[..., None], *arguments: object) -> None:
+    def timed(batch: DrivingBatch, work: Callable[..., None], *arguments: object) -> object:
         start = time.perf_counter()
-        share(batch, work, *arguments)
+        events = share(batch, work, *arguments)
         seconds[work.__name__] = seconds.get(work.__name__, 0.0) + time.perf_counter() - start
+        return events
 
     setattr(DrivingBatch, "share", timed)  # noqa: B010  # mypy knows methods as fixed
     try:
