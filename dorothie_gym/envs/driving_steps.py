@@ -29,14 +29,7 @@ from dorothie_gym.envs.pedals import find_path, has_lost_path, instructed_manoeu
 from dorothie_gym.maps.route_arrays import RouteSearch
 from dorothie_gym.maps.routing_graph import RoutingGraph
 from dorothie_gym.ontology import ARRIVAL_DISTANCE, SPEED_STEP, DialogueMove, PhysicalAction
-from dorothie_gym.policies.navigation.actions import (
-    FIRST_TURN,
-    LEFT,
-    RIGHT,
-    NavigationAction,
-    prepares,
-    turn_angle,
-)
+from dorothie_gym.policies.navigation.actions import NavigationAction, order_of
 from dorothie_gym.policies.navigation.cost_to_go import cost_from
 from dorothie_gym.policies.navigation.driver_view import DriverArrays
 from dorothie_gym.policies.navigation.guidance_steps import attend, instruct
@@ -53,7 +46,7 @@ from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.ego.manoeuvres import command
 from dorothie_gym.sim.network.centre_lines import position_on
 from dorothie_gym.sim.sensing.perception import switch_lamps
-from dorothie_gym.sim.state.codes import J_TURN, LANE_FOLLOW, LANE_SWITCH, START, STOP, U_TURN, Refusal
+from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import FRAMES
 
@@ -64,9 +57,7 @@ if TYPE_CHECKING:
 NEAR_WAYPOINT: Final = ARRIVAL_DISTANCE + 1e-6
 """Distance within which Python looks whether the ego has arrived [m]."""
 
-_NOTHING, _FOLLOW, _SWITCH_LEFT, _SWITCH_RIGHT, _ROUND, _STOP, _START, _FASTER, _SLOWER, _LIGHTS = (
-    int(action) for action in NavigationAction if action < FIRST_TURN
-)
+_FASTER = int(NavigationAction.FASTER)
 _INSTRUCT = int(DialogueMove.INSTRUCT.value)
 _SPEED_CHANGE, _LIGHT_CHANGE = int(PhysicalAction.SPEED_CHANGE.value), int(PhysicalAction.LIGHT_CHANGE.value)
 _may_change_cruise = compiled(may_change_cruise)
@@ -138,7 +129,7 @@ def carry_out(
         plan.throttle, plan.steer, plan.brake = state.controls[0], state.controls[1], state.controls[2]
         order, angle = instructed_manoeuvre(town, exits, world, driver)
     else:
-        order, angle = ordered_manoeuvre(driver, int(state.action))
+        order, angle = order_of(driver, int(state.action))
     state.order = order
     if order == 0:
         return Refusal.NONE
@@ -153,29 +144,6 @@ def carry_out(
         plan.cruise += SPEED_STEP if faster else -SPEED_STEP
         return Refusal.NONE
     return command(town, world, order, angle, world.vehicles[0].speed)
-
-
-@compiled
-def ordered_manoeuvre(driver: DriverArrays, number: int) -> tuple[int, int]:
-    """Returns the `PhysicalAction` that a `NavigationAction` stands for, or 0 for none, and its angle [degrees]."""
-    order, angle = LANE_FOLLOW, 0
-    if number == _NOTHING or prepares(driver, number):
-        order = 0
-    elif number >= FIRST_TURN:
-        order, angle = J_TURN, turn_angle(driver, number - FIRST_TURN)
-    elif number == _SWITCH_LEFT or number == _SWITCH_RIGHT:
-        order, angle = LANE_SWITCH, LEFT if number == _SWITCH_LEFT else RIGHT
-    elif number == _ROUND:
-        order = U_TURN
-    elif number == _STOP:
-        order = STOP
-    elif number == _START:
-        order = START
-    elif number == _LIGHTS:
-        order = _LIGHT_CHANGE
-    elif number == _FASTER or number == _SLOWER:
-        order = _SPEED_CHANGE
-    return order, angle
 
 
 # --- Guidance, reward and observation ---------------------------------------------------------------------------------

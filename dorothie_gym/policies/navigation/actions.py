@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays
 from dorothie_gym.sim.ego.feasibility import is_past_stopping
 from dorothie_gym.sim.ego.limits import HALF_LENGTH, LEAD, MAX_CRUISE, MIN_CRUISE, MIN_SWITCH, U_TURN_SPEED
 from dorothie_gym.sim.ego.manoeuvres import find_feasible
-from dorothie_gym.sim.state.codes import Feasible
+from dorothie_gym.sim.state.codes import J_TURN, LANE_FOLLOW, LANE_SWITCH, START, STOP, U_TURN, Feasible
 from dorothie_gym.spaces import Motion, Physical
 
 if TYPE_CHECKING:
@@ -68,27 +67,11 @@ FIRST_TURN = 10
 ACTIONS = tuple(NavigationAction)
 assert len(ACTIONS) == FIRST_TURN + len(SECTORS)
 
-PLAIN_ACTIONS: Final[Mapping[int, Physical]] = {
-    NavigationAction.LANE_FOLLOW: Physical(action=PhysicalAction.LANE_FOLLOW),
-    NavigationAction.SWITCH_LEFT: Physical(action=PhysicalAction.LANE_SWITCH, angle=LEFT),
-    NavigationAction.SWITCH_RIGHT: Physical(action=PhysicalAction.LANE_SWITCH, angle=RIGHT),
-    NavigationAction.U_TURN: Physical(action=PhysicalAction.U_TURN),
-    NavigationAction.STOP: Physical(action=PhysicalAction.STOP),
-    NavigationAction.START: Physical(action=PhysicalAction.START),
-    NavigationAction.FASTER: Physical(action=PhysicalAction.SPEED_CHANGE, up=True),
-    NavigationAction.SLOWER: Physical(action=PhysicalAction.SPEED_CHANGE, up=False),
-}
-"""Physical actions of the actions that do not depend on the observation."""
-
-
-_LANE_SWITCH, _U_TURN, _J_TURN, _LIGHTS = (
-    int(action.value)
-    for action in (
-        PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN, PhysicalAction.J_TURN, PhysicalAction.LIGHT_CHANGE,
-    )
-)  # fmt: skip
-_SWITCH_LEFT, _SWITCH_RIGHT = int(NavigationAction.SWITCH_LEFT), int(NavigationAction.SWITCH_RIGHT)
-_ROUND, _STOPPED = int(NavigationAction.U_TURN), int(Motion.STOPPED)
+_SPEED_CHANGE, _LIGHT_CHANGE = int(PhysicalAction.SPEED_CHANGE), int(PhysicalAction.LIGHT_CHANGE)
+_NOTHING, _FOLLOW, _SWITCH_LEFT, _SWITCH_RIGHT, _ROUND, _STOP, _START, _FASTER, _SLOWER, _LIGHTS = (
+    int(action) for action in NavigationAction if action < FIRST_TURN
+)
+_STOPPED = int(Motion.STOPPED)
 
 UNDER_WAY = (_SWITCH_LEFT, _SWITCH_RIGHT, _ROUND)
 """Actions, turns apart, that start a manoeuvre."""
@@ -105,13 +88,39 @@ def physical_of(action: NavigationAction, driver: DriverArrays) -> Physical | No
         action: action chosen.
         driver: arrays of the driver, with its view.
     """
-    if action is NavigationAction.NOTHING or _prepares(driver, int(action)):
+    order, angle = _order_of(driver, int(action))
+    if order == 0:
         return None
-    if action is NavigationAction.LIGHTS:
-        return Physical(action=PhysicalAction.LIGHT_CHANGE, up=not plain(driver.inputs)[0]["lights"])
-    if action.sector is None:
-        return PLAIN_ACTIONS[action]
-    return Physical(action=PhysicalAction.J_TURN, angle=turn_angle(driver, action.sector))
+    up = action is not NavigationAction.SLOWER
+    if order == _LIGHT_CHANGE:
+        up = not plain(driver.inputs)[0]["lights"]
+    return Physical(action=PhysicalAction(order), angle=angle, up=up)
+
+
+@compiled
+def order_of(driver: DriverArrays, action: int) -> tuple[int, int]:
+    """Returns the `PhysicalAction` that a `NavigationAction` stands for, or 0 for none, and its angle [degrees]."""
+    order, angle = LANE_FOLLOW, 0
+    if action == _NOTHING or prepares(driver, action):
+        order = 0
+    elif action >= FIRST_TURN:
+        order, angle = J_TURN, turn_angle(driver, action - FIRST_TURN)
+    elif action == _SWITCH_LEFT or action == _SWITCH_RIGHT:
+        order, angle = LANE_SWITCH, LEFT if action == _SWITCH_LEFT else RIGHT
+    elif action == _ROUND:
+        order = U_TURN
+    elif action == _STOP:
+        order = STOP
+    elif action == _START:
+        order = START
+    elif action == _LIGHTS:
+        order = _LIGHT_CHANGE
+    elif action == _FASTER or action == _SLOWER:
+        order = _SPEED_CHANGE
+    return order, angle
+
+
+_order_of = direct(order_of)
 
 
 @compiled
@@ -123,13 +132,10 @@ def prepares(driver: DriverArrays, action: int) -> bool:
     if action >= FIRST_TURN:
         sector = action - FIRST_TURN
         own = view.exit_lane[sector] >= 0 and view.exit_angle[sector] == view.angle
-        return bool(own and view.manoeuvre == _J_TURN)
+        return bool(own and view.manoeuvre == J_TURN)
     if action == _SWITCH_LEFT or action == _SWITCH_RIGHT:
-        return bool(view.manoeuvre == _LANE_SWITCH and view.angle == (LEFT if action == _SWITCH_LEFT else RIGHT))
-    return bool(action == _ROUND and view.manoeuvre == _U_TURN)
-
-
-_prepares = direct(prepares)
+        return bool(view.manoeuvre == LANE_SWITCH and view.angle == (LEFT if action == _SWITCH_LEFT else RIGHT))
+    return bool(action == _ROUND and view.manoeuvre == U_TURN)
 
 
 @compiled
@@ -145,7 +151,7 @@ def write_mask(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: 
     plan, mask = world.plan[0], driver.mask
     feasible = find_feasible(town, world, world.vehicles[0].speed)
     mask[:] = 0
-    mask[_NOTHING], mask[_LIGHT_SWITCH] = 1, 1
+    mask[_NOTHING], mask[_LIGHTS] = 1, 1
     mask[_STOP], mask[_START] = not plan.held, plan.held
     mask[_FASTER] = plan.cruise + SPEED_STEP <= MAX_CRUISE
     mask[_SLOWER] = plan.cruise - SPEED_STEP >= MIN_CRUISE
@@ -159,16 +165,9 @@ def write_mask(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: 
             mask[FIRST_TURN + sector] = exits.lane[plan.choice, sector] >= 0
 
 
-_NOTHING, _LIGHT_SWITCH, _STOP, _START, _FASTER, _SLOWER = (
-    int(action)
-    for action in (
-        NavigationAction.NOTHING, NavigationAction.LIGHTS, NavigationAction.STOP, NavigationAction.START,
-        NavigationAction.FASTER, NavigationAction.SLOWER,
-    )
-)  # fmt: skip
 _MAY_TURN = int(Feasible.J_TURN)
 _FEASIBLE = (
-    (int(Feasible.LANE_FOLLOW), int(NavigationAction.LANE_FOLLOW)),
+    (int(Feasible.LANE_FOLLOW), _FOLLOW),
     (int(Feasible.SWITCH_LEFT), _SWITCH_LEFT),
     (int(Feasible.SWITCH_RIGHT), _SWITCH_RIGHT),
     (int(Feasible.U_TURN), _ROUND),

@@ -10,20 +10,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import fields
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, StreetName
-from dorothie_gym.policies.navigation.guidance_steps import attend, instruct
 from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.tasks import map_label
 
 if TYPE_CHECKING:
     pass
-
-
-_attend, _instruct = direct(attend), direct(instruct)
 
 
 class Guidance(enum.StrEnum):

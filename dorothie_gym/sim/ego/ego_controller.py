@@ -1,4 +1,4 @@
-"""Ego controller: applies physical actions, and holds cruise speed, lights, goals and the pedals of outside drivers."""
+"""Ego controller: applies physical actions, and holds cruise speed, lights and goals of the ego."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dorothie_gym.copying import shared
 from dorothie_gym.ontology import SPEED_STEP, PhysicalAction
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
-from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE, VehicleControl
+from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car
 from dorothie_gym.sim.state.record_views import ArrayHolder
@@ -71,22 +71,6 @@ class EgoController:
     @lights.setter
     def lights(self, on: bool) -> None:
         self.planner.plan["lights"] = on
-
-    @property
-    def manual(self) -> VehicleControl | None:
-        """Throttle, brake and steering of an outside driver; None: the ego drives itself."""
-        plan = self.planner.plan
-        if not plan["manual"]:
-            return None
-        throttle, steer, brake = (float(plan[name]) for name in ("throttle", "steer", "brake"))
-        return VehicleControl(throttle=throttle, steer=steer, brake=brake)
-
-    @manual.setter
-    def manual(self, control: VehicleControl | None) -> None:
-        plan = self.planner.plan
-        plan["manual"] = control is not None
-        if control is not None:
-            plan["throttle"], plan["steer"], plan["brake"] = control.throttle, control.steer, control.brake
 
     def apply(self, action: PhysicalAction, *, angle: int = 0, up: bool = True) -> str | None:
         """Applies a physical action.

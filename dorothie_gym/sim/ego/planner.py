@@ -18,7 +18,7 @@ from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import PhysicalAction
 from dorothie_gym.sim.ego.feasibility import FeasibleManoeuvres
-from dorothie_gym.sim.ego.manoeuvres import BEGIN, find_feasible, request
+from dorothie_gym.sim.ego.manoeuvres import find_feasible, request
 from dorothie_gym.sim.ego.path import Path
 from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE, Feasible, Refusal
 from dorothie_gym.sim.state.record_views import ArrayHolder
@@ -184,11 +184,6 @@ class LocalPlanner(Lookups):
         return bool(self._look_up()["off_line"])
 
     @property
-    def manoeuvre_end(self) -> float:
-        """Distance along the path at which the manoeuvre ends [m]."""
-        return float(self._look_up()["end"])
-
-    @property
     def lanes_ahead(self) -> list[int]:
         """Lanes of the path ahead, in order."""
         lanes = self.path.lanes[int(self._look_up()["at"]) :]
@@ -218,16 +213,6 @@ class LocalPlanner(Lookups):
         return (self._town.exits(lane) if lane >= 0 else ()), distance
 
     # --- Navigation actions -----------------------------------------------------------------------------------------
-
-    def restart(self, lane: int, station: float, offset: float) -> None:
-        """Lays a new path for an ego that has left the present one, and drops the plan.
-
-        Args:
-            lane: lane of the ego.
-            station: distance along it [m].
-            offset: distance from it, positive right [m].
-        """
-        request_path(self._arrays, self._holder, BEGIN, lane=lane, station=station, offset=offset)
 
     def command(self, action: PhysicalAction, angle: int, speed: float) -> str | None:
         """Applies a navigation action.
