@@ -13,7 +13,11 @@ import pytest
 
 from dorothie_gym.compilation import compiled_folder
 from dorothie_gym.engine.warm_up import is_warm, warm_up
+from dorothie_gym.envs import warm_up as navigation
 from dorothie_gym.user_cache import CACHE_VARIABLE
+
+BATCHED = frozenset(["baselines", "envs"])
+"""Folders of tests that step batches of the navigation environments."""
 
 SIMULATED = frozenset(
     [
@@ -77,6 +81,8 @@ def compiled_simulation(tmp_path_factory: pytest.TempPathFactory, request: pytes
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not is_warm():
             warm_up()
+        if any(BATCHED & set(item.path.parts) for item in request.session.items) and not navigation.is_warm():
+            navigation.warm_up()
 
 
 @pytest.fixture

@@ -16,8 +16,10 @@ from typer.testing import CliRunner
 from dorothie_gym.cli import warm_up as command
 from dorothie_gym.cli.app import app
 from dorothie_gym.engine import warm_up as compiling
+from dorothie_gym.envs import warm_up as batches
 
 NAMES = ("sim.step.step", "sim.batch.play_share")
+BATCH_NAME = "envs.driving_steps.act_share"
 
 
 @pytest.fixture
@@ -30,7 +32,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
         for done, name in enumerate(NAMES, start=1):
             progress(name, done, len(NAMES))
 
+    def compile_batch(progress: Callable[[str, int, int], None]) -> None:
+        progress(BATCH_NAME, 1, 1)
+
     monkeypatch.setattr(compiling, "warm_up", compile_two)
+    monkeypatch.setattr(batches, "warm_up", compile_batch)
     monkeypatch.setattr(command, "stderr", lambda: Console(stderr=True, force_terminal=True, width=130))
     return found
 
@@ -38,10 +44,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
 def test_warm_up_compiles_everything_and_reports_it(asked: list[bool]) -> None:
     result = CliRunner().invoke(app, ["warm-up"], catch_exceptions=False)
     assert result.exit_code == 0 and asked == [True]
-    assert result.stdout.startswith("Compiled 2 functions in 0 s; kept in ")
-    assert "Compiling, once per machine" in result.stderr and NAMES[-1] in result.stderr
+    assert result.stdout.startswith("Compiled 3 functions in 0 s; kept in ")
+    assert "Compiling, once per machine" in result.stderr
+    assert BATCH_NAME in result.stderr
     facts = json.loads(CliRunner().invoke(app, ["warm-up", "--json"], catch_exceptions=False).stdout)
-    assert facts["functions"] == 2 and facts["seconds"] < 5.0 and Path(facts["folder"]).is_dir()
+    assert facts["functions"] == 3 and facts["seconds"] < 5.0 and Path(facts["folder"]).is_dir()
 
 
 def test_cold_run_shows_what_is_compiled_before_the_session(asked: list[bool], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -54,6 +61,37 @@ def test_cold_run_shows_what_is_compiled_before_the_session(asked: list[bool], m
     assert cold.exit_code == 0 and asked == [False]
     assert "Compiling, once per machine" in cold.stderr and NAMES[-1] in cold.stderr
     assert cold.stdout.splitlines()[0] == warm.stdout.splitlines()[0]  # later lines hold durations
+
+
+@pytest.mark.parametrize(
+    ("words", "stepped"),
+    [
+        (["bench", "rl"], True),
+        (["bench", "world"], False),
+        (["train-rl", "ppo", "--out", "run", "--workers", "0"], True),
+        (["train-rl", "ppo", "--out", "run", "--workers", "2"], False),
+    ],
+)
+def test_commands_that_step_batches_compile_them_first(
+    asked: list[bool], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: list[str], stepped: bool
+) -> None:
+    def interrupt(progress: Callable[[str, int, int], None], *, everything: bool) -> None:
+        raise KeyboardInterrupt  # the command itself is not to run
+
+    def interrupt_batch(progress: Callable[[str, int, int], None]) -> None:
+        progress(BATCH_NAME, 1, 1)
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(batches, "is_warm", lambda: False)
+    monkeypatch.setattr(compiling, "is_warm", lambda *, everything: stepped)
+    if stepped:
+        monkeypatch.setattr(batches, "warm_up", interrupt_batch)
+    else:
+        monkeypatch.setattr(compiling, "warm_up", interrupt)
+    result = CliRunner().invoke(app, words)
+    assert (BATCH_NAME in result.stderr) is stepped
+    assert result.exit_code != 0
 
 
 def test_warm_up_without_a_cache_is_refused() -> None:

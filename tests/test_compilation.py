@@ -8,10 +8,12 @@ import numba
 import numpy as np
 import pytest
 from numba.core import event
+from numba.core.compiler import Flags
 
 from dorothie_gym.compilation import allocating, cache, compiled, direct, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.cache import compiled_folder
+from dorothie_gym.compilation.dispatcher import OwnFlags
 from dorothie_gym.compilation.records import Float, empty_records
 
 
@@ -216,3 +218,15 @@ def test_field_with_the_name_of_an_attribute_of_numpy_is_refused():
 
     with pytest.raises(TypeError, match=r"Cell\.size has the name of an attribute"):
         empty_records(Cell, 1)
+
+
+def test_options_of_a_compilation_equal_those_of_numba_with_the_same_values() -> None:
+    plain, own = Flags(), OwnFlags()
+    plain.no_compile = plain.nrt = False
+    assert own == plain and plain == own and hash(own) == hash(plain)
+    own.nrt = True
+    assert own != plain and plain != own
+    plain.nrt = True
+    plain.fastmath = True
+    assert own != plain and plain != own
+    assert own.copy() == own and hash(own.copy()) == hash(own)

@@ -215,7 +215,7 @@ def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> 
     try:
         with reporting_errors():
             if name in SIMULATING:
-                compile_first(everything=name == "vector")
+                compile_first(everything=name == "vector", batches=name == "rl")
             with _progress() as progress:
                 figures = measure(progress)
     except KeyboardInterrupt:

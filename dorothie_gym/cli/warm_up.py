@@ -20,7 +20,7 @@ def warm_up(
     if folder is None:
         fail("caching is turned off (DOROTHIE_GYM_CACHE is empty): compiled functions would be lost; unset it")
     begun = time.perf_counter()
-    compiled = compile_with_progress(everything=True)
+    compiled = compile_with_progress(everything=True, batches=True)
     seconds = round(time.perf_counter() - begun, 1)
     if as_json:
         print_json({"functions": compiled, "seconds": seconds, "folder": str(folder)})
@@ -32,23 +32,27 @@ def warm_up(
         stdout().print(f"Nothing to compile; all is in {folder}", soft_wrap=True, markup=False)
 
 
-def compile_first(*, everything: bool = False) -> None:
+def compile_first(*, everything: bool = False, batches: bool = False) -> None:
     """Compiles what is not in the cache, with a progress bar on a terminal.
 
     Args:
-        everything: whether vectorised environments are needed, too, or sessions only.
+        everything: whether vectorised environments of `Town-v0` are needed, too, or sessions only.
+        batches: whether batches of the navigation environments are needed.
     """
-    from dorothie_gym.engine.warm_up import is_warm
+    from dorothie_gym.engine import warm_up as sessions
+    from dorothie_gym.envs import warm_up as navigation
 
-    if not is_warm(everything=everything):
-        compile_with_progress(everything=everything)
+    batches = batches and not navigation.is_warm()
+    if batches or not sessions.is_warm(everything=everything):
+        compile_with_progress(everything=everything, batches=batches)
 
 
-def compile_with_progress(*, everything: bool) -> int:
-    """Compiles with a progress bar on a terminal, see `engine.warm_up.warm_up`; returns the number of functions."""
+def compile_with_progress(*, everything: bool, batches: bool) -> int:
+    """Compiles with a progress bar on a terminal; returns the number of functions. Arguments as `compile_first`."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from dorothie_gym.engine.warm_up import warm_up
+    from dorothie_gym.engine import warm_up as sessions
+    from dorothie_gym.envs import warm_up as navigation
 
     console, begun = stderr(), 0
     columns = (
@@ -65,5 +69,8 @@ def compile_with_progress(*, everything: bool) -> int:
             begun = done
             progress.update(bar, completed=done, total=planned, description=name)
 
-        warm_up(show, everything=everything)
-    return begun
+        sessions.warm_up(show, everything=everything)
+        before, begun = begun, 0
+        if batches:
+            navigation.warm_up(show)
+    return before + begun

@@ -67,7 +67,7 @@ def warm_up(progress: Progress | None = None, *, everything: bool = False) -> No
         progress: called when the compilation of a function begins, perhaps in another thread.
         everything: whether to compile what `Town-v0` and its vectorised form need, too.
     """
-    with _reporting(progress) as report, _helper(report, everything) as wait:
+    with reporting(progress) as report, _helper(report, everything) as wait:
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
         engine.reset(seed=0)
         _compile_rare()
@@ -82,7 +82,7 @@ def warm_up(progress: Progress | None = None, *, everything: bool = False) -> No
 
 def compile_loops(progress: Progress | None = None, *, everything: bool) -> None:
     """Compiles the loop over substeps, and with `everything` the one of vectorised environments."""
-    with _reporting(progress):
+    with reporting(progress):
         town, world = _examples()
         if isinstance(step, CompiledFunction):
             step.compile_for(town, world, 1, 1.0 / FRAME_RATE)
@@ -158,7 +158,8 @@ def _compiled_functions() -> set[str]:
 
 
 @contextmanager
-def _reporting(progress: Progress | None) -> Iterator[Callable[[str], None]]:
+def reporting(progress: Progress | None) -> Iterator[Callable[[str], None]]:
+    """Calls `progress` for each function that this process begins to compile; yields a function that does so, too."""
     if progress is None:
         yield lambda name: None
         return
