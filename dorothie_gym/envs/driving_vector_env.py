@@ -255,9 +255,9 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         self._infractions[numbers] = batch.infractions[changed]
         truncated = outcomes["ending"] == Ending.OUT_OF_TIME
         self._truncations[numbers], self._terminations[numbers] = truncated, (outcomes["ending"] > 0) & ~truncated
-        refused = batch.any_refused
-        for place in np.flatnonzero(changed).tolist():
-            self._refused[members[place]] = batch.refused(place) if refused[place] else []
+        pairs = zip(np.flatnonzero(changed).tolist(), batch.any_refused[changed].tolist(), strict=True)
+        reasons = (batch.refused(place) if refused else [] for place, refused in pairs)
+        self._refused[numbers] = np.fromiter(reasons, dtype=object, count=len(numbers))
         for number in numbers.tolist() if self._views else ():
             self._views[number].note(*self._places[number])
         over = numbers[outcomes["ending"] > 0]
@@ -265,8 +265,9 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
             self._success[numbers] = batch.successes[changed]
             self._subgoals[numbers, 0] = batch.live_subgoals[changed]
             self._subgoals[numbers, 1] = outcomes["reached"]
-            for number, ending in zip(numbers.tolist(), outcomes["ending"].tolist(), strict=True):
-                self._reasons[number] = Ending(ending).label if ending else None
+            self._reasons[numbers] = None
+            for number, ending in zip(over.tolist(), outcomes["ending"][outcomes["ending"] > 0].tolist(), strict=True):
+                self._reasons[number] = Ending(ending).label
 
     def _begin(self, seeds: Mapping[int, int | None], scenario: Scenario | None) -> None:
         """Begins episodes of environments; a seed of None continues the environment's own series."""
