@@ -352,7 +352,7 @@ class DrivingBatch(Lookups):
         self._faulty.discard(number)
         self._note_task(number, TaskState(scenario.storyboard))
         if self._config.exceptions > 0.0:
-            face.interference = Interference(self._live_session(number), self._config.exceptions)
+            face.interference = Interference(self.town, self._limits, scenario, self._config.exceptions)
             self._due[number] = face.interference.due
 
     def _move_in(self, number: int) -> None:

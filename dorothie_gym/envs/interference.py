@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from dorothie_gym.engine.session_engine import LiveSession
+from dorothie_gym.engine.scenario import Scenario
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard, idle_until
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.spaces import ActionDecoder, Observation, RoleAction, plain_text
+from dorothie_gym.spaces import ActionDecoder, Observation, RoleAction, SpaceLimits, plain_text
 from dorothie_gym.spaces.limits import STORY_LENGTH
 
 
@@ -19,17 +20,19 @@ class Interference:
         due: earliest time at which it may act [s].
     """
 
-    def __init__(self, session: LiveSession, rate: float) -> None:
+    def __init__(self, town: Town, limits: SpaceLimits, scenario: Scenario, rate: float) -> None:
         """Draws its plans.
 
         Args:
-            session: the session.
+            town: the map.
+            limits: sizes of the spaces.
+            scenario: scenario of the session.
             rate: average number of exceptions in a session.
         """
-        self._policy = ScriptedAdWizard(session.limits, rate=rate)
-        self._decoder = ActionDecoder(Role.AD_WIZARD, session.limits)
-        self._plans = self._policy.initial_state(policy_seed(session.scenario.seed, Role.AD_WIZARD), session.world.town)
-        self._story = plain_text(session.scenario.storyboard.story, STORY_LENGTH)
+        self._policy = ScriptedAdWizard(limits, rate=rate)
+        self._decoder = ActionDecoder(Role.AD_WIZARD, limits)
+        self._plans = self._policy.initial_state(policy_seed(scenario.seed, Role.AD_WIZARD), town)
+        self._story = plain_text(scenario.storyboard.story, STORY_LENGTH)
         self.due = idle_until(self._policy, self._plans, self._story)
 
     def wait(self, decisions: int = 1) -> None:
