@@ -4,320 +4,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Final, TypeVar, cast
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.beliefs import goals_on_map
 from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
-from dorothie_gym.engine.session_engine import LiveSession, session_seeds
-from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, EVENTS, DriveArrays, DrivingTown, Event, Stage, row_of
-from dorothie_gym.envs.driving_start import Blanks, blank_parts, blank_world, copy_row, stacked, write_scenario
+from dorothie_gym.engine.session_engine import session_seeds
+from dorothie_gym.envs.driving_arrays import EVENTS, Event, Stage, row_of
+from dorothie_gym.envs.driving_rows import DrivingFace, DrivingRows, RowHolder
+from dorothie_gym.envs.driving_start import write_scenario
 from dorothie_gym.envs.driving_steps import act_share, guide_share
-from dorothie_gym.envs.episode import EpisodeArrays
 from dorothie_gym.envs.interference import Interference
-from dorothie_gym.envs.navigation_config import NavigationConfig
-from dorothie_gym.maps import Town
-from dorothie_gym.maps.route_arrays import empty_search
-from dorothie_gym.maps.routing import Place
-from dorothie_gym.maps.routing_graph import routing_graph
-from dorothie_gym.ontology import LandmarkName, MentalAction, PhysicalAction, Role
-from dorothie_gym.policies.navigation.cost_to_go import cost_table
-from dorothie_gym.policies.navigation.driver_view import DriverArrays
-from dorothie_gym.policies.navigation.instructor import exit_sectors, instruction_of
-from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
-from dorothie_gym.policies.navigation.junction_exits import exit_arrays
-from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, Vector
-from dorothie_gym.policies.route_tables import route_tables
-from dorothie_gym.sim.batch.threads import ThreadPool, turns_of
+from dorothie_gym.ontology import LandmarkName, MentalAction, Role
+from dorothie_gym.sim.batch.threads import ThreadPool
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL, set_goals
-from dorothie_gym.sim.ego.planner import REASONS
-from dorothie_gym.sim.infractions import INFRACTION_KINDS
-from dorothie_gym.sim.network.network import network_of
-from dorothie_gym.sim.state.codes import Refusal
-from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_room_of
+from dorothie_gym.sim.ego.ego_controller import set_goals
+from dorothie_gym.sim.state.world_arrays import lengthened
 from dorothie_gym.sim.world_start import WorldSeeds, start_world
-from dorothie_gym.spaces import LanePosition, Mental, SpaceLimits
-from dorothie_gym.tasks import StoryboardTemplate, TaskState
-
-Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
-
-ROOMS: Final = ("vehicles", "pedestrians", "props", "course", "steps", "goals")
-"""Arrays of a world whose lengths differ between worlds of a town."""
-
-
-CHANGES: Final = ("faces", "_stacks", "_due", "_waited", "_live", "_noted", "_faulty")
-"""Attributes of a batch that hold what changes."""
-
-
-INFRACTIONS: Final = tuple(kind.value for kind in INFRACTION_KINDS)
-"""Names of the infractions that infos count."""
+from dorothie_gym.spaces import LanePosition, Mental
+from dorothie_gym.tasks import TaskState
 
 _WAITS, _NEAR, _LOST, _TOLD = map(int, Event)
 _act_share, _guide_share = direct(act_share), direct(guide_share)
 
 
-@dataclass
-class DrivingFace:
-    """What a session of a batch has besides its row.
-
-    Attributes:
-        scenario: storyboard, street names and departure.
-        live: the session with objects for rare events, whose world shows the row; None before the first of them.
-        interference: scripted Ad-Wizard; None without exceptions.
-        goals: goals of the Co-Wizard as long as there is no `live`.
-        notes: belief updates that wait to be sent.
-        version: version of the task that the row knows.
-        refused: reasons for the refusals of belief updates at the last decision.
-        seen: observations for the Ad-Wizard's next action, if they were built before the path was replaced.
-    """
-
-    scenario: Scenario
-    live: LiveSession | None = None
-    interference: Interference | None = None
-    goals: tuple[LandmarkName, ...] = ()
-    notes: list[Mental] = field(default_factory=list)
-    version: int = -1
-    refused: list[str] = field(default_factory=list)
-    seen: LazyObservations | None = None
-
-
-class RowHolder:
-    """Holder of the world in a row of a batch; arrays with more room make room in all rows."""
-
-    def __init__(self, batch: DrivingBatch, number: int) -> None:
-        self._batch, self._number = batch, number
-
-    @property
-    def arrays(self) -> WorldArrays:
-        """Arrays of the world."""
-        return self._batch.row(self._number)
-
-    @arrays.setter
-    def arrays(self, arrays: WorldArrays) -> None:
-        self._batch.make_room(arrays)
-
-
-class DrivingBatch(Lookups):
+class DrivingBatch(DrivingRows):
     """Sessions of one town in which only driving is left to the agents.
 
-    The state of each session lies in a row of arrays, which compiled code plays. Python handles what happens rarely:
-    belief updates, exceptions of the Ad-Wizard, arrivals, new sessions.
-
-    Attributes:
-        town: the map.
-        faces: present session of each environment; None before its first.
-        frames: substeps of a decision.
-        pedals: whether the agents use throttle, steering and brake.
-        threads: number of threads, the caller's included.
+    Compiled code plays the rows. Python handles what happens rarely: belief updates, exceptions of the Ad-Wizard,
+    arrivals, new sessions.
     """
 
-    LOOKED_UP: ClassVar[tuple[str, ...]] = ("_pool", "_rows", "_blanks", "_decisions", "outcomes", "infractions")
-
-    def __init__(
-        self, town: Town, template: StoryboardTemplate | None, config: NavigationConfig, count: int, threads: int,
-        *, pedals: bool = False,
-    ) -> None:  # fmt: skip
-        """Prepares for sessions.
-
-        Args:
-            town: the map.
-            template: template of the storyboards; None draws one for each session.
-            config: settings.
-            count: number of environments.
-            threads: number of threads at most.
-            pedals: whether the agents use throttle, steering and brake; else they choose a `NavigationAction`.
-        """
-        self.town, self._template, self._config, self._count = town, template, config, count
-        self.threads = max(1, min(threads, count))
-        self._limits, self._network = SpaceLimits.for_town(town), network_of(town)
-        self._arrays, self._exits = town_arrays(self._network), exit_arrays(town)
-        self._tables, self._graph = route_tables(town), routing_graph(town)
-        self._searches = stacked(empty_search(self._graph), self.threads)
-        self._cost_rows: dict[tuple[Place, tuple[Place, ...]], int] = {}
-        first = town.sites[0]
-        self._common = DrivingTown(
-            exit_sectors(town), np.zeros((1, len(cost_table(town, (first.lane, first.station)).costs))),
-            float(config.max_seconds), pedals,
-        )  # fmt: skip
-        self._session_config = config.session_config
-        self.frames, self.pedals = self._session_config.frames, pedals
-        self.faces: list[DrivingFace | None] = [None] * count
-        self._stacks: list[Any] = []
-        self._due, self._waited = np.full(count, math.inf), np.zeros(count, dtype=np.int64)
-        self._live = np.zeros(count, dtype=np.int64)
-        self._turns = turns_of(count, self.threads)
-        self._noted, self._faulty = set[int](), set[int]()
+    LOOKED_UP: ClassVar[tuple[str, ...]] = (*DrivingRows.LOOKED_UP, "_pool")
 
     @cached_property
     def _pool(self) -> ThreadPool:
         return ThreadPool(self.threads - 1)
-
-    @cached_property
-    def _rows(self) -> list[WorldArrays]:
-        """Rows of the worlds, each the same object as long as the arrays are."""
-        return [row_of(self.worlds, number) for number in range(self._count)]
-
-    @cached_property
-    def _blanks(self) -> Blanks:
-        world = blank_world(self._network, self._config, pedals=self.pedals)
-        parts = blank_parts(self.town, self._limits, self._config, pedals=self.pedals)
-        if not self._stacks:
-            self._stacks = [stacked(arrays, self._count) for arrays in (world, *parts)]
-        return Blanks(self._stacks, (with_room_of(self._arrays, world, self._rows[0]), *parts))
-
-    def __setstate__(self, values: dict[str, object]) -> None:
-        self.__dict__.update(values)
-        self._show_rows()
-
-    def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the sessions."""
-        values = self.__getstate__()
-        used = {*self._decisions["costs"].tolist(), *self._drives.rows.ravel().tolist()} if self._stacks else set()
-        goals = {row: goal for goal, row in self._cost_rows.items() if row in used}
-        return {"goals": goals, **{name: values[name] for name in CHANGES}}
-
-    def apply_values(self, values: dict[str, object]) -> None:
-        """Applies the values of `mutable_values`; the costs to the goals may be in other rows here."""
-        goals = values.pop("goals")
-        assert isinstance(goals, dict)  # of `mutable_values`
-        self.__setstate__(values)
-        if not self._stacks:
-            return
-        rows = np.zeros(1 + max(goals, default=0), dtype=np.int32)
-        for row, goal in goals.items():
-            rows[row] = self._row_of_costs(*goal)
-        self._drives.rows[...] = rows[self._drives.rows]
-        self._decisions["costs"] = rows[self._decisions["costs"]]
-
-    def _show_rows(self) -> None:
-        """Lets the faces show their rows, after the arrays or the faces were replaced."""
-        self._forget_views()
-        for number, face in enumerate(self.faces):
-            if face is not None and face.live is not None:
-                face.live.world.actors.arrays = self._rows[number]
-
-    def _forget_views(self) -> None:
-        for name in self.LOOKED_UP:
-            if name != "_pool":
-                self.__dict__.pop(name, None)
-
-    # --- Arrays of all environments -----------------------------------------------------------------------------------
-
-    @property
-    def worlds(self) -> WorldArrays:
-        """Arrays of the worlds of all environments."""
-        return cast(WorldArrays, self._stacks[0])
-
-    @property
-    def _drivers(self) -> DriverArrays:
-        return cast(DriverArrays, self._stacks[1])
-
-    @property
-    def _guidances(self) -> InstructorArrays:
-        return cast(InstructorArrays, self._stacks[2])
-
-    @property
-    def _episodes(self) -> EpisodeArrays:
-        return cast(EpisodeArrays, self._stacks[3])
-
-    @property
-    def _drives(self) -> DriveArrays:
-        return cast(DriveArrays, self._stacks[4])
-
-    @property
-    def observations(self) -> Vector:
-        """Observations at the present decision (environments, n), to be copied."""
-        return self._drivers.vector
-
-    @property
-    def masks(self) -> NDArray[np.int8]:
-        """Feasible actions at the present decision (environments, 18), to be copied."""
-        return self._drivers.mask
-
-    @cached_property
-    def outcomes(self) -> NDArray[np.void]:
-        """`EpisodeRecord` of each environment (environments,)."""
-        return plain(self._episodes.state)[:, 0]
-
-    @cached_property
-    def infractions(self) -> NDArray[np.int64]:
-        """Numbers of infractions so far (environments, 5), in the order of `INFRACTION_KINDS`, to be copied."""
-        counts: NDArray[np.int64] = plain(self.worlds.watch)[:, 0]["counts"]
-        return counts
-
-    @property
-    def successes(self) -> NDArray[np.bool_]:
-        """Whether every live subgoal was reached, the destination last, without a collision that the ego caused."""
-        outcomes, collisions = self.outcomes, plain(self.worlds.car)[:, 0]["collisions"]
-        successes: NDArray[np.bool_] = (collisions == 0) & outcomes["done"] & outcomes["succeeded"]
-        return successes
-
-    @property
-    def live_subgoals(self) -> NDArray[np.int64]:
-        """Numbers of subgoals that count (environments,)."""
-        return self._live
-
-    @property
-    def nbytes(self) -> int:
-        """Memory of the arrays of all environments [bytes]."""
-        return sum(array.nbytes for stack in self._stacks for array in stack)
-
-    def refused(self, number: int) -> list[str]:
-        """Returns the reasons for the refusals of an environment at its last decision."""
-        face, state = self.faces[number], self._decisions[number]
-        reasons = list(face.refused) if face is not None and state["refused"] else []
-        if state["refusal"] > 0:
-            known = state["refusal"] != CRUISE_LIMIT
-            reason = REASONS[Refusal(int(state["refusal"]))] if known else CRUISE_REFUSAL
-            reasons.append(f"{PhysicalAction(int(state['order'])).label}: {reason}")
-        return reasons
-
-    @property
-    def any_refused(self) -> NDArray[np.bool_]:
-        """Environments at whose last decision something was refused (environments,)."""
-        refused: NDArray[np.bool_] = (self._decisions["refusal"] > 0) | (self._decisions["refused"] > 0)
-        return refused
-
-    @cached_property
-    def _decisions(self) -> NDArray[np.void]:
-        return plain(self._drives.state)[:, 0]
-
-    def heard(self, number: int) -> HeardInstruction:
-        """Returns the last instruction of an environment, as its driver remembers it."""
-        guidance, record = row_of(self._guidances, number), plain(self._drivers.heard)[number, 0]
-        goal = (int(record["goal_lane"]), float(record["goal_station"])) if record["goal_lane"] >= 0 else None
-        given = instruction_of(guidance) if plain(guidance.said)["given"][0] else None
-        return HeardInstruction(instruction=given, driven=float(record["driven"]), goal=goal)
-
-    def goal(self, number: int) -> Place | None:
-        """Returns the place that progress in an environment is measured to, or None."""
-        state = self._decisions[number]
-        return (int(state["goal_lane"]), float(state["goal_station"])) if state["goal_lane"] >= 0 else None
-
-    def blocked(self, number: int) -> tuple[Place, ...]:
-        """Returns the places behind the roadblocks that the instructor of an environment has seen."""
-        guidance = row_of(self._guidances, number)
-        closed = plain(guidance.closed)[: int(plain(guidance.route)["closed"][0])]
-        return tuple((lane, station) for station, lane in closed.tolist())
-
-    @property
-    def has_begun(self) -> bool:
-        """Whether every environment has a session."""
-        return None not in self.faces
-
-    def catch_up(self, number: int) -> LiveSession:
-        """Returns the session of an environment, as it is after the last decision."""
-        return self._live_session(number)
 
     def close(self) -> None:
         """Ends the threads."""
@@ -354,50 +82,6 @@ class DrivingBatch(Lookups):
         if self._config.exceptions > 0.0:
             face.interference = Interference(self.town, self._limits, scenario, self._config.exceptions)
             self._due[number] = face.interference.due
-
-    def _move_in(self, number: int) -> None:
-        """Copies the world of a session into its row, and makes the session show the row."""
-        actors = self._live_session(number).world.actors
-        if actors.arrays is self._rows[number]:
-            return
-        self.make_room(actors.arrays)
-        copy_row(self._rows[number], with_room_of(self._arrays, actors.arrays, self._rows[number]))
-        actors.arrays = self._rows[number]
-
-    def row(self, number: int) -> WorldArrays:
-        """Returns the arrays of the world of an environment."""
-        return self._rows[number]
-
-    def make_room(self, world: WorldArrays) -> None:
-        """Gives all rows the room of a world, if they have less."""
-        if all(len(getattr(self._rows[0], name)) >= len(getattr(world, name)) for name in ROOMS):
-            return
-        rows = [with_room_of(self._arrays, row, world) for row in self._rows]
-        shown = [
-            face is not None and face.live is not None and face.live.world.actors.arrays is row
-            for face, row in zip(self.faces, self._rows, strict=True)
-        ]
-        self._stacks[0] = stacked(rows[0], self._count)
-        self._forget_views()
-        for number, row in enumerate(rows):
-            copy_row(self._rows[number], row)
-            face = self.faces[number]
-            if face is not None and face.live is not None and shown[number]:
-                face.live.world.actors.arrays = self._rows[number]
-
-    def _row_of_costs(self, goal: Place, blocked: tuple[Place, ...]) -> int:
-        """Returns the row of the costs to a goal; new ones are added."""
-        row = self._cost_rows.get((goal, blocked))
-        if row is None:
-            taken = set(self._cost_rows.values())
-            row = next(free for free in range(len(taken) + 1) if free not in taken)
-            self._cost_rows[goal, blocked] = row
-            if row == len(self._common.costs):
-                more = np.zeros((2 * row, self._common.costs.shape[1]))
-                more[:row] = self._common.costs
-                self._common = self._common._replace(costs=more)
-            self._common.costs[row] = cost_table(self.town, goal, blocked).costs
-        return row
 
     # --- A decision ---------------------------------------------------------------------------------------------------
 
@@ -480,24 +164,6 @@ class DrivingBatch(Lookups):
         return int(turns[0, EVENTS]) if len(turns) == 1 else int(np.bitwise_or.reduce(turns[:, EVENTS]))
 
     # --- Rare events --------------------------------------------------------------------------------------------------
-
-    def _face(self, number: int) -> DrivingFace:
-        """Returns the face of an environment."""
-        face = self.faces[number]
-        assert face is not None
-        return face
-
-    def _live_session(self, number: int) -> LiveSession:
-        """Returns the session of an environment, with the time and place of its row."""
-        face = self._face(number)
-        if face.live is None:
-            face.live = LiveSession(
-                self.town, self._network, face.scenario, self._session_config, self._limits, self._rows[number]
-            )
-            face.live.beliefs.goals = face.goals
-        else:
-            face.live.world.catch_up()
-        return face.live
 
     def _look(self, number: int) -> None:
         """Updates what the ego sees after a change of weather or faults."""

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.scenario import Scenario, check_options, scenario_option, template_option
-from dorothie_gym.envs.driving_batch import INFRACTIONS, DrivingBatch
+from dorothie_gym.envs.driving_batch import DrivingBatch
+from dorothie_gym.envs.driving_rows import INFRACTIONS
 from dorothie_gym.envs.driving_view import DrivingView
 from dorothie_gym.envs.episode import TERMS, Ending
 from dorothie_gym.envs.navigation_config import NavigationConfig

@@ -284,3 +284,23 @@ def test_environments_pass_stable_baselines_checker() -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker", reason="needs the extra 'baselines'")
     checker.check_env(NavigationEnv())
     checker.check_env(NavigationContinuousEnv())
+
+
+def test_state_is_restored_where_other_goals_were_driven_to() -> None:
+    one, other = (NavigationEnv(guidance="goals", exceptions=4.0) for _ in range(2))
+    one.reset(seed=1)
+    for seed in (50, 51, 52):
+        other.reset(seed=seed)
+    for _ in range(30):
+        one.step(0)
+    size = one.clone_state().nbytes
+    other.restore_state(one.clone_state())
+    for _ in range(120):
+        expected, found = one.step(NavigationAction.STOP), other.step(NavigationAction.STOP)
+        np.testing.assert_array_equal(expected[0], found[0])
+        assert expected[1:4] == found[1:4] and expected[4]["reward_terms"] == found[4]["reward_terms"]
+        if expected[2]:
+            break
+    for seed in range(12):
+        one.reset(seed=seed)
+    assert one.clone_state().nbytes < 1.5 * size  # old goals are forgotten
