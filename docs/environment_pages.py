@@ -43,7 +43,8 @@ from dorothie_gym.ontology import (
     WeatherParameter,
 )
 from dorothie_gym.policies.navigation import FIELD_SPECS, NavigationAction
-from dorothie_gym.policies.navigation.actions import PLAIN_ACTIONS
+from dorothie_gym.policies.navigation.actions import physical_of
+from dorothie_gym.policies.navigation.driver_view import driver_arrays
 from dorothie_gym.policies.navigation.junction_exits import SECTORS
 from dorothie_gym.recording import ObjectKind, Task
 from dorothie_gym.spaces import Column, FieldKind, FieldSpec, Motion, SpaceLimits, action_fields, observation_fields
@@ -119,7 +120,7 @@ def role_comparison(specs_of: Callable[[Role, SpaceLimits], tuple[FieldSpec, ...
 def _navigation_actions() -> list[str]:
     rows = []
     for action in NavigationAction:
-        physical = PLAIN_ACTIONS.get(action)
+        physical = physical_of(action, driver_arrays())
         name, argument = "", ""
         if action.sector is not None:
             name, argument = (
