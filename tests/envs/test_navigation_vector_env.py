@@ -17,7 +17,7 @@ from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 from tests.envs.navigation_drivers import drive, obey
 
 NAVIGATION, CONTINUOUS = "dorothie_gym/Navigation-v0", "dorothie_gym/Navigation-continuous-v0"
-SHORT = {"max_seconds": 40.0, "patience": 20.0}
+SHORT: dict[str, Any] = {"max_seconds": 40.0, "patience": 20.0}
 
 
 def check_equal(found: Any, expected: Any, path: str = "") -> None:
@@ -37,11 +37,19 @@ def check_equal(found: Any, expected: Any, path: str = "") -> None:
         assert found == expected, path
 
 
-def play_both(name: str, mode: AutoresetMode, actions: Any, steps: int, **settings: Any) -> int:
-    """Plays the same actions in both kinds of batches of three; returns the number of episodes that ended."""
-    native = gym.make_vec(name, num_envs=3, autoreset_mode=mode, **settings)
+def play_both(
+    name: str,
+    mode: AutoresetMode,
+    actions: Any,
+    steps: int,
+    count: int = 3,
+    threads: int | None = None,
+    **settings: Any,
+) -> int:
+    """Plays the same actions in both kinds of batches; returns the number of episodes that ended."""
+    native = gym.make_vec(name, num_envs=count, autoreset_mode=mode, threads=threads, **settings)
     plain = gym.make_vec(
-        name, num_envs=3, vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode}, **settings
+        name, num_envs=count, vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode}, **settings
     )
     check_equal(native.reset(seed=5), plain.reset(seed=5))
     rng, ended = np.random.default_rng(3), 0
@@ -75,7 +83,7 @@ def test_batch_with_pedals_is_equal_to_single_environments(mode: AutoresetMode) 
 
 @pytest.mark.parametrize("frequency", [5.0, 0.5])  # several calls of the physics a decision below 2 Hz
 def test_settings_with_pedals_are_those_of_the_single_environment(frequency: float) -> None:
-    settings = {"exceptions": 4.0, "traffic": "medium", "decision_frequency": frequency}
+    settings: dict[str, Any] = {"exceptions": 4.0, "traffic": "medium", "decision_frequency": frequency}
     play_both(CONTINUOUS, AutoresetMode.NEXT_STEP, pedals, 60, **SHORT, **settings)
 
 
@@ -94,6 +102,25 @@ def test_number_of_threads_changes_nothing_with_pedals() -> None:
 )
 def test_settings_are_those_of_the_single_environment(settings: dict[str, Any]) -> None:
     play_both(NAVIGATION, AutoresetMode.NEXT_STEP, lambda rng: rng.integers(0, 18, 3), 40, **SHORT, **settings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("guidance", ["turns", "goals"])
+@pytest.mark.parametrize(
+    ("town", "traffic", "exceptions"),
+    [("brookside", "light", 0.0), ("midtown", "medium", 2.0), ("millbrook", "none", 4.0), ("northgate", "heavy", 0.0)],
+)
+def test_hundreds_of_episodes_are_equal_to_those_of_single_environments(
+    town: str, traffic: str, exceptions: float, guidance: str
+) -> None:
+    settings: dict[str, Any] = {"town": town, "traffic": traffic, "exceptions": exceptions, "guidance": guidance}
+    ended = 0
+    for count, threads, steps in ((1, 1, 150), (7, 2, 100), (64, 2, 60), (64, 1, 60)):
+        ended += play_both(
+            NAVIGATION, AutoresetMode.SAME_STEP, lambda rng, count=count: rng.integers(0, 18, count), steps, count,
+            threads, max_seconds=25.0, patience=12.0, **settings,
+        )  # fmt: skip
+    assert ended >= 130
 
 
 def test_environment_does_not_depend_on_its_place_in_the_batch() -> None:
