@@ -71,6 +71,18 @@ def test_weight_of_the_entropy_falls_to_its_last_value(tmp_path: Path) -> None:
         settings_for("ppo", parameters={"final_ent_coef": 0.0})
 
 
+def test_driver_of_several_towns(tmp_path: Path) -> None:
+    towns = {"town": ["brookside", "northgate"], "max_seconds": 10.0, "traffic": "none"}
+    run = Training(settings_for("maskable_ppo", env_settings=towns), tmp_path).run()
+    assert run.rows[-1].outcome.episodes == 2  # one in each town
+    model, settings = load_model(tmp_path)
+    assert settings.env_settings == towns and model.observation_space.shape == (161,)
+    with pytest.raises(SettingsError, match="several towns"):
+        Training(settings_for("maskable_ppo", env_settings=towns, workers=2), tmp_path / "workers")
+    with pytest.raises(SettingsError, match="town"):
+        Training(settings_for("maskable_ppo", env_settings={"town": ["brookside", "nowhere"]}), tmp_path / "unknown")
+
+
 def test_resumed_run_keeps_weights_optimiser_and_evaluations(tmp_path: Path) -> None:
     first = Training(settings_for("ppo"), tmp_path)
     run = first.run()
