@@ -45,6 +45,9 @@ FINAL_ENTROPY: Final = "final_ent_coef"
 MAX_ENVIRONMENTS: Final = 4096
 """Largest number of parallel environments."""
 
+SHORTEST_ROLLOUT: Final = 8
+"""Least number of steps of each environment in a rollout."""
+
 MAX_LAYERS, MAX_WIDTH = 16, 8192
 """Largest number of hidden layers, and of numbers in a layer."""
 
@@ -165,6 +168,8 @@ class TrainingSettings(RunSettings):
 def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSettings:
     """Returns the tuned settings of an algorithm and an environment, with changes.
 
+    With another number of environments, rollouts of PPO get as many steps of each as keep their size.
+
     Args:
         algorithm: one of `ALGORITHMS`.
         env: id of the environment; an environment without tuned settings gets the default of the algorithm.
@@ -176,7 +181,11 @@ def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSetti
     _check_algorithm(algorithm)
     entries = _read_data(algorithm)
     tuned = TrainingSettings(algorithm=algorithm, env=env, **entries[env if env in entries else DEFAULT])
-    return replace(tuned, **_given(changes))
+    changed = replace(tuned, **_given(changes))
+    if "batch_size" in tuned.parameters and "n_steps" in tuned.parameters and "parameters" not in _given(changes):
+        steps = max(tuned.parameters["n_steps"] * tuned.environments // changed.environments, SHORTEST_ROLLOUT)
+        changed = replace(changed, parameters={**changed.parameters, "n_steps": steps})
+    return changed
 
 
 def _check_algorithm(name: str) -> None:

@@ -71,6 +71,15 @@ def test_weight_of_the_entropy_falls_to_its_last_value(tmp_path: Path) -> None:
         settings_for("ppo", parameters={"final_ent_coef": 0.0})
 
 
+def test_rollouts_keep_their_size_with_other_numbers_of_environments() -> None:
+    tuned = tuned_settings("ppo", DISCRETE)
+    for environments in (1, 8, 512):
+        changed = tuned_settings("ppo", DISCRETE, environments=environments)
+        assert environments * changed.parameters["n_steps"] == tuned.environments * tuned.parameters["n_steps"]
+    given = tuned_settings("ppo", DISCRETE, environments=8, parameters={"n_steps": 4, "batch_size": 8})
+    assert given.parameters["n_steps"] == 4
+
+
 def test_driver_of_several_towns(tmp_path: Path) -> None:
     towns = {"town": ["brookside", "northgate"], "max_seconds": 10.0, "traffic": "none"}
     run = Training(settings_for("maskable_ppo", env_settings=towns), tmp_path).run()
