@@ -23,7 +23,7 @@ from PIL import Image
 
 import dorothie_gym
 from dorothie_gym.envs.history_space import SPEAKERS, act_fields, decision_fields, history_fields
-from dorothie_gym.envs.navigation_continuous_v0 import CONTINUOUS_FIELD_SPECS, CONTROL_SPECS
+from dorothie_gym.envs.navigation_continuous_v0 import ACCELERATION_SPECS, CONTINUOUS_FIELD_SPECS, CONTROL_SPECS
 from dorothie_gym.ontology import (
     AGENT_ROLES,
     LABELS,
@@ -115,6 +115,13 @@ def role_comparison(specs_of: Callable[[Role, SpaceLimits], tuple[FieldSpec, ...
 
     rows = ((f"`{name}`", *(cell(spaces[role].get(name)) for role in AGENT_ROLES)) for name in names)
     return table(rows, "field", *(f"[`{role}`]({role}.md)" for role in AGENT_ROLES))
+
+
+def _pedal_actions() -> list[str]:
+    """Returns the tables of both controls."""
+    return [
+        *vector_table(CONTROL_SPECS), "", 'With `control="acceleration"`:', "", *vector_table(ACCELERATION_SPECS),
+    ]  # fmt: skip
 
 
 def _navigation_actions() -> list[str]:
@@ -391,7 +398,7 @@ def _pages() -> Iterator[EnvironmentPage]:
     navigation = ("../navigation.md", "Navigation environments")
     named_weights = {
         name: gym.make("dorothie_gym/Navigation-v0", reward=name).unwrapped.config.weights  # type: ignore[attr-defined]
-        for name in ("dense", "sparse")
+        for name in ("dense", "careful", "sparse")
     }
     yield EnvironmentPage(
         name="navigation", id="Navigation-v0", cls=dorothie_gym.NavigationEnv, picture=DRIVE, guide=navigation,
@@ -405,7 +412,7 @@ def _pages() -> Iterator[EnvironmentPage]:
         summary="Driving with given directions, by throttle, steering and brake.", picture=DRIVE, guide=navigation,
         snippet=SAMPLE,
         observations=lambda: vector_table(CONTINUOUS_FIELD_SPECS),
-        actions=lambda: vector_table(CONTROL_SPECS),
+        actions=_pedal_actions,
     )  # fmt: skip
     classes = {Task.UFN: dorothie_gym.UfNEnv, Task.RFN: dorothie_gym.RfNEnv, Task.NFD: dorothie_gym.NfDEnv}
     for task, cls in classes.items():

@@ -260,7 +260,8 @@ def curves(runs: dict[str, list[Path]]) -> str:
                      for now in shared]  # fmt: skip
         axes.axhline(0.8, color=SOFT, lw=0.8, ls="--")
         axes.set(ylim=(-0.02, 1.02), xscale="log", xlabel="training time [s]", ylabel=f"success of {episodes} episodes")
-        axes.legend(frameon=False, loc="lower right")
+        axes.set_xticks([10, 20, 50, 100, 200, 500, 1000], labels=["10", "20", "50", "100", "200", "500", "1000"])
+        axes.legend(frameon=False, loc=(0.42, 0.06))
         figure.savefig(CURVES, format="png", dpi=150)
     seeds = (f"seed {k}" for k in range(max(map(len, runs.values()))))
     return "\n".join(_table(iter(rows), "", "thousand steps", *seeds))

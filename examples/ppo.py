@@ -84,7 +84,7 @@ def main() -> None:
     envs = gym.make_vec("dorothie_gym/Navigation-v0", num_envs=count, autoreset_mode="SameStep")
     inputs, actions = envs.single_observation_space.shape[0], int(envs.single_action_space.n)
     driver = Driver(inputs, actions).to(device)
-    optimiser = torch.optim.Adam(driver.parameters(), lr=arguments.rate, eps=1e-5)
+    optimiser = torch.optim.Adam(driver.parameters(), lr=arguments.rate, eps=1e-5, fused=True)
     rollouts = arguments.steps // (count * steps)
     observations = torch.zeros(steps, count, inputs, device=device)
     masks = torch.zeros(steps, count, actions, dtype=torch.bool, device=device)

@@ -61,6 +61,7 @@ class NavigationWeights:
 REWARDS: Mapping[str, NavigationWeights] = MappingProxyType(
     {
         "dense": NavigationWeights(),
+        "careful": NavigationWeights(collision=-3.0),
         "sparse": NavigationWeights(progress=0.0, infraction=0.0, gave_up=0.0, time=0.0, action=0.0, refusal=0.0),
     }
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +15,16 @@ from dorothie_gym.envs.driving_env import DrivingEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.pedals import CONTINUOUS_FIELD_SPECS, CONTINUOUS_FIELDS
 from dorothie_gym.envs.session_view import metadata_at
+from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import Town
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.spaces import StepInfo
-from dorothie_gym.spaces.fields import signal
+from dorothie_gym.spaces.fields import FieldSpec, signal
 from dorothie_gym.tasks import StoryboardTemplate
 
 __all__ = [
-    "CONTINUOUS_FIELDS", "CONTINUOUS_FIELD_SPECS", "CONTROL_SPECS", "NavigationContinuousEnv", "control_space",
-    "controls_of", "path_space",
+    "ACCELERATION_SPECS", "CONTINUOUS_FIELDS", "CONTINUOUS_FIELD_SPECS", "CONTROLS", "CONTROL_SPECS",
+    "NavigationContinuousEnv", "control_space", "controls_of", "path_space",
 ]  # fmt: skip
 
 CONTROL_SPECS = (
@@ -32,10 +34,21 @@ CONTROL_SPECS = (
 )
 """Fields of the action, in order."""
 
+ACCELERATION_SPECS = (
+    signal("acceleration", 1, meaning="share of full throttle; negative: of full braking"),
+    CONTROL_SPECS[1],
+)
+"""Fields of the action with `control="acceleration"`, in order."""
 
-def control_space() -> spaces.Space[NDArray[np.float32]]:
-    """Returns the action space: throttle, steer and brake."""
-    return spaces.Box(-1.0, 1.0, (len(CONTROL_SPECS),), dtype=np.float32)
+CONTROLS: Mapping[str, tuple[FieldSpec, ...]] = {"pedals": CONTROL_SPECS, "acceleration": ACCELERATION_SPECS}
+"""Fields of the action by the name of the control."""
+
+
+def control_space(control: str) -> spaces.Space[NDArray[np.float32]]:
+    """Returns the action space of one of `CONTROLS`; raises `ValueError` for another name."""
+    if control not in CONTROLS:
+        raise ValueError(f"control is {short_repr(control)}; it must be one of {', '.join(CONTROLS)}")
+    return spaces.Box(-1.0, 1.0, (len(CONTROLS[control]),), dtype=np.float32)
 
 
 def path_space() -> spaces.Space[Vector]:
@@ -43,19 +56,24 @@ def path_space() -> spaces.Space[Vector]:
     return spaces.Box(-1.0, 1.0, (sum(CONTINUOUS_FIELDS.values()),), dtype=np.float32)
 
 
-def controls_of(name: str, action: object, shape: tuple[int, ...], meaning: str) -> NDArray[np.float64]:
-    """Returns throttle, steer and brake of actions (..., 3), negative throttle and brake as 0.
+def controls_of(name: str, action: object, control: str, count: tuple[int, ...] = ()) -> NDArray[np.float64]:
+    """Returns throttle, steer and brake of actions (*count, 3), negative throttle and brake as 0.
 
     Args:
         name: name of the argument.
         action: the actions.
-        shape: of all of them.
-        meaning: their meaning, for messages.
+        control: one of `CONTROLS`.
+        count: shape of the batch.
 
     Raises:
-        ValueError: they are not finite numbers of this shape.
+        ValueError: they are not finite numbers of the right shape.
     """
-    return np.clip(real_numbers(name, action, shape, meaning), (0.0, -1.0, 0.0), 1.0)
+    fields = [field.name for field in CONTROLS[control]]
+    shape = (*count, len(fields))
+    values = real_numbers(name, action, shape, f"finite numbers {shape}: {', '.join(fields)}")
+    if control == "acceleration":
+        values = np.stack((values[..., 0], values[..., 1], -values[..., 0]), axis=-1)
+    return np.clip(values, (0.0, -1.0, 0.0), 1.0)
 
 
 class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
@@ -71,6 +89,8 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
 
     ## Action Space
     `Box(-1, 1, (3,), float32)`: throttle, steer (positive right) and brake; negative throttle and brake count as 0.
+    With `control="acceleration"`, `Box(-1, 1, (2,), float32)`: acceleration and steer; negative acceleration is
+    braking.
 
     ## Rewards
     As `NavigationEnv`.
@@ -79,7 +99,11 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
     As `NavigationEnv`; it also terminates when the car is 15 m off the road (`info["reason"]` is "left the road").
 
     ## Arguments
-    As `NavigationEnv` without `guidance`, and `decision_frequency` [Hz], which divides 30.
+    As `NavigationEnv` without `guidance`, and:
+
+    - `decision_frequency` [Hz], which divides 30.
+    - `control`: "pedals" or "acceleration", with which random actions explore more: a car whose throttle and brake
+      are drawn apart hardly moves.
 
     ## Version History
     - v0: first version.
@@ -98,6 +122,7 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         max_seconds: float = 600.0,
         patience: float = 60.0,
         decision_frequency: float = 10.0,
+        control: str = "pedals",
         render_mode: str | None = None,
         view: str = "role",
     ) -> None:
@@ -106,7 +131,8 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
             patience=patience, decision_frequency=decision_frequency,
         )  # fmt: skip
         super().__init__(town, storyboard, config, render_mode, view, pedals=True)
-        self.action_space, self.observation_space = control_space(), path_space()
+        self.action_space, self.observation_space = control_space(control), path_space()
+        self.control = control
 
     def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
         """Begins a session; see `NavigationEnv.reset`."""
@@ -116,9 +142,9 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         """Plays one decision.
 
         Raises:
-            ValueError: the action does not consist of three finite numbers.
+            ValueError: the action does not consist of as many finite numbers as the action space.
             gymnasium.error.ResetNeeded: no session is in progress, or it is over.
         """
-        values = controls_of("action", action, (3,), "three finite numbers: throttle, steer, brake")
+        values = controls_of("action", action, self.control)
         self._check_begun()
         return self._play(values)

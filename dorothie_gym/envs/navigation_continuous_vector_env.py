@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv, Towns
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
-from dorothie_gym.envs.navigation_continuous_v0 import CONTROL_SPECS, control_space, controls_of, path_space
+from dorothie_gym.envs.navigation_continuous_v0 import control_space, controls_of, path_space
 from dorothie_gym.tasks import StoryboardTemplate
 
 
@@ -21,7 +21,8 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
     `Box(-1, 1, (num_envs, n), float32)`, see `NavigationContinuousEnv`.
 
     ## Action Space
-    `Box(-1, 1, (num_envs, 3), float32)`: throttle, steer and brake of each environment.
+    `Box(-1, 1, (num_envs, 3), float32)`: throttle, steer and brake of each environment; with `control="acceleration"`
+    acceleration and steer.
 
     ## Episode End
     As `NavigationContinuousEnv`, with the autoreset modes of `NavigationVectorEnv`.
@@ -46,6 +47,7 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
         max_seconds: float = 600.0,
         patience: float = 60.0,
         decision_frequency: float = 10.0,
+        control: str = "pedals",
         render_mode: str | None = None,
         view: str = "role",
         threads: int | None = None,
@@ -56,10 +58,11 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
             patience=patience, decision_frequency=decision_frequency,
         )  # fmt: skip
         super().__init__(
-            num_envs, town, storyboard, config, path_space(), control_space(), render_mode, view, threads,
+            num_envs, town, storyboard, config, path_space(), control_space(control), render_mode, view, threads,
             autoreset_mode, pedals=True,
         )  # fmt: skip
 
+        self.control = control
+
     def _checked(self, actions: object) -> NDArray[np.float64]:
-        shape = self.num_envs, len(CONTROL_SPECS)
-        return controls_of("actions", actions, shape, f"finite numbers {shape}: throttle, steer, brake of each")
+        return controls_of("actions", actions, self.control, (self.num_envs,))

@@ -56,7 +56,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
     - `guidance`: "turns" (before each junction) or "goals" (by name, where the place is on the Co-Wizard's map).
     - `traffic`: "none", "light", "medium" or "heavy".
     - `exceptions`: average number of exceptions in a session, 0 to 4.
-    - `reward`: "dense", "sparse" or `NavigationWeights`.
+    - `reward`: "dense", "careful" (a collision counts three times as much), "sparse" or `NavigationWeights`.
     - `max_seconds`, `patience`: see above [s].
     - `render_mode`: None, `"rgb_array"` or `"human"`.
     - `view`: picture of `render()`: `"role"` (what the Co-Wizard observes, and the instructions) or `"session"`

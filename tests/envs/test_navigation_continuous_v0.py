@@ -8,6 +8,7 @@ from dorothie_gym.envs.navigation_continuous_v0 import (
     CONTINUOUS_FIELDS,
     NavigationContinuousEnv,
 )
+from dorothie_gym.envs.navigation_continuous_vector_env import NavigationContinuousVectorEnv
 from dorothie_gym.policies.navigation import layout
 from tests.envs.navigation_drivers import pursue
 
@@ -105,3 +106,27 @@ def test_values_lie_in_the_ranges_of_their_fields() -> None:
             observation, _ = env.reset()
     for spec in CONTINUOUS_FIELD_SPECS:
         assert spec.low <= least[FIELD[spec.name]].min() and greatest[FIELD[spec.name]].max() <= spec.high, spec.name
+
+
+def test_acceleration_is_throttle_or_brake() -> None:
+    one, two = (NavigationContinuousEnv(control=control, max_seconds=20.0) for control in ("acceleration", "pedals"))
+    batch = NavigationContinuousVectorEnv(1, control="acceleration", max_seconds=20.0)
+    assert one.action_space.shape == (2,) and two.action_space.shape == (3,)
+    np.testing.assert_array_equal(one.reset(seed=3)[0], two.reset(seed=3)[0])
+    batch.reset(seed=3)
+    one.action_space.seed(0)
+    for _ in range(100):
+        pull, steer = one.action_space.sample()
+        chosen = np.array([pull, steer], dtype=np.float32)
+        observation, reward, *_ = one.step(chosen)
+        pressed, same, *_ = two.step(np.array([max(pull, 0.0), steer, max(-pull, 0.0)], dtype=np.float32))
+        np.testing.assert_array_equal(observation, pressed)
+        assert reward == same
+        np.testing.assert_array_equal(batch.step(chosen[None])[0][0], observation)
+    with pytest.raises(ValueError, match="acceleration, steer"):
+        one.step(np.zeros(3, dtype=np.float32))
+
+
+def test_unknown_control_is_refused() -> None:
+    with pytest.raises(ValueError, match="control is 'wheel'; it must be one of pedals, acceleration"):
+        NavigationContinuousEnv(control="wheel")

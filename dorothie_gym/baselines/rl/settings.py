@@ -173,16 +173,19 @@ def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSetti
     Args:
         algorithm: one of `ALGORITHMS`.
         env: id of the environment; an environment without tuned settings gets the default of the algorithm.
-        changes: fields of `TrainingSettings`; None leaves a field as it is.
+        changes: fields of `TrainingSettings`; None leaves a field as it is, and so do the arguments of the environment
+            that `env_settings` does not name.
 
     Raises:
         SettingsError: there is no such algorithm, or a field is out of its range.
     """
     _check_algorithm(algorithm)
-    entries = _read_data(algorithm)
+    entries, given = _read_data(algorithm), _given(changes)
     tuned = TrainingSettings(algorithm=algorithm, env=env, **entries[env if env in entries else DEFAULT])
-    changed = replace(tuned, **_given(changes))
-    if "batch_size" in tuned.parameters and "n_steps" in tuned.parameters and "parameters" not in _given(changes):
+    changed = replace(tuned, **given)
+    changed = replace(changed, env_settings={**tuned.env_settings, **changed.env_settings})
+    on_policy = algorithm in ON_POLICY and "batch_size" in tuned.parameters
+    if on_policy and "parameters" not in given:
         steps = max(tuned.parameters["n_steps"] * tuned.environments // changed.environments, SHORTEST_ROLLOUT)
         changed = replace(changed, parameters={**changed.parameters, "n_steps": steps})
     return changed

@@ -28,7 +28,7 @@ SMALL: dict[str, dict[str, Any]] = {
     "maskable_ppo": {"n_steps": 16, "batch_size": 32, "n_epochs": 1},
     "a2c": {"n_steps": 8},
     "dqn": {"learning_starts": 16, "buffer_size": 200, "batch_size": 8},
-    "sac": {"learning_starts": 16, "buffer_size": 200, "batch_size": 8},
+    "sac": {"learning_starts": 16, "buffer_size": 200, "batch_size": 8, "n_steps": 3},
 }
 
 
