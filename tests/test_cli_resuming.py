@@ -84,15 +84,16 @@ def results(out: Path) -> dict[str, object]:
 
 
 def test_killed_and_interrupted_training_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
-    training = ("maskable_ppo", "--steps", "2560", "--workers", "0")
+    rollouts = ("--environments", "64", "--evaluate-every", "8192")  # an evaluation after each rollout
+    training = ("maskable_ppo", "--steps", "40960", "--workers", "0")
     whole, cut = tmp_path / "whole", tmp_path / "cut"
-    finish(command(*training, out=whole), tmp_path)
-    words = command(*training, out=cut)
+    finish([*command(*training, out=whole), *rollouts], tmp_path)
+    words = [*command(*training, out=cut), *rollouts]
     seen = [
         interrupt(words, tmp_path, signal.SIGKILL, lambda: rows(cut) >= 2),
         interrupt(words, tmp_path, signal.SIGTERM, lambda: rows(cut) >= 3),
     ]
-    other = CliRunner().invoke(app, ["train-rl", *training, *SHORT, "--out", str(cut), "--seed", "1"])
+    other = CliRunner().invoke(app, [*words[3:], "--seed", "1"])
     assert other.exit_code == 2 and "another seed" in other.stderr and other.stderr.count("\n") == 1
     seen.append(interrupt(words, tmp_path, signal.SIGINT, lambda: rows(cut) >= 4))
     assert all(seen)  # each in the middle
