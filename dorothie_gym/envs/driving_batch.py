@@ -115,7 +115,7 @@ class DrivingBatch(DrivingRows):
         while events & _WAITS:
             for number in np.flatnonzero(np.isin(state["stage"], (Stage.MOVING, Stage.NO_SPACE))).tolist():
                 if state["stage"][number] == Stage.NO_SPACE:
-                    self.make_room(lengthened(self._rows[number]))
+                    self.make_room(lengthened(self.row(number)))
                 else:
                     self._look(number)
             events = self._share_act()
@@ -168,7 +168,7 @@ class DrivingBatch(DrivingRows):
     def _look(self, number: int) -> None:
         """Updates what the ego sees after a change of weather or faults."""
         world = self._live_session(number).world
-        self._rows[number] = world.sensing_arrays  # the same arrays, with the present visibility
+        world.write_weather()
         self._decisions["faulty"][number] = bool(world.faults)
         if world.faults:
             self._faulty.add(number)

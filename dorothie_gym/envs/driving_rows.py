@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, Final, cast
@@ -16,7 +17,7 @@ from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, DriveArrays, DrivingTown, row_of
-from dorothie_gym.envs.driving_start import Blanks, blank_parts, blank_world, copy_row, stacked
+from dorothie_gym.envs.driving_start import Blanks, blank_parts, blank_world, copy_row, stacked, with_room
 from dorothie_gym.envs.episode import EpisodeArrays
 from dorothie_gym.envs.interference import Interference
 from dorothie_gym.envs.navigation_config import NavigationConfig
@@ -145,9 +146,9 @@ class DrivingRows(Lookups):
         self._noted, self._faulty = set[int](), set[int]()
 
     @cached_property
-    def _rows(self) -> list[WorldArrays]:
-        """Rows of the worlds, each the same object as long as the arrays are."""
-        return [row_of(self.worlds, number) for number in range(self._count)]
+    def _rows(self) -> dict[int, WorldArrays]:
+        """Rows of the worlds that `row` has returned."""
+        return {}
 
     @cached_property
     def _blanks(self) -> Blanks:
@@ -155,11 +156,11 @@ class DrivingRows(Lookups):
         parts = blank_parts(self.town, self._limits, self._config, pedals=self.pedals)
         if not self._stacks:
             self._stacks = [stacked(arrays, self._count) for arrays in (world, *parts)]
-        return Blanks(self._stacks, (with_room_of(self._arrays, world, self._rows[0]), *parts))
+        return Blanks(self._stacks, (with_room_of(self._arrays, world, self.row(0)), *parts))
 
     def __setstate__(self, values: dict[str, object]) -> None:
         self.__dict__.update(values)
-        self._show_rows()
+        self._show_rows(self._sessions())
 
     def mutable_values(self) -> dict[str, object]:
         """Returns what changes in the sessions."""
@@ -181,12 +182,17 @@ class DrivingRows(Lookups):
         self._drives.rows[...] = rows[self._drives.rows]
         self._decisions["costs"] = rows[self._decisions["costs"]]
 
-    def _show_rows(self) -> None:
-        """Lets the faces show their rows, after the arrays or the faces were replaced."""
-        self._forget_views()
+    def _sessions(self) -> Iterator[tuple[int, LiveSession]]:
+        """Yields the sessions that have objects, by the number of their environment."""
         for number, face in enumerate(self.faces):
             if face is not None and face.live is not None:
-                face.live.world.actors.arrays = self._rows[number]
+                yield number, face.live
+
+    def _show_rows(self, sessions: Iterable[tuple[int, LiveSession]]) -> None:
+        """Lets sessions show their rows, after the arrays were replaced."""
+        self._forget_views()
+        for number, live in sessions:
+            live.world.actors.arrays = self.row(number)
 
     def _forget_views(self) -> None:
         for name in DrivingRows.LOOKED_UP:
@@ -313,7 +319,7 @@ class DrivingRows(Lookups):
         face = self._face(number)
         if face.live is None:
             face.live = LiveSession(
-                self.town, self._network, face.scenario, self._session_config, self._limits, self._rows[number]
+                self.town, self._network, face.scenario, self._session_config, self._limits, self.row(number)
             )
             face.live.beliefs.goals = face.goals
         else:
@@ -323,32 +329,27 @@ class DrivingRows(Lookups):
     def _move_in(self, number: int) -> None:
         """Copies the world of a session into its row, and makes the session show the row."""
         actors = self._live_session(number).world.actors
-        if actors.arrays is self._rows[number]:
+        if actors.arrays is self.row(number):
             return
         self.make_room(actors.arrays)
-        copy_row(self._rows[number], with_room_of(self._arrays, actors.arrays, self._rows[number]))
-        actors.arrays = self._rows[number]
+        copy_row(self.row(number), with_room_of(self._arrays, actors.arrays, self.row(number)))
+        actors.arrays = self.row(number)
 
     def row(self, number: int) -> WorldArrays:
-        """Returns the arrays of the world of an environment."""
-        return self._rows[number]
+        """Returns the arrays of the world of an environment, the same object as long as there is room in them."""
+        row = self._rows.get(number)
+        if row is None:
+            row = self._rows[number] = row_of(self.worlds, number)
+        return row
 
     def make_room(self, world: WorldArrays) -> None:
         """Gives all rows the room of a world, if they have less."""
-        if all(len(getattr(self._rows[0], name)) >= len(getattr(world, name)) for name in ROOMS):
+        first = self.row(0)
+        if all(len(getattr(first, name)) >= len(getattr(world, name)) for name in ROOMS):
             return
-        rows = [with_room_of(self._arrays, row, world) for row in self._rows]
-        shown = [
-            face is not None and face.live is not None and face.live.world.actors.arrays is row
-            for face, row in zip(self.faces, self._rows, strict=True)
-        ]
-        self._stacks[0] = stacked(rows[0], self._count)
-        self._forget_views()
-        for number, row in enumerate(rows):
-            copy_row(self._rows[number], row)
-            face = self.faces[number]
-            if face is not None and face.live is not None and shown[number]:
-                face.live.world.actors.arrays = self._rows[number]
+        shown = [(number, live) for number, live in self._sessions() if live.world.actors.arrays is self.row(number)]
+        self._stacks[0] = with_room(self._arrays, self.worlds, with_room_of(self._arrays, first, world))
+        self._show_rows(shown)
 
     def _row_of_costs(self, goal: Place, blocked: tuple[Place, ...]) -> int:
         """Returns the row of the costs to a goal; new ones are added."""

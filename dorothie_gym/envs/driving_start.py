@@ -16,13 +16,15 @@ from dorothie_gym.envs.episode import EpisodeArrays, episode_arrays
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.pedals import CONTINUOUS_FIELDS
 from dorothie_gym.maps import Town
+from dorothie_gym.policies.ad_wizard import AdWizardConfig
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_arrays
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
 from dorothie_gym.policies.navigation.observation_vector import FIELDS
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.state.world_arrays import WorldArrays
+from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays, grown, with_room_of
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world_start import OwnArrays
 from dorothie_gym.spaces import SpaceLimits
@@ -33,9 +35,17 @@ Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
 def blank_world(network: TownNetwork, config: NavigationConfig, *, pedals: bool) -> WorldArrays:
     """Returns the arrays of a world that has not started, on a clear noon.
 
-    Nothing depends there on the seed of perception or on the wind: `World` writes both when the weather changes.
+    There is room for what the scripted Ad-Wizard adds in a session: a crowd and a roadblock, as each kind of trick is
+    played at most once. Nothing depends on the seed of perception or on the wind: `World` writes both when the weather
+    changes.
     """
     world, weather = OwnArrays(network, config.session_config.world).arrays, Weather()
+    if config.exceptions > 0.0:
+        crowd = AdWizardConfig().crowd_sizes[1]
+        world = grown(
+            town_arrays(network), world, vehicles=len(world.vehicles) + crowd,
+            pedestrians=len(world.pedestrians) + crowd, props=1,
+        )  # fmt: skip
     view = weather.visibility(lights=False)
     plain(world.eye)[0] = (
         0, view.sight, view.fog, view.fog_start, view.rain, view.light, view.lamps, view.clarity, view.is_clear,
@@ -121,6 +131,26 @@ def stacked(arrays: Arrays, count: int) -> Arrays:
     for number in range(count):
         copy_row(row_of(stack, number), arrays)
     return stack
+
+
+def with_room(town: TownArrays, worlds: WorldArrays, row: WorldArrays) -> WorldArrays:
+    """Returns the arrays of all worlds with the room of a row, which has at least that of theirs."""
+    if len(row.order) == worlds.order.shape[1]:  # only paths are longer
+        pairs = zip(worlds.plain(), row.plain(), strict=True)
+        return WorldArrays._make(_widened(rooms, array.shape) for rooms, array in pairs)
+    wider = stacked(row, len(worlds.clock))
+    for number in range(len(worlds.clock)):
+        copy_row(row_of(wider, number), with_room_of(town, row_of(worlds, number), row))
+    return wider
+
+
+def _widened(rooms: NDArray[np.generic], shape: tuple[int, ...]) -> NDArray[np.generic]:
+    """Returns the arrays of all worlds with rows of another shape, which is as long at least."""
+    wider = rooms
+    if rooms.shape[1:] != shape:
+        wider = np.zeros((len(rooms), *shape), dtype=rooms.dtype)
+        wider[:, : rooms.shape[1]] = rooms
+    return wider.view(np.recarray) if wider.dtype.names else wider
 
 
 def copy_row(row: tuple[Any, ...], arrays: tuple[Any, ...]) -> None:

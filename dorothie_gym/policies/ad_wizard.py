@@ -52,6 +52,7 @@ class AdWizardConfig:
         bad_weather_time: range of durations of bad weather [s].
         crowd_ahead: range of distances ahead at which people or vehicles are spawned [m].
         crowd_extent: size of the area in which they are spawned [m].
+        crowd_sizes: range of the number of people or vehicles that are spawned.
         crowd_of_people: probability that people are spawned instead of vehicles.
     """
 
@@ -77,6 +78,7 @@ class AdWizardConfig:
     bad_weather_time: tuple[float, float] = (80.0, 140.0)
     crowd_ahead: tuple[float, float] = (60.0, 110.0)
     crowd_extent: int = 25
+    crowd_sizes: tuple[int, int] = (1, 3)
     crowd_of_people: float = 0.6
 
 
@@ -355,7 +357,7 @@ def _crowd(state: AdWizardState, observation: ObservationMapping, now: float, rn
     action = AdWizardAction(
         exception=ExceptionKind.SPAWN_PEDESTRIANS if people else ExceptionKind.SPAWN_VEHICLES,
         place=LanePosition(lane=place[0], metres=round(place[1])),
-        count=int(rng.integers(1, 4)),
+        count=int(rng.integers(*config.crowd_sizes, endpoint=True)),
         extent=config.crowd_extent,
     )
     return action, state

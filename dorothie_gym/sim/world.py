@@ -156,13 +156,13 @@ class World(Lookups, Restorable):
         self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
         if self.faults:
             self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
-            self._tell_weather(self.actors.arrays)
+            self.write_weather()
         self._note_props()
         return self.reports.take()
 
     def _run(self, frames: int) -> Array:
         """Steps all bodies by no more than `FRAMES` substeps; returns the ego's trace, see `WorldArrays`."""
-        self._tell_weather(self.actors.arrays)
+        self.write_weather()
         while _step(self._arrays, self.actors.arrays, frames, 1.0 / FRAME_RATE) == NO_SPACE:
             self.actors.arrays = lengthened(self.actors.arrays)
         self.car.refresh()
@@ -186,10 +186,10 @@ class World(Lookups, Restorable):
             self._record_of, self._own_record = self.actors.arrays, CarRecord(self.actors.arrays)
         return self._own_record
 
-    def _tell_weather(self, arrays: WorldArrays) -> None:
+    def write_weather(self) -> None:
         """Writes the effects of the weather on grip, sight and course into the world's arrays after a change."""
         visibility = self.visibility  # a new object after any change of the weather
-        if self._perception.open(arrays.eye, visibility):
+        if self._perception.open(self.actors.arrays.eye, visibility):
             wind = self.weather.above_clear(WeatherParameter.WIND_INTENSITY)
             self._record.air[()] = self.weather.friction, wind, self.wind.heading, tuple(self.wind.phases)
 
@@ -233,9 +233,8 @@ class World(Lookups, Restorable):
     @property
     def sensing_arrays(self) -> WorldArrays:
         """Arrays of the world, with the present visibility."""
-        arrays = self.actors.arrays
-        self._tell_weather(arrays)
-        return arrays
+        self.write_weather()
+        return self.actors.arrays
 
     @property
     def senses(self) -> SensorArrays:
@@ -253,7 +252,7 @@ class World(Lookups, Restorable):
         """Notes the perceived props for the planner."""
         arrays = self.actors.arrays
         if self.actors.has_props:
-            self._tell_weather(arrays)
+            self.write_weather()
             note_props(arrays, self.frame)
         else:
             self._record.props[()] = 0

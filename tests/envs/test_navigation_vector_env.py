@@ -14,6 +14,7 @@ from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_continuous_vector_env import NavigationContinuousVectorEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
+from dorothie_gym.sim.state.codes import Walk
 from tests.envs.navigation_drivers import drive, obey
 
 NAVIGATION, CONTINUOUS = "dorothie_gym/Navigation-v0", "dorothie_gym/Navigation-continuous-v0"
@@ -171,6 +172,20 @@ def test_long_paths_of_many_environments_make_room_once() -> None:
         mask = env.action_masks()
         env.step((rng.random(mask.shape) * mask).argmax(axis=1))
     assert env.nbytes / 64 < 120 * 1024
+
+
+def test_crowds_and_roadblocks_find_room_in_the_batch() -> None:
+    env = NavigationVectorEnv(16, "midtown", traffic="medium", exceptions=4.0)
+    observations, infos = env.reset(seed=0)
+    (batch,) = env.batches
+    before, people, props = batch.worlds.order.shape, 0, 0
+    for _ in range(400):
+        actions = [obey(*each) for each in zip(observations, infos["action_mask"], strict=True)]
+        observations, *_, infos = env.step(np.array(actions))
+        people = max(people, int((batch.worlds.pedestrians["state"] != Walk.EMPTY).sum(axis=1).max()))
+        props = max(props, int(batch.worlds.props["present"].sum(axis=1).max()))
+    assert people > 4 and props > 0
+    assert batch.worlds.order.shape == before
 
 
 def test_masks_are_those_of_infos() -> None:
