@@ -62,7 +62,7 @@ def blank_parts(
     driver = driver_arrays(size, actions, [0] * len(town.streets))
     plain(driver.inputs)["weather"][0] = tuple(Weather().values.values())
     guidance = instructor_arrays(
-        lanes=len(town.lanes), subgoals=limits.subgoals, landmarks=limits.landmarks, streets=limits.streets,
+        subgoals=limits.subgoals, landmarks=limits.landmarks, streets=limits.streets,
         things=limits.objects,
     )  # fmt: skip
     guidance.now["by_name"] = config.guidance is Guidance.GOALS

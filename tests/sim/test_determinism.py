@@ -154,5 +154,5 @@ def test_arrays_of_further_sessions_take_less_than_112_kib(name):
         network.town, config, seed=np.random.SeedSequence(1), departure=(site.lane, site.station), network=network
     )
     arrays = session.actors.arrays
-    assert len(arrays.vehicles) == 31 and len(arrays.pedestrians) == 20 and len(arrays.path) > 100
+    assert len(arrays.vehicles) == 31 and len(arrays.pedestrians) == 20 and len(arrays.sweeps) > 100
     assert arrays.nbytes <= 112 * 1024

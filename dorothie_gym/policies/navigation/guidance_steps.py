@@ -15,7 +15,7 @@ from dorothie_gym.maps.route_search import find_route
 from dorothie_gym.maps.routing_graph import CHANGE_LEFT, NONE, U_TURN, RoutingGraph
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies.guidance_config import GuidanceConfig
-from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, StepKind
+from dorothie_gym.policies.navigation.instructor_arrays import LEGS_LEFT, InstructorArrays, StepKind
 from dorothie_gym.policies.navigation.junction_exits import nearest_sector
 from dorothie_gym.policies.route_legs import (
     PASSED,
@@ -176,13 +176,11 @@ def _find_route(graph: RoutingGraph, search: RouteSearch, guide: InstructorArray
 
 @compiled
 def _take_route(search: RouteSearch, guide: InstructorArrays) -> None:
-    """Takes the route found last; there is none if it has no legs."""
-    route, count = guide.route[0], search.result[0].legs
-    if count > len(guide.legs):
-        raise ValueError("the route has more legs than there is room for")
+    """Takes the route found last, or as many legs as there is room for; there is none if it has no legs."""
+    route, count = guide.route[0], min(int(search.result[0].legs), len(guide.legs))
     for k in range(count):
         guide.legs[k] = search.legs[k]
-    route.legs, route.leg, route.astray = count, 0, 0
+    route.legs, route.leg, route.astray, route.cut = count, 0, 0, count < search.result[0].legs
 
 
 @compiled
@@ -253,6 +251,9 @@ def _follow(tables: RouteTables, graph: RoutingGraph, search: RouteSearch, guide
         _find_route(graph, search, guide, route.landmark)
         _take_route(search, guide)
         guide.said[0].kind = _NO_STEP
+    elif route.cut and route.leg >= route.legs - LEGS_LEFT:
+        _find_route(graph, search, guide, route.landmark)
+        _take_route(search, guide)
 
 
 # --- Steps ------------------------------------------------------------------------------------------------------------

@@ -19,8 +19,11 @@ CLOSED_PLACES = 64
 LEGS_AHEAD = 6
 """Number of legs on which roadblocks are looked for."""
 
-MORE_LEGS = 64
-"""Room for legs beyond one for each lane of the town: a route that evades roadblocks uses some lanes twice."""
+LEGS = 96
+"""Most legs of a route that an instructor keeps; of a longer one, the first. Routes through the towns have some 30."""
+
+LEGS_LEFT = 12
+"""Number of legs from which on the rest of a longer route is planned."""
 
 
 class StepKind(enum.IntEnum):
@@ -85,6 +88,7 @@ class RouteRecord:
     leg: Int32  # the present leg
     astray: Int32  # number of decisions for which the car has been off the route
     closed: Int32  # number of rows of `InstructorArrays.closed` in use
+    cut: Flag  # whether the route has more legs than there is room for
 
 
 class InstructionRecord:
@@ -113,7 +117,7 @@ class InstructorArrays(NamedTuple):
         names: `StreetName` of each street of the town.
         things: static bodies in sight.
         route: (1,) goal and progress.
-        legs: legs of the route.
+        legs: legs of the route, or the first of them.
         closed: places closed by roadblocks.
         ahead: (`LEGS_AHEAD`,) scratch: lanes on which roadblocks are looked for.
         said: (1,) last instruction.
@@ -131,11 +135,10 @@ class InstructorArrays(NamedTuple):
     said: RecordArray[InstructionRecord]
 
 
-def instructor_arrays(*, lanes: int, subgoals: int, landmarks: int, streets: int, things: int) -> InstructorArrays:
+def instructor_arrays(*, subgoals: int, landmarks: int, streets: int, things: int) -> InstructorArrays:
     """Returns the arrays of an instructor without a goal.
 
     Args:
-        lanes: number of lanes of the town.
         subgoals: most subgoals.
         landmarks: most landmarks.
         streets: most streets.
@@ -148,7 +151,7 @@ def instructor_arrays(*, lanes: int, subgoals: int, landmarks: int, streets: int
         names=np.zeros(streets, dtype=np.int32),
         things=argument(empty_records(ThingRecord, things)),
         route=argument(empty_records(RouteRecord, 1)),
-        legs=argument(empty_records(LegRecord, lanes + MORE_LEGS)),
+        legs=argument(empty_records(LegRecord, LEGS)),
         closed=argument(empty_records(PlaceRecord, CLOSED_PLACES)),
         ahead=np.zeros(LEGS_AHEAD, dtype=np.int32),
         said=argument(empty_records(InstructionRecord, 1)),

@@ -13,7 +13,7 @@ from dorothie_gym.compilation import compiled
 from dorothie_gym.sim.ego.course import find_end, point_before
 from dorothie_gym.sim.ego.limits import KMH
 from dorothie_gym.sim.ego.manoeuvres import extend
-from dorothie_gym.sim.ego.path import find_sides
+from dorothie_gym.sim.ego.path import find_sweeps
 from dorothie_gym.sim.network.centre_lines import position_on, project_on
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import STATIC, Refusal
@@ -54,22 +54,17 @@ def prepare(town: TownArrays, world: WorldArrays) -> int:
 @compiled
 def write_window(world: WorldArrays) -> None:
     """Writes the stretch of the path around the ego for the motion control, and the lanes along it."""
-    plan, car, course, path = world.plan[0], world.car[0], world.course, world.path
+    plan, car, course = world.plan[0], world.car[0], world.course
     first = point_before(world, car.s - PATH_BEHIND)
-    count = min(int(plan.points) - first, len(path))
+    end = min(int(plan.points), first + len(world.sweeps))
     car.runs = 0
-    for k in range(count):
-        point, row = course[first + k], path[k]
-        row.s, row.x, row.y, row.heading = point.s, point.x, point.y, point.heading
-        row.cos, row.sin = math.cos(point.heading), math.sin(point.heading)
-        row.height, row.station, row.speed = point.height, point.station, point.speed
-        row.lane, row.manoeuvre = point.lane, point.manoeuvre
-        if (k == 0 or point.lane != path[k - 1].lane) and car.runs < len(car.run_lane):
-            car.run_lane[car.runs], car.run_first[car.runs] = point.lane, k
+    for k in range(first, end):
+        if (k == first or course[k].lane != course[k - 1].lane) and car.runs < len(car.run_lane):
+            car.run_lane[car.runs], car.run_first[car.runs] = course[k].lane, k
             car.runs += 1
-    find_sides(path, count, CAR_LENGTH, CAR_WIDTH)
-    car.run, car.points, car.at = -1, count, point_before(world, car.s) - first
-    plan.written_until = course[first + count - 1].s
+    find_sweeps(course, world.sweeps, first, end, CAR_LENGTH, CAR_WIDTH)
+    car.run, car.first, car.points, car.at = -1, first, end, point_before(world, car.s)
+    plan.written_until = course[end - 1].s
 
 
 # --- Goals ------------------------------------------------------------------------------------------------------------

@@ -49,9 +49,7 @@ def count_points(world: WorldArrays, points: int, write: bool) -> bool:
 
 
 @compiled
-def append(
-    world: WorldArrays, x: float, y: float, height: float, station: float, limit: float, lane: int, manoeuvre: bool
-) -> None:
+def append(world: WorldArrays, x: float, y: float, station: float, limit: float, lane: int, manoeuvre: bool) -> None:
     """Appends a point to the path unless it is in the same place as the one before."""
     plan = world.plan[0]
     s = 0.0
@@ -61,10 +59,12 @@ def append(
             return
         last = world.course[plan.points - 1]
         s = last.s + np.hypot(x - last.x, y - last.y)
+    else:
+        plan.limit = limit
     plan.last_x, plan.last_y = x, y
     point = world.course[plan.points]
-    point.s, point.x, point.y, point.height, point.station = s, x, y, height, station
-    point.limit, point.lane, point.manoeuvre = limit, lane, manoeuvre
+    point.s, point.x, point.y, point.station = s, x, y, station
+    point.speed, point.lane, point.manoeuvre = limit, lane, manoeuvre
     plan.points += 1
 
 
@@ -85,7 +85,7 @@ def follow(town: TownArrays, world: WorldArrays, number: int, start: float, end:
             segment += 1
         append(
             world, interpolated(points, lane, segment, X, station), interpolated(points, lane, segment, Y, station),
-            interpolated(points, lane, segment, HEIGHT, station), station, lane.limit, number, False,
+            station, lane.limit, number, False,
         )  # fmt: skip
 
 
@@ -128,7 +128,7 @@ def switch(
                 + weight * interpolated(points, target, other, X, there),
                 (1.0 - weight) * interpolated(points, source, one, Y, here)
                 + weight * interpolated(points, target, other, Y, there),
-                interpolated(points, target, other, HEIGHT, there), there, limit, beside, True,
+                there, limit, beside, True,
             )  # fmt: skip
     return begin + 1.0 * (end - begin)
 
@@ -151,12 +151,12 @@ def u_turn(town: TownArrays, world: WorldArrays, number: int, oncoming: int, sta
     points, source, target = town.points, town.lanes[number], town.lanes[oncoming]
     x, y = position_on(points, source, start)
     station, lateral = project_on(town, oncoming, x, y)
-    course, height, limit = value_on(points, source, HEADING, start), 0.0, min(source.limit, target.limit)
-    height, gap, radius = value_on(points, target, HEIGHT, station), abs(lateral), TURNING_RADIUS
+    course, limit = value_on(points, source, HEADING, start), min(source.limit, target.limit)
+    gap, radius = abs(lateral), TURNING_RADIUS
     swings = gap < 2.0 * radius
     swing = math.acos((gap + 2.0 * radius) / (4.0 * radius)) if swings else 0.0
     if count_points(world, 1, write):
-        append(world, x, y, height, station, limit, oncoming, True)
+        append(world, x, y, station, limit, oncoming, True)
     for k in range(3 if swings else 2):
         if swings:
             right, angle = k != 1, math.pi + 2.0 * swing if k == 1 else swing
@@ -165,7 +165,7 @@ def u_turn(town: TownArrays, world: WorldArrays, number: int, oncoming: int, sta
             if k == 1 and gap - 2.0 * radius > 0.0:
                 x, y = x + (gap - 2.0 * radius) * math.cos(course), y + (gap - 2.0 * radius) * math.sin(course)
                 if count_points(world, 1, write):
-                    append(world, x, y, height, station, limit, oncoming, True)
+                    append(world, x, y, station, limit, oncoming, True)
         steps = max(2, math.ceil(radius * angle / (PATH_SPACING / 2.0)))
         turn = angle / steps if right else -(angle / steps)  # headings are clockwise
         chord = 2.0 * radius * math.sin(abs(turn) / 2.0)
@@ -173,18 +173,36 @@ def u_turn(town: TownArrays, world: WorldArrays, number: int, oncoming: int, sta
             for _ in range(steps):
                 x, y = x + chord * math.cos(course + turn / 2.0), y + chord * math.sin(course + turn / 2.0)
                 course += turn
-                append(world, x, y, height, station, limit, oncoming, True)
+                append(world, x, y, station, limit, oncoming, True)
 
 
 @compiled
-def keep(world: WorldArrays, first: int, end: int, write: bool) -> None:
+def keep(town: TownArrays, world: WorldArrays, first: int, end: int, write: bool) -> None:
     """Lays the points from `first` to before `end` of the present path, which is being replaced."""
     if not count_points(world, end - first, write):
         return
-    course, lane, limit = world.course, world.plan[0].lane, world.course[first].limit
+    course, lane, limit = world.course, world.plan[0].lane, _limit_in_manoeuvre(town, world, first)
     for k in range(first, end):  # the points move to the front
         point = course[k]
-        append(world, point.x, point.y, point.height, point.station, limit, lane, True)
+        append(world, point.x, point.y, point.station, limit, lane, True)
+
+
+@compiled
+def _limit_in_manoeuvre(town: TownArrays, world: WorldArrays, number: int) -> float:
+    """Returns the speed limit at a point of a lane switch or U-turn [m/s]: the lower one of its two lanes."""
+    course, lane, k = world.course, world.course[number].lane, number
+    while k >= 0 and course[k].manoeuvre and course[k].lane == lane:
+        k -= 1
+    if k < 0:  # the path begins in it
+        return float(world.plan[0].limit)
+    return min(town.lanes[course[k].lane].limit, town.lanes[lane].limit)
+
+
+@compiled
+def height_at_point(town: TownArrays, world: WorldArrays, number: int) -> float:
+    """Returns the height of a point of the whole path [m]."""
+    point = world.course[number]
+    return value_on(town.points, town.lanes[point.lane], HEIGHT, point.station)
 
 
 # --- Directions and speeds --------------------------------------------------------------------------------------------
@@ -256,7 +274,7 @@ def find_speeds(course: RecordArray[CoursePointRecord], count: int, stop_at: flo
     """Computes the speed that curves, limits and the end of a path allow at each of its points [m/s].
 
     Args:
-        course: points, read and written.
+        course: points, read and written; their speeds are limits before.
         count: number of points, at least 2.
         stop_at: distance along the path at which the ego has to stop [m], or infinite.
     """
@@ -268,7 +286,7 @@ def find_speeds(course: RecordArray[CoursePointRecord], count: int, stop_at: flo
         bend = before * third + here * third + after * third
         before, here = here, after
         point = course[k]
-        squared = min(point.limit * point.limit, LATERAL_ACCELERATION / max(bend, 1e-4))
+        squared = min(point.speed * point.speed, LATERAL_ACCELERATION / max(bend, 1e-4))
         if point.manoeuvre and bend > 0.1:
             squared = min(squared, U_TURN_SPEED * U_TURN_SPEED)
         point.speed = 0.0 if point.s >= stop_at else squared

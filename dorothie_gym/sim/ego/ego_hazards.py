@@ -69,7 +69,7 @@ def look(town: TownArrays, world: WorldArrays, seen: int) -> None:
     """
     car = world.car[0]
     car.kind = 0
-    best = bodies_ahead(world, seen)
+    best = bodies_ahead(town, world, seen)
     way, other, kind = _gap_to_others(town, world, seen, best <= 0.0)
     safe, best = best, _crosswalk(town, world, best)
     if best > 0.0 or safe <= 0.0:
@@ -85,7 +85,7 @@ def look(town: TownArrays, world: WorldArrays, seen: int) -> None:
 @compiled
 def _crosswalk(town: TownArrays, world: WorldArrays, best: float) -> float:
     """Offers the next crosswalk on the path with visible pedestrians for which the ego can still stop."""
-    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    car, vehicle, course = world.car[0], world.vehicles[0], world.course
     braking = vehicle.speed * vehicle.speed
     reach = braking / (2.0 * PLANNED_BRAKING) + EGO_ASKING + 0.5 * vehicle.length
     last = point_at(world, car.s + reach)
@@ -94,13 +94,13 @@ def _crosswalk(town: TownArrays, world: WorldArrays, best: float) -> float:
         if k > last:
             break
         lane = town.lanes[car.run_lane[r]]
-        if path[k].manoeuvre or lane.passages == 0:
+        if course[k].manoeuvre or lane.passages == 0:
             continue
         for p in range(lane.passage, lane.passage + lane.passages):
             passage = town.passages[p]
             if world.busy[passage.crossing] == 0:
                 continue
-            gap = path[k].s + passage.start - path[k].station - car.s - 0.5 * vehicle.length
+            gap = course[k].s + passage.start - course[k].station - car.s - 0.5 * vehicle.length
             if gap < 0.0 or gap > reach or braking > 2.0 * HARDEST_BRAKING * max(gap, 0.1):
                 continue
             walker = _walker_on(world, passage)
@@ -126,7 +126,7 @@ def _walker_on(world: WorldArrays, passage: PassageRecord) -> int:
 @compiled
 def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
     """Offers the line before a junction that the ego may not enter yet."""
-    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    car, vehicle, course = world.car[0], world.vehicles[0], world.course
     if car.held and vehicle.speed < EGO_STANDING:
         return best  # requests nothing that it does not use
     asking = vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + EGO_ASKING
@@ -139,7 +139,7 @@ def _junction(town: TownArrays, world: WorldArrays, best: float) -> float:
         connector, lane = int(car.run_lane[r]), int(car.run_lane[r - 1])
         if town.lanes[connector].junction < 0:
             continue
-        line = path[k].s - path[k].station - car.s - half
+        line = course[k].s - course[k].station - car.s - half
         if line < -half:
             break  # over the line already
         announce(vehicle, lane, connector, line, world.clock[0].time)
@@ -183,24 +183,24 @@ def _gap_to_others(town: TownArrays, world: WorldArrays, seen: int, blocked: boo
     Returns:
         The way (infinite if the manoeuvre may begin), and key and class of the body in the way.
     """
-    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    car, vehicle, course = world.car[0], world.vehicles[0], world.course
     turning = car.action == U_TURN
     start = int(car.at)
-    if path[start].manoeuvre and (car.s > BEGUN or vehicle.speed > EGO_STANDING):
+    if course[start].manoeuvre and (car.s > BEGUN or vehicle.speed > EGO_STANDING):
         if not turning:
-            way, other = _gap_beside(town, world, seen, int(path[start].lane))
+            way, other = _gap_beside(town, world, seen, int(course[start].lane))
             return way, other, VEHICLES
         if not blocked:
             _close_junctions(town, world, start)
         return math.inf, 0, VEHICLES
     reach = BEFORE_MANOEUVRE + vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING)
-    while start < car.points and not path[start].manoeuvre and path[start].s - car.s <= reach:
+    while start < car.points and not course[start].manoeuvre and course[start].s - car.s <= reach:
         start += 1
-    if start >= car.points or not path[start].manoeuvre or path[start].s - car.s > reach:
+    if start >= car.points or not course[start].manoeuvre or course[start].s - car.s > reach:
         return math.inf, 0, VEHICLES
-    ahead = path[start].s - car.s
-    target = int(path[start].lane)
-    meeting, _, _ = project(town, target, path[start].x, path[start].y)
+    ahead = course[start].s - car.s
+    target = int(course[start].lane)
+    meeting, _, _ = project(town, target, course[start].x, course[start].y)
     lanes = _find_upstream(town, world, target)
     for n in range(seen):
         body = world.seen[n]
@@ -233,12 +233,14 @@ def _leads_to(town: TownArrays, world: WorldArrays, start: int, meeting: float, 
         meeting: station of that point on the new lane [m].
         prop: a perceived prop.
     """
-    car, vehicle, path = world.car[0], world.vehicles[0], world.path
-    target, end = int(path[start].lane), start
-    while end + 1 < car.points and path[end].manoeuvre:
+    car, vehicle, course = world.car[0], world.vehicles[0], world.course
+    target, end = int(course[start].lane), start
+    while end + 1 < car.points and course[end].manoeuvre:
         end += 1
     station, lateral, segment = project(town, target, prop.x, prop.y)
-    until = path[end].s - path[start].s + vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + MANOEUVRE_PROP_GAP
+    until = (
+        course[end].s - course[start].s + vehicle.speed * vehicle.speed / (2.0 * PLANNED_BRAKING) + MANOEUVRE_PROP_GAP
+    )
     if abs(lateral) > town.lanes[target].half_width or not -0.5 * vehicle.length < station - meeting < until:
         return False
     height = value_near(town.points, town.lanes[target], segment, 4, station)
@@ -269,7 +271,7 @@ def _gap_beside(town: TownArrays, world: WorldArrays, seen: int, target: int) ->
 @compiled
 def _close_junctions(town: TownArrays, world: WorldArrays, start: int) -> bool:
     """Closes the junctions that a U-turn from a point reaches into; returns whether they are empty."""
-    x, y, free = world.path[start].x, world.path[start].y, True
+    x, y, free = world.course[start].x, world.course[start].y, True
     for j in range(len(town.junctions)):
         dx, dy = town.junctions[j, 0] - x, town.junctions[j, 1] - y
         reach = town.junctions[j, 2] + U_TURN_REACH

@@ -339,7 +339,7 @@ def lay_head(
     """
     lane, station = world.plan[0].lane, world.plan[0].station
     if end > first:
-        keep(world, first, end, write)
+        keep(town, world, first, end, write)
     if oncoming >= 0:
         if begin > station + ALMOST:
             follow(town, world, lane, station, begin, write)

@@ -9,7 +9,7 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.lane_neighbours import opposite_gap
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.maps.polyline import HEADING, HEIGHT, WIDTH, X, Y
-from dorothie_gym.sim.ego.course import enter, finish, follow, place_of_ego, point_before
+from dorothie_gym.sim.ego.course import enter, finish, follow, height_at_point, place_of_ego, point_before
 from dorothie_gym.sim.ego.feasibility import has_room_to_switch, is_past_stopping, u_turn_braking
 from dorothie_gym.sim.ego.limits import (
     EGO_MOVING,
@@ -79,7 +79,8 @@ def find_place(town: TownArrays, world: WorldArrays) -> None:
     point = course[at]
     lane = town.lanes[point.lane]
     ahead = 0.0 if point.manoeuvre else car.s - point.s
-    plan.at, plan.lane, plan.height, plan.off_line = at, point.lane, point.height, point.manoeuvre
+    plan.at, plan.lane, plan.off_line = at, point.lane, point.manoeuvre
+    plan.height = height_at_point(town, world, at)
     plan.station = min(point.station + ahead, lane.length)
     plan.turning, plan.turn_at = False, math.inf
     if plan.action == J_TURN:

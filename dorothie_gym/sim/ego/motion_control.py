@@ -9,6 +9,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.sim.ego.course import height_at_point
 from dorothie_gym.sim.ego.ego_hazards import look
 from dorothie_gym.sim.ego.limits import (
     APPROACH_DISTANCE,
@@ -118,7 +119,7 @@ def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
         car.throttle, car.brake = 0.0, 1.0
     _note_hazard(world, limiting)
     _note_sweep(world)
-    vehicle.height = world.path[car.at].height
+    vehicle.height = height_at_point(town, world, int(car.at))
     acceleration = car.throttle * MAX_ACCELERATION - car.brake * MAX_BRAKING
     if acceleration < 0.0:
         acceleration = max(acceleration, -MAX_BRAKING * car.friction, -vehicle.speed / dt)
@@ -135,7 +136,7 @@ def _free_speed(world: WorldArrays) -> float:
     """Returns the speed that the path, the goals and the sight allow [m/s]."""
     car, vehicle = world.car[0], world.vehicles[0]
     s = car.s + 0.1
-    speed = min(car.cruise, world.path[point_at(world, s)].speed)
+    speed = min(car.cruise, world.course[point_at(world, s)].speed)
     if car.stop_at < math.inf:  # exact near the end, where the points are too coarse
         left = car.stop_at - s
         speed = min(speed, math.sqrt(2.0 * PROFILE_BRAKING * left) if left > 0.0 else 0.0)
@@ -202,10 +203,10 @@ def _note_sweep(world: WorldArrays) -> None:
     """Notes the part of a U-turn that is still to come, to which others give way also while the ego waits in it."""
     car = world.car[0]
     at = int(car.at)
-    car.sweeping = bool(car.action == U_TURN and world.path[at].manoeuvre and car.s >= BEGUN)
+    car.sweeping = bool(car.action == U_TURN and world.course[at].manoeuvre and car.s >= BEGUN)
     if car.sweeping:
         car.sweep_first = at
-        while at + 1 < car.points and world.path[at + 1].manoeuvre:
+        while at + 1 < car.points and world.course[at + 1].manoeuvre:
             at += 1
         car.sweep_last = at
 

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.sim.ego.course import PATH_SPACING
+from dorothie_gym.sim.ego.course import PATH_SPACING, height_at_point
 from dorothie_gym.sim.ego.path import WIDEST_SWEEP, point_at
 from dorothie_gym.sim.state.codes import STATIC
 from dorothie_gym.sim.state.records import EgoRecord, SeenRecord
 
 if TYPE_CHECKING:
+    from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
@@ -131,10 +132,11 @@ def offer(car: EgoRecord, best: float, kind: int, gap: float, speed: float, key:
 
 
 @inlined
-def bodies_ahead(world: WorldArrays, seen: int) -> float:
+def bodies_ahead(town: TownArrays, world: WorldArrays, seen: int) -> float:
     """Finds the body on the path, or soon there, that allows the least speed, and notes the distance of a roadblock.
 
     Args:
+        town: arrays of the town.
         world: arrays of the world.
         seen: number of perceived bodies.
 
@@ -142,7 +144,7 @@ def bodies_ahead(world: WorldArrays, seen: int) -> float:
         The speed that it allows [m/s], infinite if nothing is there.
     """
     car, vehicle = world.car[0], world.vehicles[0]
-    tight = bool(world.path[car.at].manoeuvre)
+    tight = bool(world.course[car.at].manoeuvre)
     speed = vehicle.speed
     reach = max(LOOKAHEAD, speed * BRAKE_DELAY + speed * speed / (2.0 * HARD_BRAKING) + ROADBLOCK_GAP)
     last, near = point_at(world, car.s + reach), point_at(world, car.s + LOOKAHEAD)
@@ -150,12 +152,12 @@ def bodies_ahead(world: WorldArrays, seen: int) -> float:
     best = math.inf
     if last - car.at < 1:
         return best
-    far = world.path[last].s - car.s + vehicle.length
+    far = world.course[last].s - car.s + vehicle.length
     for n in range(seen):
         body = world.seen[n]
         if math.sqrt(body.distance2) > far + 2.0 * abs(body.speed) + body.length:
             continue
-        k, gap, along = _meet(world, body, last)
+        k, gap, along = _meet(town, world, body, last)
         if k < 0:
             continue
         if body.kind == STATIC and k <= near:
@@ -165,7 +167,7 @@ def bodies_ahead(world: WorldArrays, seen: int) -> float:
 
 
 @compiled
-def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, float]:
+def _meet(town: TownArrays, world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, float]:
     """Returns the first place of the path where the ego would touch a body, now or on the body's course.
 
     Points that are nearer to one another than the body is away are skipped.
@@ -173,7 +175,7 @@ def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, 
     Returns:
         Number of the point (-1 for none), gap from the ego's nose [m], and the body's speed along the path [m/s].
     """
-    car, vehicle, path = world.car[0], world.vehicles[0], world.path
+    car, vehicle, course = world.car[0], world.vehicles[0], world.course
     radius = 0.5 * math.sqrt(body.length * body.length + body.width * body.width)
     side = radius + WIDEST_SWEEP + SIDE_MARGIN
     reach = math.sqrt(side * side + (radius + PATH_SPACING) * (radius + PATH_SPACING))
@@ -182,24 +184,26 @@ def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, 
         x, y = body.x + way * body.cos, body.y + way * body.sin
         k = int(car.at)
         while k <= last:
-            point = path[k]
+            point = course[k]
             dx, dy = x - point.x, y - point.y
             away = math.sqrt(dx * dx + dy * dy) - reach
             if away > PATH_SPACING:
                 k = _skip(world, k, last, away)
                 continue
-            parallel = abs(body.cos * point.cos + body.sin * point.sin)
-            square = abs(body.sin * point.cos - body.cos * point.sin)
+            sweep = world.sweeps[k - car.first]
+            parallel = abs(body.cos * sweep.cos + body.sin * sweep.sin)
+            square = abs(body.sin * sweep.cos - body.cos * sweep.sin)
             half_width = 0.5 * (body.width * parallel + body.length * square) + SIDE_MARGIN
             half_length = 0.5 * (body.length * parallel + body.width * square)
-            along = dx * point.cos + dy * point.sin
-            across = dy * point.cos - dx * point.sin
-            swept = half_width + (point.right if across > 0.0 else point.left)
+            along = dx * sweep.cos + dy * sweep.sin
+            across = dy * sweep.cos - dx * sweep.sin
+            swept = half_width + (sweep.right if across > 0.0 else sweep.left)
             touches = abs(across) <= swept and abs(along) <= half_length + PATH_SPACING
             # bodies that move along the path are checked where they are now
-            if touches and abs(point.height - body.height) <= LEVEL_HEIGHT and (instant == 0 or square >= CROSSING):
+            touches = touches and abs(height_at_point(town, world, k) - body.height) <= LEVEL_HEIGHT
+            if touches and (instant == 0 or square >= CROSSING):
                 gap = point.s - car.s + along - half_length - 0.5 * vehicle.length
-                forward = body.speed * (body.cos * point.cos + body.sin * point.sin)
+                forward = body.speed * (body.cos * sweep.cos + body.sin * sweep.sin)
                 return k, gap, max(forward, 0.0) if instant == 0 else 0.0
             k += 1
     return -1, 0.0, 0.0
@@ -208,9 +212,9 @@ def _meet(world: WorldArrays, body: SeenRecord, last: int) -> tuple[int, float, 
 @inlined
 def _skip(world: WorldArrays, k: int, last: int, away: float) -> int:
     """Returns the next point of the path that is at least `away` [m] further along it."""
-    path = world.path
-    target = path[k].s + away
+    course = world.course
+    target = course[k].s + away
     step = int(away / PATH_SPACING)
-    while k + step <= last and step > 1 and path[k + step].s > target:
+    while k + step <= last and step > 1 and course[k + step].s > target:
         step -= 1
     return k + max(step, 1)

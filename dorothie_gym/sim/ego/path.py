@@ -14,7 +14,7 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.course import SEARCH_RANGE
-from dorothie_gym.sim.state.records import PathPointRecord, RecordArray, VehicleRecord
+from dorothie_gym.sim.state.records import CoursePointRecord, RecordArray, SweepRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.route import locate
 
@@ -54,19 +54,9 @@ class Path:
         return float(self.headings[0])
 
     @cached_property
-    def heights(self) -> Array:
-        """Heights of the points (n,) [m]."""
-        return self._column("height")
-
-    @cached_property
     def stations(self) -> Array:
         """Distance of each point along its lane (n,) [m]."""
         return self._column("station")
-
-    @cached_property
-    def limits(self) -> Array:
-        """Speed limit at each point (n,) [m/s]."""
-        return self._column("limit")
 
     @cached_property
     def speeds(self) -> Array:
@@ -116,11 +106,11 @@ WIDEST_SWEEP = 2.5
 @inlined
 def point_at(world: WorldArrays, s: float) -> int:
     """Returns the number of the point at or before a distance along the path [m]."""
-    path, car = world.path, world.car[0]
+    course, car = world.course, world.car[0]
     k, last = int(car.at), int(car.points) - 1
-    while k < last and path[k + 1].s <= s:
+    while k < last and course[k + 1].s <= s:
         k += 1
-    while k > 0 and path[k].s > s:
+    while k > car.first and course[k].s > s:
         k -= 1
     return k
 
@@ -128,27 +118,27 @@ def point_at(world: WorldArrays, s: float) -> int:
 @inlined
 def heading_at(world: WorldArrays, s: float) -> float:
     """Returns the direction of the path at a distance along it [rad]."""
-    path = world.path
+    course = world.course
     k = min(point_at(world, s), int(world.car[0].points) - 2)
-    t = (s - path[k].s) / (path[k + 1].s - path[k].s)
+    t = (s - course[k].s) / (course[k + 1].s - course[k].s)
     t = min(max(t, 0.0), 1.0)
-    return float(path[k].heading + t * (path[k + 1].heading - path[k].heading))
+    return float(course[k].heading + t * (course[k + 1].heading - course[k].heading))
 
 
 @compiled
 def advance(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> None:
     """Updates the ego's place on the path: distance along it, and from it (positive right)."""
-    path, car = world.path, world.car[0]
-    last = int(car.points) - 1
+    course, car = world.course, world.car[0]
+    begin, last = int(car.first), int(car.points) - 1
     first = point_at(world, car.s - SEARCH_RANGE)
     end = min(point_at(world, car.s + SEARCH_RANGE) + 1, last)
     best, s, offset = math.inf, car.s, 0.0
     for k in range(first, end):
-        one, two = path[k], path[k + 1]
+        one, two = course[k], course[k + 1]
         dx, dy = two.x - one.x, two.y - one.y
         t = ((vehicle.x - one.x) * dx + (vehicle.y - one.y) * dy) / (dx * dx + dy * dy)
         # before the first and after the last point the path continues straight
-        if (t < 0.0 and k > 0) or (t > 1.0 and k < last - 1):
+        if (t < 0.0 and k > begin) or (t > 1.0 and k < last - 1):
             t = 0.0 if t < 0.0 else 1.0
         ox, oy = vehicle.x - one.x - t * dx, vehicle.y - one.y - t * dy
         gap = ox * ox + oy * oy
@@ -162,32 +152,39 @@ def advance(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> Non
 
 
 @compiled
-def find_sides(path: RecordArray[PathPointRecord], count: int, length: float, width: float) -> None:
-    """Computes the reach of a car's corners to the left and to the right of the path of its middle.
+def find_sweeps(
+    course: RecordArray[CoursePointRecord], sweeps: RecordArray[SweepRecord], first: int, end: int, length: float,
+    width: float,
+) -> None:  # fmt: skip
+    """Computes directions, and the reach of a car's corners to the left and to the right of the path of its middle.
 
     highway-env's bicycle moves along its heading plus a slip angle, and turns by the sine of that over half its length:
     where the path begins to bend its heading follows with a delay, and in a long bend its front points outwards.
     A corner that is `along` before or behind the middle is off a path of curvature k by k / 2 along^2 more.
 
     Args:
-        path: points, read and written; the car enters the path along its direction.
-        count: number of points.
+        course: points of the whole path.
+        sweeps: of those from `first` on, written; the car enters the path there along its direction.
+        first: first point.
+        end: point behind the last one.
         length: of the car [m].
         width: of the car [m].
     """
     off = 0.0  # heading of the car to the right of the path [rad]
-    for k in range(count):
+    for k in range(first, end):
         bend = 0.0
-        if k > 0:
-            way, turn = path[k].s - path[k - 1].s, path[k].heading - path[k - 1].heading
+        if k > first:
+            way, turn = course[k].s - course[k - 1].s, course[k].heading - course[k - 1].heading
             off -= turn
             off -= math.sin(off) * min(way / (0.5 * length), 1.0)
             bend = turn / way
         sine, cosine = abs(math.sin(off)), math.cos(off)
         across, along = 0.5 * (length * sine + width * cosine), 0.5 * (length * cosine - width * sine)
         more = 0.5 * bend * along * along
-        path[k].left = min(max(across + more, 0.5 * width), WIDEST_SWEEP)
-        path[k].right = min(max(across - more, 0.5 * width), WIDEST_SWEEP)
+        sweep = sweeps[k - first]
+        sweep.cos, sweep.sin = math.cos(course[k].heading), math.sin(course[k].heading)
+        sweep.left = min(max(across + more, 0.5 * width), WIDEST_SWEEP)
+        sweep.right = min(max(across - more, 0.5 * width), WIDEST_SWEEP)
 
 
 @inlined

@@ -326,29 +326,21 @@ class NodeRecord:
 # --- Ego --------------------------------------------------------------------------------------------------------------
 
 
-class PathPointRecord:
-    """A point of the path that the ego follows."""
+class SweepRecord:
+    """Direction of the path at a point around the ego, and the sweep of the ego's corners to either side of it [m]."""
 
-    s: Float  # distance along the path [m]
-    x: Float
-    y: Float
-    heading: Float
     cos: Float
     sin: Float
-    height: Float
-    station: Float  # along its lane [m]; during a U-turn that of its end
-    speed: Float  # speed that curves, limits and the path's end allow [m/s]
-    left: Float  # sweep of the ego's corners to either side of the path [m]
+    left: Float
     right: Float
-    lane: Int32
-    manoeuvre: Flag  # whether the path leaves the centre lines here: lane switch or U-turn
 
 
 class EgoRecord:
     """Control of the ego, the vehicle of the kind `Kind.DRIVEN`."""
 
-    points: Int32  # number of points of the path, and the one at or before the ego
-    at: Int32
+    first: Int32  # stretch of the path that the motion control follows: its first point, and the one behind its last
+    points: Int32
+    at: Int32  # the point at or before the ego
     s: Float  # distance along the path, and offset to its right [m]
     offset: Float
     stop_at: Float  # place of a stop at the path's end [m]; infinite where the path continues
@@ -407,9 +399,8 @@ class PlanRecord:
     """
 
     version: Int64  # number of paths laid so far
-    written: Int64  # version of the path in `WorldArrays.path`; 0: none, or with other goals
+    written: Int64  # version of the path in `WorldArrays.sweeps`; 0: none, or with other goals
     written_until: Float  # end of the stretch of it there [m]
-    window: Int32  # point of the whole path that is the first one there
     action: Int32  # manoeuvre planned or under way: a `PhysicalAction` or 0
     angle: Int32  # its angle [degrees], positive left
     end: Float  # distance along the path at which it ends [m]
@@ -427,6 +418,7 @@ class PlanRecord:
     open_end: Flag  # whether the path ends where a turn has to be chosen, or at the end of the map
     points: Int32  # number of points of the path
     length: Float  # its length [m]
+    limit: Float  # speed limit at its first point [m/s]
     at: Int32  # point at or before the ego
     lane: Int32  # lane of the ego, station [m], height [m], and whether it is off the centre lines
     station: Float
@@ -443,16 +435,14 @@ class PlanRecord:
 
 
 class CoursePointRecord:
-    """A point of the whole path."""
+    """A point of the whole path; its height is that of its lane there."""
 
     s: Float  # distance along the path [m]
     x: Float
     y: Float
     heading: Float  # unwrapped [rad]
-    height: Float
     station: Float  # along its lane [m]; during a U-turn that of its end
-    limit: Float  # speed limit [m/s]
-    speed: Float  # speed that curves, limits and the path's end allow [m/s]
+    speed: Float  # speed that curves, limits and the path's end allow [m/s]; the limit while the path is being laid
     lane: Int32
     manoeuvre: Flag  # whether the path leaves the centre lines here: lane switch or U-turn
 

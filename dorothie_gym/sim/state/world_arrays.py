@@ -29,12 +29,12 @@ from dorothie_gym.sim.state.records import (
     LineMarkRecord,
     LocalizerRecord,
     NodeRecord,
-    PathPointRecord,
     PedestrianRecord,
     PlanRecord,
     PropRecord,
     RecordArray,
     SeenRecord,
+    SweepRecord,
     VehicleRecord,
     WatchRecord,
     empty_records,
@@ -82,7 +82,7 @@ class WorldArrays(NamedTuple):
         starts: see there.
         clock: (1,) time and counters.
         car: (1,) control of the ego, if vehicle 0 is of the kind `Kind.DRIVEN`.
-        path: points of the path that it follows, around its place.
+        sweeps: directions and sweeps at the points of its path around its place, `EgoRecord.first` the first.
         plan: (1,) its plan.
         course: points of its whole path.
         steps: lanes of the plan that is being made.
@@ -112,7 +112,7 @@ class WorldArrays(NamedTuple):
     starts: Array
     clock: RecordArray[ClockRecord]
     car: RecordArray[EgoRecord]
-    path: RecordArray[PathPointRecord]
+    sweeps: RecordArray[SweepRecord]
     plan: RecordArray[PlanRecord]
     course: RecordArray[CoursePointRecord]
     steps: RecordArray[LaneStepRecord]
@@ -169,7 +169,7 @@ ALIGNMENT = 16
 _DTYPES = [
     *map(record_dtype, (VehicleRecord, PedestrianRecord, PropRecord, NodeRecord)), *map(np.dtype, "iid"),
     record_dtype(LampRecord), *map(np.dtype, "iid"),
-    *map(record_dtype, (ClockRecord, EgoRecord, PathPointRecord, PlanRecord, CoursePointRecord, LaneStepRecord)),
+    *map(record_dtype, (ClockRecord, EgoRecord, SweepRecord, PlanRecord, CoursePointRecord, LaneStepRecord)),
     record_dtype(GoalRecord), np.dtype("d"), *map(record_dtype, (EyeRecord, SeenRecord)), *map(np.dtype, "dd"),
     *map(record_dtype, (EventRecord, LocalizerRecord, WatchRecord, LineMarkRecord, BreachRecord)),
 ]  # fmt: skip
@@ -221,7 +221,7 @@ def empty_world(
         starts=np.zeros(STACK),
         clock=empty_records(ClockRecord, 1),
         car=empty_records(EgoRecord, 1),
-        path=empty_records(PathPointRecord, POINTS if driven else 1),
+        sweeps=empty_records(SweepRecord, POINTS if driven else 1),
         plan=empty_records(PlanRecord, 1),
         course=empty_records(CoursePointRecord, COURSE if driven else 1),
         steps=empty_records(LaneStepRecord, STEPS if driven else 1),
@@ -272,7 +272,7 @@ def grown(town: TownArrays, world: WorldArrays, *, vehicles: int, pedestrians: i
     room, wanted = (len(world.vehicles), len(world.pedestrians), len(world.props)), (vehicles, pedestrians, props)
     if any(more < less for more, less in zip(wanted, room, strict=True)):
         raise ValueError(f"a world with room for {room} vehicles, pedestrians and props does not shrink to {wanted}")
-    driven = len(world.path) > 1
+    driven = len(world.sweeps) > 1
     bigger = empty_world(town, vehicles=vehicles, pedestrians=pedestrians, props=props, driven=driven)
     bigger = bigger._replace(course=world.course, steps=world.steps, goals=world.goals).copy()
     for name, old, new in zip(WorldArrays._fields, world.plain(), bigger.plain(), strict=True):
@@ -333,7 +333,7 @@ def note_pose(world: WorldArrays, k: int) -> None:
     """Logs the pose of the ego in a row of its poses."""
     car, vehicle, rows = world.car[0], world.vehicles[0], world.poses
     rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = vehicle.x, vehicle.y, vehicle.heading, vehicle.speed
-    rows[k, 4], rows[k, 5] = vehicle.height, 1.0 if car.action == U_TURN and world.path[car.at].manoeuvre else 0.0
+    rows[k, 4], rows[k, 5] = vehicle.height, 1.0 if car.action == U_TURN and world.course[car.at].manoeuvre else 0.0
 
 
 @compiled

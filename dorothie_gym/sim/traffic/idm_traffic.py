@@ -131,7 +131,7 @@ def _give_way_to_turning(town: TownArrays, world: WorldArrays, vehicle: VehicleR
     for k in range(min(int(vehicle.planned), 3)):
         lane = town.lanes[vehicle.plan[k]]
         for p in range(car.sweep_first, car.sweep_last + 1, U_TURN_SAMPLES):
-            station, lateral, _ = project(town, vehicle.plan[k], world.path[p].x, world.path[p].y)
+            station, lateral, _ = project(town, vehicle.plan[k], world.course[p].x, world.course[p].y)
             if abs(lateral) < beside and 0.0 <= station <= lane.length:
                 gap = min(gap, start + station - vehicle.station)
         start += lane.length

@@ -47,7 +47,7 @@ def ahead(*bodies: dict[str, Any], road: Lane = ROAD, speed: float = 0.0) -> Fou
             row[name] = value
         row.cos, row.sin = math.cos(row.heading), math.sin(row.heading)
         row.distance2 = (row.x - 10.0) ** 2 + row.y**2
-    safe = float(bodies_ahead(world, len(bodies)))
+    safe = float(bodies_ahead(arrays, world, len(bodies)))
     if math.isinf(safe):
         return None
     car = world.car[0]
