@@ -15,7 +15,8 @@ from rich.table import Table
 from rich.text import Text
 
 from dorothie_gym.cli.output import Facts
-from dorothie_gym.engine.session_engine import LiveSession, SessionEngine
+from dorothie_gym.engine.live_session import LiveSession
+from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import GoalStatus, Role
 from dorothie_gym.recording import Event, EventType
 from dorothie_gym.recording.events import move_record

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -14,31 +14,17 @@ from dorothie_gym.compilation import direct
 from dorothie_gym.copying import Lookups
 from dorothie_gym.dialogue import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
-from dorothie_gym.engine.path_measurements import EgoMeasurements, UpcomingJunction
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.ontology import AGENT_ROLES, LABELS, GoalStatus, PropKind, Role, Sensor, encode_slots
+from dorothie_gym.engine.session_views import SessionViews
+from dorothie_gym.ontology import AGENT_ROLES, GoalStatus, PropKind, Role, Sensor, encode_slots
 from dorothie_gym.sim.ego.motion_control import motion_of
-from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import (
-    ExitColumn,
-    LandmarkColumn,
-    Motion,
-    Observation,
-    SpaceLimits,
-    SubgoalColumn,
-    observation_space,
-    plain_text,
-)
+from dorothie_gym.spaces import LandmarkColumn, Motion, Observation, SubgoalColumn, plain_text
 from dorothie_gym.spaces.actions import NO_MOVE
-from dorothie_gym.spaces.fields import FieldBuffer
 from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH
 from dorothie_gym.spaces.observations import MAX_UTTERANCE
 from dorothie_gym.tasks import Landmark, TaskState
 
 Table = NDArray[np.float64]
-
-WAYPOINT_SPACING = 5.0
-"""Distance between the observed waypoints of the planned path [m]."""
 
 _SENSORS = tuple(Sensor)
 _motion_of = direct(motion_of)
@@ -62,52 +48,37 @@ class DeliveredMessages:
     speaking: Mapping[Role, float]
 
 
-@lru_cache(maxsize=16)
-def _int64s(count: int) -> tuple[np.int64, ...]:
-    """Returns the numbers below `count`, which are handed out as they are."""
-    return tuple(np.int64(number) for number in range(count))
-
-
 class ObservationBuilder(Lookups):
     """Builds the observations of a session, for the roles that are asked for.
 
-    Each role has a buffer. Its template holds the values that are the same in most decisions: constant values are
-    written once, rarely changing ones when they change. A copy of the template is completed and handed out.
+    Compiled code writes what changes at every decision (`view_steps`). Constant values are written once, and rarely
+    changing ones when they change.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_unread", "_numbers")
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_tables",)
 
-    def __init__(
-        self,
-        world: World,
-        scenario: Scenario,
-        task: TaskState,
-        beliefs: BeliefTracker,
-        limits: SpaceLimits,
-        observe_acts: bool,
-        junction: UpcomingJunction,
-    ) -> None:
-        self._world, self._task, self._beliefs = world, task, beliefs
-        self._limits, self._observe_acts = limits, observe_acts
-        self._junction = junction
-        self._buffers = {
-            role: FieldBuffer.of_space(observation_space(role, limits, observe_acts)) for role in AGENT_ROLES
-        }
-        self._story = plain_text(scenario.storyboard.story, STORY_LENGTH)
-        self._tasks = ""
+    def __init__(self, views: SessionViews, scenario: Scenario, task: TaskState, beliefs: BeliefTracker) -> None:
+        """Writes what stays the same in the session.
+
+        Args:
+            views: the row of the session.
+            scenario: storyboard, street names and departure.
+            task: progress in the storyboard.
+            beliefs: places of hidden landmarks as the Co-Wizard has stated them.
+        """
+        self._views, self._world, self._task, self._beliefs = views, views.world, task, beliefs
         self._weather: tuple[float, ...] = ()
         self._faults: tuple[Sensor, ...] = ()
         self._versions = (-1, -1)
+        self._props = 0
+        self._heard = self._spoke = True  # whether utterances, or remaining speaking times, may be in the row
+        views.arrays.clear(views.row)
         self._write_constants(scenario)
 
     @cached_property
-    def _unread(self) -> dict[Role, Observation]:
-        """Tables that are written in place of those of a role that is not asked for."""
-        return {role: buffer.copy() for role, buffer in self._buffers.items()}
-
-    @cached_property
-    def _numbers(self) -> tuple[np.int64, ...]:
-        return _int64s(max(self._limits.lanes, len(LABELS)))
+    def _tables(self) -> dict[Role, Observation]:
+        """Arrays of the row, by role and field."""
+        return self._views.tables()
 
     def build(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[str, Observation]:
         """Builds the observations of some roles, by agent, each in its observation space.
@@ -116,101 +87,55 @@ class ObservationBuilder(Lookups):
             delivered: speech and messages of the last decision.
             roles: the roles that observe.
         """
-        self._update_templates()
-        time, speed = self._world.time, self._world.car.speed
-        views: dict[str, Observation] = {}
-        for role in roles:
-            view = views[_NAMES[role]] = self._buffers[role].copy()
-            view["time"][0], view["speed"][0] = time, speed
-        ego = EgoMeasurements(self._world)
-        participant, co_wizard = views.get(Role.PARTICIPANT), views.get(Role.CO_WIZARD)
-        ad_wizard = views.get(Role.AD_WIZARD)
-        if co_wizard is not None or ad_wizard is not None:
-            true, believed = ad_wizard or self._unread[Role.AD_WIZARD], co_wizard or self._unread[Role.CO_WIZARD]
-            ego.write_path(WAYPOINT_SPACING, true["waypoints"], true["path_lanes"], believed["waypoints"])
-        if participant is not None or co_wizard is not None:
-            true, believed = participant or self._unread[Role.PARTICIPANT], co_wizard or self._unread[Role.CO_WIZARD]
-            ego.write_objects(true["objects"], believed["objects"])
-        motion = self._numbers[0 if co_wizard is None and ad_wizard is None else self.motion()]
-        if participant is not None:
-            self._build_participant(participant, delivered, ego)
-        if co_wizard is not None:
-            self._build_co_wizard(co_wizard, delivered, ego, motion)
-        if ad_wizard is not None:
-            self._build_ad_wizard(ad_wizard, delivered, ego, motion)
-        return views
+        self._views.observe(roles)
+        self.write(delivered)
+        arrays, row = self._views.arrays, self._views.row
+        return {_NAMES[role]: arrays.observation(role, row) for role in roles}
 
-    def _build_participant(self, view: Observation, delivered: DeliveredMessages, ego: EgoMeasurements) -> None:
-        self._write_true_place(view, ego)
-        view["lights"] = self._numbers[self._world.ego.lights]
-        view["story"], view["tasks"] = self._story, self._tasks
-        view["message"] = plain_text(delivered.message, MESSAGE_LENGTH) if delivered.message else ""
-        view["speaking"][0] = delivered.speaking[Role.PARTICIPANT]
-        self._write_utterance(Role.CO_WIZARD, delivered.heard.get(Role.CO_WIZARD), view)
-
-    def _build_co_wizard(
-        self, view: Observation, delivered: DeliveredMessages, ego: EgoMeasurements, motion: np.int64
-    ) -> None:
-        self._write_believed_place(view, ego.pose)
-        self._write_exits(view["exits"], ego)
-        view["lights"] = self._numbers[self._world.ego.lights]
-        view["motion"] = motion
-        view["speaking"][0] = delivered.speaking[Role.CO_WIZARD]
-        self._write_driving(view)
-        self._write_utterance(Role.PARTICIPANT, delivered.heard.get(Role.PARTICIPANT), view)
-
-    def _build_ad_wizard(
-        self, view: Observation, delivered: DeliveredMessages, ego: EgoMeasurements, motion: np.int64
-    ) -> None:
-        self._write_true_place(view, ego)
-        view["motion"] = motion
-        view["story"] = self._story
-        self._write_props(view["props"])
-        for speaker in (Role.PARTICIPANT, Role.CO_WIZARD):
-            self._write_utterance(speaker, delivered.said.get(speaker), view)
+    def write(self, delivered: DeliveredMessages) -> None:
+        """Writes all that the compiled code does not: what is said, and what has changed of the rest."""
+        self._write_talk(delivered)
+        self._write_props()
+        weather = tuple(self._world.weather.values.values())
+        if weather != self._weather:
+            self._weather = weather
+            for table in self._tables.values():
+                table["weather"][:] = weather
+        faults = tuple(self._world.faults)
+        if faults != self._faults:
+            self._faults = faults
+            self._tables[Role.AD_WIZARD]["sensors"][:] = [sensor in faults for sensor in _SENSORS]
+        versions = self._task.version, self._beliefs.version
+        if versions != self._versions:
+            self._versions = versions
+            self._write_tasks()
+            self._write_guesses(self._tables[Role.CO_WIZARD]["guesses"])
 
     def motion(self) -> Motion:
         """Returns the state of motion of the ego."""
         return Motion(_motion_of(self._world.actors.arrays))
 
-    # --- templates --------------------------------------------------------------------------------------------------
+    # --- rarely changing values -------------------------------------------------------------------------------------
 
     def _write_constants(self, scenario: Scenario) -> None:
-        landmarks = scenario.storyboard.landmarks[: self._limits.landmarks]
+        participant, co_wizard, ad_wizard = (self._tables[role] for role in AGENT_ROLES)
+        landmarks = scenario.storyboard.landmarks[: len(ad_wizard["hidden"])]
         known = [landmark for landmark in landmarks if not landmark.hidden]
-        write_landmarks(self._buffers[Role.PARTICIPANT].template["landmarks"], landmarks)
-        write_landmarks(self._buffers[Role.AD_WIZARD].template["landmarks"], landmarks)
-        write_landmarks(self._buffers[Role.CO_WIZARD].template["landmarks"], known)
-        self._buffers[Role.AD_WIZARD].template["hidden"][: len(landmarks)] = [landmark.hidden for landmark in landmarks]
-        for buffer in self._buffers.values():
-            buffer.template["street_names"][: len(scenario.street_names)] = [
-                name.value for name in scenario.street_names
-            ]
-            for name, array in buffer.template.items():
-                if name.endswith("_moves"):
-                    array[:] = NO_MOVE
-
-    def _update_templates(self) -> None:
-        """Updates weather, sensor faults, tasks and guesses in the templates where they have changed."""
-        weather = tuple(self._world.weather.values.values())
-        if weather != self._weather:
-            self._weather = weather
-            for buffer in self._buffers.values():
-                buffer.template["weather"][:] = weather
-        faults = tuple(self._world.faults)
-        if faults != self._faults:
-            self._faults = faults
-            self._buffers[Role.AD_WIZARD].template["sensors"][:] = [sensor in faults for sensor in _SENSORS]
-        versions = self._task.version, self._beliefs.version
-        if versions != self._versions:
-            self._versions = versions
-            self._write_tasks()
-            self._write_guesses(self._buffers[Role.CO_WIZARD].template["guesses"])
+        write_landmarks(participant["landmarks"], landmarks)
+        write_landmarks(ad_wizard["landmarks"], landmarks)
+        write_landmarks(co_wizard["landmarks"], known)
+        ad_wizard["hidden"][: len(landmarks)] = [landmark.hidden for landmark in landmarks]
+        for table in self._tables.values():
+            table["street_names"][: len(scenario.street_names)] = [name.value for name in scenario.street_names]
+        story = plain_text(scenario.storyboard.story, STORY_LENGTH)
+        self._views.set_text(Role.PARTICIPANT, "story", story)
+        self._views.set_text(Role.AD_WIZARD, "story", story)
 
     def _write_tasks(self) -> None:
-        self._tasks = plain_text("\n".join(self._task.description(i) for i in self._task.live), STORY_LENGTH)
-        for buffer, permissions in ((self._buffers[Role.PARTICIPANT], False), (self._buffers[Role.AD_WIZARD], True)):
-            write_subgoals(buffer.template["subgoals"], self._task, permissions=permissions)
+        tasks = plain_text("\n".join(self._task.description(i) for i in self._task.live), STORY_LENGTH)
+        self._views.set_text(Role.PARTICIPANT, "tasks", tasks)
+        for role, permissions in ((Role.PARTICIPANT, False), (Role.AD_WIZARD, True)):
+            write_subgoals(self._tables[role]["subgoals"], self._task, permissions=permissions)
 
     def _write_guesses(self, table: Table) -> None:
         table[:] = 0.0
@@ -218,60 +143,46 @@ class ObservationBuilder(Lookups):
             (xx, xy), (_, yy) = guess.covariance
             table[name.value] = (1.0, *guess.mean, xx, yy, xy)
 
-    # --- values of the present decision -----------------------------------------------------------------------------
-
-    def _write_true_place(self, view: Observation, ego: EgoMeasurements) -> None:
-        """Writes the true pose and place of the ego."""
-        planner = self._world.planner
-        view["pose"][:] = ego.true_pose
-        view["lane"] = self._numbers[planner.lane]
-        view["station"][0] = planner.station
-
-    def _write_believed_place(self, view: Observation, pose: Table) -> None:
-        """Writes the estimated pose of the ego and the place on the map that belongs to it."""
-        world = self._world
-        view["pose"][:] = pose
-        view["pose_covariance"][:] = world.localizer.covariance
-        x, y, heading = pose.tolist()
-        lane, view["station"][0] = world.network.closest_place(x, y, heading, world.car.height)
-        view["lane"] = self._numbers[lane]
-
-    def _write_exits(self, table: Table, ego: EgoMeasurements) -> None:
-        options = self._junction.options()
-        rows = options.rows[: len(table)]
-        if len(rows):
-            table[: len(rows)] = rows
-            table[: len(rows), ExitColumn.DISTANCE] = ego.distance_left(options.distance)
-
-    def _write_driving(self, view: Observation) -> None:
-        """Writes cruise speed, manoeuvre and hazard stop."""
-        world = self._world
-        manoeuvre, angle = world.planner.manoeuvre
-        hazard = world.hazard
-        view["cruise_speed"][0] = world.ego.cruise
-        view["manoeuvre"] = self._numbers[manoeuvre or 0]
-        view["manoeuvre_angle"][0] = angle
-        view["hazard"] = self._numbers[hazard.kind.value if hazard is not None else 0]
-        if hazard is not None:
-            view["hazard_distance"][0] = max(hazard.gap, 0.0)
-
-    def _write_props(self, table: Table) -> None:
-        for row, prop in zip(table, self._world.actors.props, strict=False):
-            row[:] = _PROP_NUMBERS[prop.kind], prop.position[0], prop.position[1], prop.heading
-
-    def _write_utterance(self, speaker: Role, utterance: Utterance | None, view: Observation) -> None:
-        if utterance is None:
-            view[_TEXT[speaker]] = ""
+    def _write_props(self) -> None:
+        """Writes the props, if there are or were any."""
+        if not (self._props or self._world.actors.has_props):
             return
-        view[_TEXT[speaker]] = plain_text(utterance.text, MAX_UTTERANCE)
-        if self._observe_acts:
-            for k, act in enumerate(utterance.acts[: self._limits.spans]):
-                view[f"{speaker}_moves"][k] = int(act.move)
-                view[f"{speaker}_slots"][k] = encode_slots(act.slots)
+        props, table = self._world.actors.props, self._tables[Role.AD_WIZARD]["props"]
+        for row, prop in zip(table, props, strict=False):
+            row[:] = _PROP_NUMBERS[prop.kind], prop.position[0], prop.position[1], prop.heading
+        self._props = min(len(props), len(table))
+        table[self._props :] = 0.0
+
+    # --- talk -------------------------------------------------------------------------------------------------------
+
+    def _write_talk(self, delivered: DeliveredMessages) -> None:
+        participant, co_wizard, _ = (self._tables[role] for role in AGENT_ROLES)
+        spoke = any(delivered.speaking.values())
+        if spoke or self._spoke:
+            participant["speaking"][0] = delivered.speaking[Role.PARTICIPANT]
+            co_wizard["speaking"][0] = delivered.speaking[Role.CO_WIZARD]
+        heard = bool(delivered.said or delivered.message)
+        if heard or self._heard:
+            message = plain_text(delivered.message, MESSAGE_LENGTH) if delivered.message else ""
+            self._views.set_text(Role.PARTICIPANT, "message", message)
+            for listener, speaker in ((Role.PARTICIPANT, Role.CO_WIZARD), (Role.CO_WIZARD, Role.PARTICIPANT)):
+                self._write_utterance(listener, speaker, delivered.heard.get(speaker))
+                self._write_utterance(Role.AD_WIZARD, speaker, delivered.said.get(speaker))
+        self._spoke, self._heard = spoke, heard
+
+    def _write_utterance(self, listener: Role, speaker: Role, utterance: Utterance | None) -> None:
+        text = "" if utterance is None else plain_text(utterance.text, MAX_UTTERANCE)
+        self._views.set_text(listener, f"{speaker}_text", text)
+        table = self._tables[listener]
+        if (moves := table.get(f"{speaker}_moves")) is None:
+            return  # acts are not observed
+        slots = table[f"{speaker}_slots"]
+        moves[:], slots[:] = NO_MOVE, 0
+        for k, act in enumerate(() if utterance is None else utterance.acts[: len(moves)]):
+            moves[k], slots[k] = int(act.move), encode_slots(act.slots)
 
 
 _NAMES = {role: str(role) for role in AGENT_ROLES}
-_TEXT = {role: f"{role}_text" for role in Role}
 
 
 def write_landmarks(table: Table, landmarks: Sequence[Landmark]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dorothie_gym.engine.session_engine import LiveSession
+from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.ontology import GoalStatus, Role
 from dorothie_gym.rendering.exception_words import exception_words
 from dorothie_gym.rendering.scene import (

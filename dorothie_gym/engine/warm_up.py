@@ -1,7 +1,7 @@
 """Compilation of the simulation ahead of its use, in two processes where there are two processors.
 
-Half of the work is the loop over substeps (`sim.step.step`), which a second process compiles meanwhile; it leaves the
-machine code in the cache, where the first one finds it.
+Half of the work is the loop over substeps (`sim.batch.worlds.step_share`), which a second process compiles meanwhile:
+it leaves the machine code in the cache, where the first one finds it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.egos import play_share
+from dorothie_gym.sim.batch.threads import turns_of
 from dorothie_gym.sim.batch.town_vector_env import TownVectorEnv
+from dorothie_gym.sim.batch.worlds import alone, step_share
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.briefing import note_props
 from dorothie_gym.sim.network.network import TownNetwork
@@ -35,7 +37,6 @@ from dorothie_gym.sim.sensing.perception import look_around
 from dorothie_gym.sim.state.codes import Footway
 from dorothie_gym.sim.state.town_arrays import TownArrays, empty_town
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.town_env import TownEnv
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import noop
@@ -56,7 +57,7 @@ compile_loops(lambda name, *_: print(name, flush=True), everything=sys.argv[1:] 
 
 def is_warm(*, everything: bool = False) -> bool:
     """Returns whether the loop over substeps needs no compilation; with `everything` that of batches neither."""
-    loops = (step, play_share) if everything else (step,)
+    loops = (step_share, play_share) if everything else (step_share,)
     return all(not isinstance(loop, CompiledFunction) or loop.is_cached() for loop in loops)
 
 
@@ -70,6 +71,7 @@ def warm_up(progress: Progress | None = None, *, everything: bool = False) -> No
     with reporting(progress) as report, _helper(report, everything) as wait:
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
         engine.reset(seed=0)
+        engine.session.observe()
         _compile_rare()
         _call_what_follows_a_step(engine.session.world)
         if everything:
@@ -84,8 +86,9 @@ def compile_loops(progress: Progress | None = None, *, everything: bool) -> None
     """Compiles the loop over substeps, and with `everything` the one of vectorised environments."""
     with reporting(progress):
         town, world = _examples()
-        if isinstance(step, CompiledFunction):
-            step.compile_for(town, world, 1, 1.0 / FRAME_RATE)
+        if isinstance(step_share, CompiledFunction):
+            zeros, answers = np.zeros(1), np.zeros(1, dtype=np.int64)
+            step_share.compile_for(turns_of(1, 1), 0, town, alone(world), 1, 1.0 / FRAME_RATE, zeros, zeros, answers)
         if everything:
             _play(TownVectorEnv(num_envs=2))
 
@@ -110,7 +113,6 @@ def _compile_rare() -> None:
 def _call_what_follows_a_step(world: World) -> None:
     """Calls the functions that read a step of a world, while the second process compiles the step."""
     world.visibility.signal(1.0)
-    world.planner.feasible(0.0)
     note_props(world.actors.arrays, 0)
 
 

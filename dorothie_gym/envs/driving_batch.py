@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.engine.beliefs import goals_on_map
+from dorothie_gym.engine.live_session import session_seeds
 from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
-from dorothie_gym.engine.session_engine import session_seeds
 from dorothie_gym.envs.driving_arrays import EVENTS, Event, Stage, row_of
 from dorothie_gym.envs.driving_rows import DrivingFace, DrivingRows, RowHolder
 from dorothie_gym.envs.driving_start import write_scenario

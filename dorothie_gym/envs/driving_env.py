@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.copying import Restorable
+from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_option, template_option
-from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.envs.driving_batch import DrivingBatch
 from dorothie_gym.envs.driving_rows import INFRACTIONS
 from dorothie_gym.envs.driving_view import DrivingView

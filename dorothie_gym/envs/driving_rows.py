@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
+from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.engine.session_engine import LiveSession
 from dorothie_gym.envs.driving_arrays import CRUISE_LIMIT, DriveArrays, DrivingTown, row_of
 from dorothie_gym.envs.driving_start import Blanks, blank_parts, blank_world, copy_row, stacked, with_room
 from dorothie_gym.envs.episode import EpisodeArrays

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from dorothie_gym.engine.session_engine import LiveSession
+from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.envs.driving_batch import DrivingBatch
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.ontology import Role

@@ -15,8 +15,9 @@ from pettingzoo.utils.conversions import parallel_to_aec
 
 from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.engine.scenario import ResetOptions, Scenario, scenario_option
-from dorothie_gym.engine.session_engine import LiveSession, SessionEngine
+from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
 from dorothie_gym.maps import Town

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.copying import Lookups
-from dorothie_gym.engine.session_engine import LiveSession
+from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import Observation
 

@@ -36,6 +36,7 @@ class Actors(Lookups):
 
     Attributes:
         arrays: state of all bodies, the ego the first vehicle; replaced by bigger arrays when more are added.
+        town_arrays: arrays of the town.
     """
 
     LOOKED_UP: ClassVar[Sequence[str]] = ("_bodies", "_present_of", "_present")
@@ -52,7 +53,7 @@ class Actors(Lookups):
             rng: source of kinds and speeds of new actors.
         """
         self.arrays = arrays
-        self._road, self._town_arrays, self._town = road, town, road.network.town
+        self._road, self.town_arrays, self._town = road, town, road.network.town
         self._rng = rng
 
     @cached_property
@@ -87,7 +88,7 @@ class Actors(Lookups):
 
     def add_vehicle(self, lane: int, station: float, *, distance: float) -> bool:
         """Adds a vehicle or cyclist on a lane if there is room and the ego is farther than `distance` [m]."""
-        town = self._town_arrays
+        town = self.town_arrays
         if not is_free(town, self.arrays, lane, float(station), int(NOBODY), float(distance)):
             return False
         cycles = bool(town.lanes[lane].right < 0 and town.lanes[lane].cycling) and self._rng.random() < CYCLIST_SHARE
@@ -102,7 +103,7 @@ class Actors(Lookups):
         Such pedestrians stay at their street, and cross it anywhere.
         """
         self._make_room(pedestrians=1)
-        found = add_street_walker(self._road.network, self._town_arrays, self.arrays, lane, station)
+        found = add_street_walker(self._road.network, self.town_arrays, self.arrays, lane, station)
         return found is not None
 
     def add_prop(self, kind: PropKind, lane: int, station: float) -> Prop:
@@ -114,16 +115,16 @@ class Actors(Lookups):
             station: distance along the lane [m].
         """
         self._make_room(props=1)
-        row = add_prop(self._road.network, self._town_arrays, self.arrays, kind, lane, station)
+        row = add_prop(self._road.network, self.town_arrays, self.arrays, kind, lane, station)
         return self._bodies.prop(row)
 
     def move_prop(self, prop: Prop, lane: int, station: float) -> None:
         """Moves a prop to another place; it keeps its key."""
-        move_prop(self._road.network, self._town_arrays, self.arrays, prop.row, lane, station)
+        move_prop(self._road.network, self.town_arrays, self.arrays, prop.row, lane, station)
 
     def remove_prop(self, prop: Prop) -> None:
         """Removes a prop."""
-        remove_prop(self._town_arrays, self.arrays, prop.row)
+        remove_prop(self.town_arrays, self.arrays, prop.row)
 
     def _make_room(self, *, vehicles: int = 0, pedestrians: int = 0, props: int = 0) -> None:
         """Replaces the arrays by bigger ones if so many more actors do not fit."""
@@ -136,6 +137,6 @@ class Actors(Lookups):
         if any(missing):
             more = [math.ceil(n / MORE) * MORE for n in missing]
             self.arrays = grown(
-                self._town_arrays, state, vehicles=len(state.vehicles) + more[0],
+                self.town_arrays, state, vehicles=len(state.vehicles) + more[0],
                 pedestrians=len(state.pedestrians) + more[1], props=len(state.props) + more[2],
             )  # fmt: skip

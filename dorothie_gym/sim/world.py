@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.compilation import direct
-from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
+from dorothie_gym.sim.batch.threads import turns_of
+from dorothie_gym.sim.batch.worlds import alone, step_share
 from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.briefing import note_props
 from dorothie_gym.sim.ego.ego_controller import EgoController
@@ -28,22 +31,15 @@ from dorothie_gym.sim.sensing.perception import BODY, Perception, look_around
 from dorothie_gym.sim.sensing.visibility import Visibility
 from dorothie_gym.sim.state.codes import NO_SPACE
 from dorothie_gym.sim.state.records import (
-    EyeRecord,
-    PedestrianRecord,
-    PropRecord,
-    RecordArray,
-    SeenRecord,
-    VehicleRecord,
     plain,
 )
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import FRAMES
 from dorothie_gym.sim.weather import Weather, Wind
 from dorothie_gym.sim.world_start import OwnArrays, WorldSeeds, start_world
 
-_step = direct(step)
+_step_share = direct(step_share)
 
 FAULT_SECONDS = 30.0
 """Duration of a sensor fault [s] (design)."""
@@ -52,15 +48,9 @@ CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
 """Share of the signal left by a fault of the view: blur halves the sight."""
 
 
-@by_reference
-class SensorArrays(NamedTuple):
-    """Arrays of a world that `seeing.see` takes; see `WorldArrays`."""
-
-    vehicles: RecordArray[VehicleRecord]
-    pedestrians: RecordArray[PedestrianRecord]
-    props: RecordArray[PropRecord]
-    seen: RecordArray[SeenRecord]
-    eye: RecordArray[EyeRecord]
+def parts_of(frames: int) -> list[int]:
+    """Returns the frames of the parts in which a step is played: the log of the ego has room for `FRAMES`."""
+    return [min(FRAMES, frames - first) for first in range(0, max(frames, 1), FRAMES)]
 
 
 class World(Lookups, Restorable):
@@ -86,9 +76,10 @@ class World(Lookups, Restorable):
         reports: events of the ego, and the numbers of its infractions.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_record_of", "_own_record")
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_record_of", "_own_record", "_batch_of", "_batch", "_scratch")
 
     _record_of: WorldArrays | None = None
+    _batch_of: WorldArrays | None = None
 
     def __init__(
         self, town: Town, config: WorldConfig, *, seed: np.random.SeedSequence, departure: tuple[int, float],
@@ -142,6 +133,11 @@ class World(Lookups, Restorable):
         """Returns the town and the settings."""
         return {**super().compatibility(), "the town": self.town, "the settings": self.config}
 
+    @cached_property
+    def _scratch(self) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
+        """Turns, inputs and answers of a step as a batch of one, see `step_share`."""
+        return turns_of(1, 1), np.zeros(1), np.zeros(1, dtype=np.int64)
+
     # --- Time ---------------------------------------------------------------------------------------------------------
 
     @property
@@ -151,26 +147,53 @@ class World(Lookups, Restorable):
 
     def step(self, frames: int) -> list[WorldEvent]:
         """Runs the world for a number of physics frames; returns the events of the ego."""
-        parts = [self._run(min(FRAMES, frames - first)) for first in range(0, max(frames, 1), FRAMES)]
-        trace = parts[0] if len(parts) == 1 else np.concatenate(parts)
-        self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
-        if self.faults:
-            self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
-            self.write_weather()
-        self._note_props()
-        return self.reports.take()
+        traces = []
+        for part in parts_of(frames):
+            self.begin_part()
+            self._run(part)
+            traces.append(self.end_part(part))
+        return self.end_step(traces)
 
-    def _run(self, frames: int) -> Array:
-        """Steps all bodies by no more than `FRAMES` substeps; returns the ego's trace, see `WorldArrays`."""
-        self.write_weather()
-        while _step(self._arrays, self.actors.arrays, frames, 1.0 / FRAME_RATE) == NO_SPACE:
+    def _run(self, frames: int) -> None:
+        """Steps all bodies as a batch of one by no more than `FRAMES` substeps."""
+        turns, inputs, answers = self._scratch
+        answers[0] = NO_SPACE
+        while True:
+            turns[0, 0] = 0
+            _step_share(turns, 0, self._arrays, self.batch, frames, 1.0 / FRAME_RATE, inputs, inputs, answers)
+            if answers[0] != NO_SPACE:
+                return
             self.actors.arrays = lengthened(self.actors.arrays)
+
+    @property
+    def batch(self) -> WorldArrays:
+        """Arrays of the world as a batch of one."""
+        if self._batch_of is not self.actors.arrays:
+            self._batch_of, self._batch = self.actors.arrays, alone(self.actors.arrays)
+        return self._batch
+
+    def begin_part(self) -> None:
+        """Writes what the physics needs to know before a part of a step, see `parts_of`."""
+        self.write_weather()
+
+    def end_part(self, frames: int) -> Array:
+        """Reads the results of a part of a step; returns the ego's trace, see `WorldArrays`."""
         self.car.refresh()
         self.frame += frames
         events, breaches, _ = self._record.outcome.item()
         if events or breaches:
             self.reports.note(events, breaches)
         return self.actors.arrays.trace[:frames].copy()
+
+    def end_step(self, traces: Sequence[Array]) -> list[WorldEvent]:
+        """Ends a step with the traces of its parts; returns the events of the ego."""
+        trace = traces[0] if len(traces) == 1 else np.concatenate(traces)
+        self.frames, self.offsets = trace[:, : len(FRAME_COLUMNS)], trace[:, -1]
+        if self.faults:
+            self.faults = {sensor: end for sensor, end in self.faults.items() if end > self.frame}
+            self.write_weather()
+        self._note_props()
+        return self.reports.take()
 
     def catch_up(self) -> None:
         """Reads time and place of the ego after another caller has stepped the arrays of the world."""
@@ -235,12 +258,6 @@ class World(Lookups, Restorable):
         """Arrays of the world, with the present visibility."""
         self.write_weather()
         return self.actors.arrays
-
-    @property
-    def senses(self) -> SensorArrays:
-        """Arrays for perception: bodies, visibility, and room for the result."""
-        arrays = self.sensing_arrays
-        return SensorArrays(arrays.vehicles, arrays.pedestrians, arrays.props, arrays.seen, arrays.eye)
 
     def seen(self) -> Array:
         """Returns the perceived bodies as numbers (n, 9), columns `perception.BODY` [m, rad, m/s]."""

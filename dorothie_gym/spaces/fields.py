@@ -173,39 +173,53 @@ Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 
 class FieldBuffer(Lookups):
-    """Arrays of fixed types and shapes in one block of memory.
+    """Arrays of fixed types and shapes in one block of memory, with a leading axis of rows.
 
-    A copy of the block costs as much as the copy of one array. The caller owns the copy; later changes of the template
-    do not reach it.
+    A copy of the block costs as much as the copy of one array. The caller owns the copy; later changes of the buffer do
+    not reach it.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("template",)
+    LOOKED_UP: ClassVar[Sequence[str]] = ("arrays",)
 
-    def __init__(self, fields: Mapping[str, tuple[DTypeLike, Shape]]) -> None:
+    def __init__(self, fields: Mapping[str, tuple[DTypeLike, Shape]], rows: int = 1) -> None:
         """Allocates arrays of zeros.
 
         Args:
-            fields: type and shape of each array, by name.
+            fields: type and shape of a row of each array, by name.
+            rows: number of rows.
         """
-        self._layout = np.dtype([(name, kind, shape) for name, (kind, shape) in fields.items()], align=True)
+        self._layout = np.dtype([(name, kind, (rows, *shape)) for name, (kind, shape) in fields.items()], align=True)
+        # of a single row: the same places in memory, without the leading axis
+        self._row = np.dtype([(name, *each) for name, each in fields.items()], align=True) if rows == 1 else None
         self._block: NDArray[np.uint8] = np.zeros(self._layout.itemsize, dtype=np.uint8)
         self._names = tuple(fields)
 
     @cached_property
-    def template(self) -> Arrays:
-        """Arrays that the next copies are made of, by name."""
+    def arrays(self) -> Arrays:
+        """The arrays (rows, ...), by name."""
         return self._arrays(self._block)
 
     @classmethod
-    def of_space(cls, space: spaces.Dict) -> Self:
-        """Returns a buffer for all fields of a space that are arrays."""
-        arrays = (spaces.Box, spaces.MultiDiscrete, spaces.MultiBinary)
-        fields = {name: field for name, field in space.spaces.items() if isinstance(field, arrays)}
-        return cls({name: (field.dtype, field.shape) for name, field in fields.items()})
+    def of_space(cls, space: spaces.Dict, rows: int = 1) -> Self:
+        """Returns a buffer for all fields of a space that are numbers."""
+        numbers = {name: field for name, field in space.spaces.items() if not isinstance(field, spaces.Text)}
+        return cls({name: (np.dtype(field.dtype), field.shape or ()) for name, field in numbers.items()}, rows)
 
     def copy(self) -> Arrays:
-        """Returns a copy of the template: arrays by name."""
+        """Returns a copy of all rows: arrays (rows, ...) by name."""
         return self._arrays(self._block.copy())
+
+    def copy_row(self, row: int) -> Arrays:
+        """Returns a copy of a row: arrays, and NumPy integers for fields without axes, by name."""
+        if self._row is not None:
+            record = np.ndarray(1, self._row, self._block.copy())[0]
+            return {name: record[name] for name in self._names}
+        return {name: array[row].copy() for name, array in self.arrays.items()}
+
+    def clear(self, row: int) -> None:
+        """Sets a row to zeros."""
+        for array in self.arrays.values():
+            array[row] = 0
 
     def _arrays(self, block: NDArray[np.uint8]) -> Arrays:
         record = np.ndarray((), self._layout, block)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import string
 import unicodedata
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from dorothie_gym.copying import shared
@@ -76,10 +77,16 @@ class SpaceLimits:
     @classmethod
     def for_town(cls, town: Town) -> SpaceLimits:
         """Returns the default sizes, enlarged where the town needs it."""
+        return cls.for_towns((town,))
+
+    @classmethod
+    def for_towns(cls, towns: Iterable[Town]) -> SpaceLimits:
+        """Returns the default sizes, enlarged where one of the towns needs it."""
+        towns = tuple(towns)
         return cls(
-            lanes=max(cls.lanes, len(town.lanes)),
-            junctions=max(cls.junctions, len(town.junctions)),
-            streets=max(cls.streets, len(town.streets)),
+            lanes=max(cls.lanes, *(len(town.lanes) for town in towns)),
+            junctions=max(cls.junctions, *(len(town.junctions) for town in towns)),
+            streets=max(cls.streets, *(len(town.streets) for town in towns)),
         )
 
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from dorothie_gym.engine.masks import ActionMasks
-from dorothie_gym.engine.path_measurements import UpcomingJunction
 from dorothie_gym.engine.scenario import draw_scenario
+from dorothie_gym.engine.session_views import SessionViews
+from dorothie_gym.engine.view_arrays import RoleArrays
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, PropKind, Role
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.world import World
@@ -21,7 +22,8 @@ def in_town(name: str) -> tuple[World, ActionMasks, SpaceLimits]:
     scenario = draw_scenario(town, None, 4)
     world = world_at(name, *scenario.departure, WorldConfig(vehicles=4, pedestrians=0))
     limits = SpaceLimits()
-    return world, ActionMasks(world, TaskState(scenario.storyboard), limits, UpcomingJunction(world)), limits
+    views = SessionViews(world, RoleArrays(limits, observe_acts=True), 0)
+    return world, ActionMasks(views, TaskState(scenario.storyboard)), limits
 
 
 def fitting_angles(world: World, action: PhysicalAction, angles: list[int]) -> list[int]:

@@ -9,14 +9,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import concurrent
+from dorothie_gym.compilation import concurrent, direct
 from dorothie_gym.compilation.by_reference import gives_row
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.threads import ThreadPool, take, turns_of
+from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE
 from dorothie_gym.sim.state.town_arrays import TownArrays
-from dorothie_gym.sim.state.world_arrays import WorldArrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_room_of
 from dorothie_gym.sim.step import step
 
 
@@ -52,6 +53,12 @@ def world_of(batch: WorldArrays, number: int) -> WorldArrays:
     return WorldArrays._make(array[number] for array in batch)
 
 
+def alone(world: WorldArrays) -> WorldArrays:
+    """Returns a world as a batch of one: views of its arrays."""
+    arrays = (array.reshape(1, *array.shape) for array in world.plain())
+    return WorldArrays._make(array.view(np.recarray) if array.dtype.names else array for array in arrays)
+
+
 @concurrent
 def step_share(
     turns: NDArray[np.int64],
@@ -62,6 +69,7 @@ def step_share(
     dt: float,
     acceleration: Array,
     steering: Array,
+    answers: NDArray[np.int64],
 ) -> None:
     """Steps worlds of a batch, until all of them have been taken.
 
@@ -74,11 +82,16 @@ def step_share(
         dt: time of each [s].
         acceleration: (worlds,) of each world's vehicles of the kind `Kind.EGO` [m/s^2].
         steering: (worlds,) angle of their front wheels, positive to the right [rad].
+        answers: (worlds,) `Refusal.NO_SPACE` of those that are to be stepped; replaced by the answers of `step`.
     """
     number = take(turns, home)
     while number >= 0:
-        step(town, world_of(batch, number), substeps, dt, acceleration[number], steering[number])
+        if answers[number] == NO_SPACE:
+            answers[number] = step(town, world_of(batch, number), substeps, dt, acceleration[number], steering[number])
         number = take(turns, home)
+
+
+_step_share = direct(step_share)
 
 
 # --- Batch of worlds --------------------------------------------------------------------------------------------------
@@ -135,20 +148,41 @@ class VectorWorld(Lookups):
         """Makes one of the worlds the same as another world, which has room for as many bodies."""
         put(self.arrays, range(len(self))[number], world)
 
-    def step(self, substeps: int, dt: float, acceleration: Array | float = 0.0, steering: Array | float = 0.0) -> None:
-        """Steps all worlds, as `sim.step.step` does with one.
+    def make_room(self, world: WorldArrays) -> bool:
+        """Gives all worlds the room of another one, if they have less; returns whether the arrays were replaced."""
+        first = self.world(0)
+        if all(len(mine) >= len(other) for mine, other in zip(first.plain(), world.plain(), strict=True)):
+            return False
+        rows = [with_room_of(self.town, self.world(number), world) for number in range(len(self))]
+        self.arrays = stacked(rows[0], len(rows))
+        for number, row in enumerate(rows):
+            self.put(number, row)
+        return True
+
+    def step(
+        self, substeps: int, dt: float, acceleration: Array | float = 0.0, steering: Array | float = 0.0,
+        playing: NDArray[np.bool_] | None = None,
+    ) -> None:  # fmt: skip
+        """Steps worlds, as `sim.step.step` does with one; where a path needs more room, all worlds get it.
 
         Args:
             substeps: how many.
             dt: time of each [s].
             acceleration: (worlds,) or one for all: of vehicles of the kind `Kind.EGO` [m/s^2].
             steering: (worlds,) or one for all: angle of their front wheels, positive to the right [rad].
+            playing: (worlds,) those that are stepped; None for all.
 
         Raises:
             ValueError: the actions do not fit the number of worlds.
         """
         actions = (self._one_each("acceleration", acceleration), self._one_each("steering", steering))
-        self.share(step_share, self.town, self.arrays, substeps, float(dt), *actions)
+        answers = np.full(len(self), NO_SPACE, dtype=np.int64)
+        if playing is not None:
+            answers[~playing] = CARRIED_OUT
+        while (short := np.flatnonzero(answers == NO_SPACE)).size:
+            self.share(_step_share, self.town, self.arrays, substeps, float(dt), *actions, answers)
+            for number in short[answers[short] == NO_SPACE].tolist():
+                self.make_room(lengthened(self.world(number)))
 
     def _one_each(self, name: str, value: Array | float) -> Array:
         values = np.asarray(value, dtype=np.float64)

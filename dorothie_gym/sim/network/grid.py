@@ -14,7 +14,6 @@ from dorothie_gym.maps.polyline import (
     LaneTable,
     closest_on_segment,
     distance,
-    local_coordinates,
     value_at,
 )
 
@@ -69,26 +68,6 @@ class GridIndex:
         if row < 0:  # nothing at this height in the whole town
             return self.closest(x, y, heading if weight else None)
         return int(row)
-
-    def closest_place(self, x: float, y: float, heading: float, height: float) -> tuple[int, float]:
-        """Returns the same row for a body with a heading and a height, and its station on that lane [m].
-
-        Raises:
-            ValueError: the place is not a number.
-        """
-        row, station = _closest_place(self._arrays, x, y, heading, height)
-        if row < 0:
-            raise ValueError(f"no lane is closest to ({x}, {y}), heading {heading}: these must be finite numbers")
-        return int(row), float(station)
-
-
-@allocating
-def _closest_place(arrays: _Arrays, x: float, y: float, heading: float, height: float) -> tuple[int, float]:
-    row = _closest(arrays, x, y, heading, 1.0, height)
-    if row < 0:  # nothing at this height in the whole town
-        row = _closest(arrays, x, y, heading, 1.0, math.nan)
-    points, offsets, ends = arrays[:3]
-    return row, local_coordinates(points, offsets, ends, max(row, 0), x, y)[0]
 
 
 @allocating

@@ -194,22 +194,6 @@ class TownNetwork(RoadNetwork):
         found: LaneIndex = super().get_closest_lane_index(position, heading)
         return found
 
-    def closest_place(self, x: float, y: float, heading: float, height: float) -> tuple[int, float]:
-        """Returns the closest lane as `get_closest_lane_index`, and the place on it.
-
-        Args:
-            x: position [m].
-            y: position [m].
-            heading: [rad].
-            height: [m].
-
-        Returns:
-            Id of the lane in the town, and distance along it [m], no less than 0 and no more than its length.
-        """
-        row, station = self._grid.closest_place(x, y, heading, height)
-        lane = self._lanes[row]
-        return lane.town_lane.id, min(max(station, 0.0), lane.length)
-
     def random_lane_index(self, np_random: np.random.Generator) -> LaneIndex:
         """Returns an index drawn uniformly from all lanes."""
         return self._indexes[int(np_random.choice(len(self._indexes)))]

@@ -3,11 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.path_measurements import EgoMeasurements, UpcomingJunction
+from dorothie_gym.engine.session_views import SessionViews
+from dorothie_gym.engine.view_arrays import RoleArrays
 from dorothie_gym.maps import Exit
-from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import ExitColumn
+from dorothie_gym.spaces import ExitColumn, SpaceLimits
 from tests.sim.driving import network, world_at
 
 
@@ -30,18 +31,20 @@ def test_options_and_lanes_ahead_are_those_of_the_path(name: str) -> None:
         lane for lane in town.lanes if not lane.in_junction and lane.length > 60.0 and len(town.exits(lane.id)) > 1
     )
     world = world_at(name, start.id, 5.0)
-    prospect, rng = UpcomingJunction(world), np.random.default_rng(4)
+    views, rng = SessionViews(world, RoleArrays(SpaceLimits(), observe_acts=True), 0), np.random.default_rng(4)
+    observed = views.tables()
     counts = set()
     for _ in range(60):
         exits, distance = next_exits(world)
-        options = prospect.options()
         assert world.planner.exits() == (exits, distance)
         counts.add(len(exits))
-        assert (options.exits, options.distance) == (exits, distance)
-        assert options.rows[:, ExitColumn.ANGLE].tolist() == [way.angle for way in exits]
-        lanes = np.zeros(12, dtype=np.int64)
-        waypoints = np.zeros((20, 2))
-        EgoMeasurements(world).write_path(5.0, waypoints, lanes, np.zeros((20, 2)))
+        views.observe((Role.CO_WIZARD, Role.AD_WIZARD))
+        options, lanes = observed[Role.CO_WIZARD]["exits"], observed[Role.AD_WIZARD]["path_lanes"]
+        waypoints = observed[Role.AD_WIZARD]["waypoints"]
+        assert options[: len(exits), ExitColumn.LANE].tolist() == [way.lane for way in exits]
+        assert options[: len(exits), ExitColumn.ANGLE].tolist() == [way.angle for way in exits]
+        np.testing.assert_allclose(options[: len(exits), ExitColumn.DISTANCE], distance, rtol=0.0, atol=2.0)
+        assert not options[len(exits) :].any()
         ahead = world.planner.lanes_ahead[:12]
         assert lanes[: len(ahead)].tolist() == [lane + 1 for lane in ahead]
         assert not lanes[len(ahead) :].any()

@@ -1,0 +1,416 @@
+"""Vectorised `DuoWizard-v0`: many sessions of three agents in one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, TypeAlias
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from dorothie_gym.copying import Restorable
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.scenario import Scenario, scenario_option
+from dorothie_gym.engine.session_batch import SessionBatch
+from dorothie_gym.engine.session_engine import SessionEngine, StepOutcome
+from dorothie_gym.envs.driving_vector_env import Towns
+from dorothie_gym.envs.session_view import SessionView, metadata_at
+from dorothie_gym.errors import short_repr
+from dorothie_gym.maps import Town, load_town
+from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.processors import available_processors
+from dorothie_gym.sim.infractions import INFRACTION_KINDS
+from dorothie_gym.spaces import ActionMapping, SpaceLimits, action_space, observation_space
+from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.vector_infos import Infos, mask_of, seeds_of
+
+_AGENTS = {str(role): role for role in AGENT_ROLES}
+_KINDS = tuple(kind.value for kind in INFRACTION_KINDS)
+
+Stacked: TypeAlias = dict[str, Any]
+"""Observations or masks of one agent in all environments: by field an array (num_envs, ...), or a tuple of texts."""
+
+BatchedActions: TypeAlias = Mapping[str, Mapping[str, Any]] | Sequence[Mapping[str, ActionMapping]]
+"""Actions by agent and field, each for all environments; or by environment and agent."""
+
+Flags: TypeAlias = NDArray[np.bool_]
+
+
+class DuoWizardVectorEnv(Restorable):
+    """Many sessions of `DuoWizardEnv` in one batch, by agent as in PettingZoo and stacked as in Gymnasium.
+
+    Worlds, observations and masks of all sessions lie in arrays, which compiled code steps on threads; talk stays in
+    Python. A session depends on its seed and its actions, and neither on the others, nor on its place among them, nor
+    on the number of threads: it is that of a `DuoWizardEnv`.
+
+    Everything is by agent. Of one agent, the values of a field of its observation are an array (num_envs, ...) or, for
+    a text, a tuple of `num_envs` texts, as `gymnasium.vector.utils.batch_space` has it:
+    `{name: values[k] for name, values in observations[agent].items()}` is the observation in environment `k`.
+    All agents of a session end together.
+
+    Attributes:
+        num_envs: number of environments.
+        possible_agents: names of the agents.
+        autoreset_mode: when sessions that are over begin anew, as `gymnasium.vector.SyncVectorEnv` has it.
+        towns: town of each environment.
+        config: settings of the sessions.
+        limits: sizes of the spaces, which all towns of the batch share.
+        single_observation_spaces: observation space of each agent in one environment.
+        single_action_spaces: action space of each agent in one environment.
+        observation_spaces: observation space of each agent in all environments.
+        action_spaces: action space of each agent in all environments.
+        engines: engine of each environment, to be read: of the session in progress, its events, its summary.
+    """
+
+    metadata: dict[str, object] = {  # noqa: RUF012
+        "name": "duo_wizard_v0",
+        "render_modes": ["rgb_array"],
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    CHANGES: ClassVar[Sequence[str]] = ("_over",)
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        town: Towns = "brookside",
+        storyboard: str | Path | StoryboardTemplate | None = None,
+        *,
+        config: EnvConfig | None = None,
+        render_mode: str | None = None,
+        max_cycles: int | None = None,
+        threads: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    ) -> None:
+        """Makes the environments.
+
+        Args:
+            num_envs: number of environments.
+            town: a town as in `DuoWizardEnv`, or several that the environments play in turn.
+            storyboard: as in `DuoWizardEnv`.
+            config: as in `DuoWizardEnv`.
+            render_mode: None or "rgb_array".
+            max_cycles: as in `DuoWizardEnv`.
+            threads: number of threads; None for one per processor.
+            autoreset_mode: see above.
+
+        Raises:
+            ValueError: an argument is out of its range.
+        """
+        if num_envs < 1:
+            raise ValueError(f"num_envs is {num_envs}; it must be at least 1")
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode is {render_mode!r}; it must be None or 'rgb_array' for several environments")
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads is {threads}; it must be at least 1, or None for one per processor")
+        names = [town] if isinstance(town, str | Path | Town) else list(town)
+        if not names:
+            raise ValueError("town is an empty sequence; it must name at least one town")
+        loaded = [each if isinstance(each, Town) else load_town(each) for each in names]
+        self.towns = [loaded[number % len(loaded)] for number in range(num_envs)]
+        self.num_envs, self.render_mode, self.config = num_envs, render_mode, config or EnvConfig()
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        rate = self.config.decision_frequency
+        self.metadata = {**self.metadata, **metadata_at(rate), "render_modes": ["rgb_array"],
+                         "autoreset_mode": self.autoreset_mode}  # fmt: skip
+        self.limits = SpaceLimits.for_towns(self.towns)
+        self.possible_agents = list(_AGENTS)
+        self.single_observation_spaces, self.observation_spaces = self._spaces(
+            {agent: observation_space(role, self.limits, self.config.observe_acts) for agent, role in _AGENTS.items()}
+        )
+        self.single_action_spaces, self.action_spaces = self._spaces(
+            {agent: action_space(role, self.limits) for agent, role in _AGENTS.items()}
+        )
+        numbers: dict[Town, list[int]] = {}
+        for number, each in enumerate(self.towns):
+            numbers.setdefault(each, []).append(number)
+        self._batches = [
+            SessionBatch(
+                each,
+                storyboard,
+                config=self.config,
+                max_cycles=max_cycles,
+                limits=self.limits,
+                numbers=own,
+                threads=threads or available_processors(),
+            )
+            for each, own in numbers.items()
+        ]
+        places = {number: (batch, row) for batch in self._batches for row, number in enumerate(batch.numbers)}
+        self.engines: tuple[SessionEngine, ...] = tuple(
+            places[number][0].engines[places[number][1]] for number in range(num_envs)
+        )
+        self._over = np.zeros(num_envs, dtype=np.bool_)
+        views = num_envs if render_mode is not None else 0
+        self._views = [SessionView(render_mode, frames_per_second=rate) for _ in range(views)]
+
+    def _spaces(self, single: Mapping[str, spaces.Dict]) -> tuple[dict[str, spaces.Dict], dict[str, spaces.Dict]]:
+        """Returns spaces of one environment, and those of all, by agent."""
+        batched = {}
+        for agent, space in single.items():
+            whole = batch_space(space, self.num_envs)
+            assert isinstance(whole, spaces.Dict)
+            batched[agent] = whole
+        return dict(single), batched
+
+    @property
+    def threads(self) -> int:
+        """Number of threads that step the environments."""
+        return max(batch.threads for batch in self._batches)
+
+    def observation_space(self, agent: str) -> spaces.Dict:
+        """Returns the observation space of an agent in all environments, always the same object."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Dict:
+        """Returns the action space of an agent in all environments, always the same object."""
+        return self.action_spaces[agent]
+
+    # --- Episodes -----------------------------------------------------------------------------------------------------
+
+    def reset(
+        self, seed: int | Sequence[int | None] | None = None, options: Mapping[str, object] | None = None
+    ) -> tuple[dict[str, Stacked], dict[str, Infos]]:
+        """Begins new sessions.
+
+        Args:
+            seed: of the first environment; the others have the numbers that follow. Or one for each. Without one, the
+                next of the series that the environment's last given seed began.
+            options: `reset_mask`, a bool array (num_envs,): which environments, by default all; `scenario` as in
+                `DuoWizardEnv`, for all of them; other options are ignored.
+
+        Returns:
+            Observations of all environments, and infos of those that begin, by agent.
+
+        Raises:
+            ValueError: not one seed for each environment, or a mask of the wrong shape or type.
+        """
+        mask = mask_of((options or {}).get("reset_mask"), self.num_envs)
+        seeds = seeds_of(seed, self.num_envs)
+        scenario = scenario_option({name: value for name, value in (options or {}).items() if name == "scenario"})
+        self._begin(mask, seeds, scenario)
+        for batch in self._batches:
+            batch.observe([row for row, number in enumerate(batch.numbers) if mask[number]])
+        return self._observations(), self._infos(mask, {})
+
+    def step(
+        self, actions: BatchedActions
+    ) -> tuple[
+        dict[str, Stacked], dict[str, NDArray[np.float64]], dict[str, Flags], dict[str, Flags], dict[str, Infos]
+    ]:  # fmt: skip
+        """Plays a decision in every environment; those that are over begin anew, as the autoreset mode says.
+
+        Args:
+            actions: by agent the fields of its action, each an array (num_envs, ...) or a sequence of `num_envs`
+                values; or a sequence of `num_envs` dicts with an action for each agent.
+
+        Returns:
+            By agent: observations, rewards, terminations and truncations (num_envs,), infos.
+
+        Raises:
+            ValueError: an action is missing or malformed; the message names environment, agent and field. Nothing was
+                played.
+            gymnasium.error.ResetNeeded: an environment was never reset, or is over and not reset by itself.
+        """
+        begun = np.array([engine.has_begun for engine in self.engines])
+        mode, again = self.autoreset_mode, self._over.copy()
+        if not begun.all() or (mode is AutoresetMode.DISABLED and again.any()):
+            waiting = np.flatnonzero(~begun | again).tolist()
+            raise gym.error.ResetNeeded(f"environments {short_repr(waiting)} wait for a reset: call reset()")
+        outcomes = self._play(rows_of(actions, self.num_envs, self.possible_agents), ~again)
+        self._begin(again, [None] * self.num_envs, None)
+        for batch in self._batches:
+            batch.observe()
+        played = [outcomes.get(number) for number in range(self.num_envs)]
+        rewards = {
+            agent: np.array([0.0 if each is None else float(sum(each.reward_terms[role].values())) for each in played])
+            for agent, role in _AGENTS.items()
+        }
+        terminated = np.array([each is not None and each.terminated for each in played])
+        truncated = np.array([each is not None and each.truncated for each in played])
+        self._over = terminated | truncated
+        observations, infos = self._observations(), self._infos(np.ones(self.num_envs, dtype=np.bool_), outcomes)
+        if mode is AutoresetMode.SAME_STEP and self._over.any():
+            observations, infos = self._begin_at_once(observations, outcomes)
+        return (
+            observations, rewards, {agent: terminated.copy() for agent in _AGENTS},
+            {agent: truncated.copy() for agent in _AGENTS}, infos,
+        )  # fmt: skip
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Draws the first environment; `render_one` draws another one."""
+        frame = self.render_one(0)
+        return None if frame is None else (frame,)
+
+    def render_one(self, number: int) -> NDArray[np.uint8] | None:
+        """Draws the session of one environment (800, 1280, 3), as `DuoWizardEnv` does; None without a render mode."""
+        engine = self.engines[range(self.num_envs)[number]]
+        return self._views[number].render(engine.session) if self._views else None
+
+    def close(self) -> None:
+        """Ends the threads."""
+        for batch in self._batches:
+            batch.close()
+
+    # --- States -------------------------------------------------------------------------------------------------------
+
+    def mutable_values(self) -> dict[str, object]:
+        """Returns what changes in the environments."""
+        return {**super().mutable_values(), "batches": [batch.mutable_values() for batch in self._batches]}
+
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies the values of the environments."""
+        parts = values.pop("batches")
+        assert isinstance(parts, list)  # of `mutable_values`
+        for batch, part in zip(self._batches, parts, strict=True):
+            batch.apply_values(part)
+        super().apply_values(values)
+
+    def compatibility(self) -> dict[str, object]:
+        """Returns the kind of environment, the towns and the settings."""
+        return {**super().compatibility(), "the towns": self.towns, "the settings": self.config}
+
+    # --- Parts of a step ----------------------------------------------------------------------------------------------
+
+    def _play(self, actions: Sequence[Mapping[str, ActionMapping]], playing: Flags) -> dict[int, StepOutcome]:
+        """Plays a decision in some environments; returns the outcomes by number of the environment."""
+        decoded = [
+            batch.decode({row: actions[number] for row, number in enumerate(batch.numbers) if playing[number]})
+            for batch in self._batches
+        ]
+        outcomes = {}
+        for batch, own in zip(self._batches, decoded, strict=True):
+            if own:
+                outcomes.update({batch.numbers[row]: outcome for row, outcome in batch.step(own).items()})
+        return outcomes
+
+    def _begin(self, mask: Flags, seeds: Sequence[int | None], scenario: Scenario | None) -> None:
+        """Begins sessions in the environments of a mask."""
+        for batch in self._batches:
+            for row, number in enumerate(batch.numbers):
+                if mask[number]:
+                    batch.begin(row, seeds[number], scenario)
+                    if self._views:
+                        self._views[number].begin(self.engines[number].session)
+        self._over[mask] = False
+
+    def _begin_at_once(
+        self, last: Mapping[str, Stacked], outcomes: Mapping[int, StepOutcome]
+    ) -> tuple[dict[str, Stacked], dict[str, Infos]]:
+        """Begins sessions anew that are over; returns observations and infos as in the mode `SAME_STEP`."""
+        over = self._over.copy()
+        ended = self._infos(over, outcomes)
+        self._begin(over, [None] * self.num_envs, None)
+        for batch in self._batches:
+            batch.observe([row for row, number in enumerate(batch.numbers) if over[number]])
+        infos = self._infos(np.ones(self.num_envs, dtype=np.bool_), {k: v for k, v in outcomes.items() if not over[k]})
+        for agent, seen in last.items():
+            final = np.full(self.num_envs, None, dtype=object)
+            for number in np.flatnonzero(over).tolist():
+                final[number] = {name: values[number] for name, values in seen.items()}
+            infos[agent] |= {"final_obs": final, "_final_obs": over.copy()}
+            infos[agent] |= {"final_info": ended[agent], "_final_info": over.copy()}
+        return self._observations(), infos
+
+    # --- Results ------------------------------------------------------------------------------------------------------
+
+    def _observations(self) -> dict[str, Stacked]:
+        """Returns a copy of the observations of all environments, by agent."""
+        found = {}
+        for agent, role in _AGENTS.items():
+            own = found[agent] = self._gathered([batch.views.observations[role].copy() for batch in self._batches])
+            for name in self._batches[0].views.texts[role]:
+                texts = [""] * self.num_envs
+                for batch in self._batches:
+                    for number, text in zip(batch.numbers, batch.views.texts[role][name], strict=True):
+                        texts[number] = text
+                own[name] = tuple(texts)
+        return found
+
+    def _gathered(self, parts: Sequence[Mapping[str, NDArray[Any]]]) -> Stacked:
+        """Returns the arrays of all batches as arrays of all environments."""
+        if len(parts) == 1:
+            return dict(parts[0])
+        order = np.argsort(np.concatenate([batch.numbers for batch in self._batches]))
+        return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
+
+    def _infos(self, mask: Flags, outcomes: Mapping[int, StepOutcome]) -> dict[str, Infos]:
+        """Returns the infos of the environments of a mask, by agent; reward terms of those that have an outcome."""
+        infos: dict[str, Infos] = {}
+        (infractions,) = self._gathered([{"": batch.infractions.copy()} for batch in self._batches]).values()
+        infractions[~mask] = 0
+        stepped = np.zeros(self.num_envs, dtype=np.bool_)
+        stepped[list(outcomes)] = True
+        stepped &= mask
+        rows, numbers = np.flatnonzero(stepped).tolist(), np.flatnonzero(mask).tolist()
+        for agent, role in _AGENTS.items():
+            masks = self._gathered([batch.views.masks[role].copy() for batch in self._batches])
+            refused = np.full(self.num_envs, None, dtype=object)
+            for number in numbers:
+                refused[number] = self.engines[number].session.refused[role].copy()
+            info = infos[agent] = {
+                "action_mask": {**masks, **dict.fromkeys(self._batches[0].views.unmasked[role])},
+                "_action_mask": mask.copy(),
+                "refused": refused,
+                "_refused": mask.copy(),
+                "infractions": _columns(_KINDS, infractions.copy(), mask),
+                "_infractions": mask.copy(),
+            }
+            if rows:
+                names = tuple(outcomes[rows[0]].reward_terms[role])
+                table = np.zeros((self.num_envs, len(names)))
+                table[rows] = [[*outcomes[number].reward_terms[role].values()] for number in rows]
+                info["reward_terms"], info["_reward_terms"] = _columns(names, table, stepped), stepped.copy()
+        return infos
+
+
+def _columns(names: Sequence[str], table: NDArray[np.generic], mask: Flags) -> Infos:
+    """Returns the columns of a table (num_envs, n) as infos of the environments of a mask."""
+    infos: Infos = {}
+    for k, name in enumerate(names):
+        infos[name], infos[f"_{name}"] = table[:, k], mask.copy()
+    return infos
+
+
+def rows_of(actions: object, count: int, agents: Sequence[str]) -> Sequence[Mapping[str, ActionMapping]]:
+    """Returns the actions of each environment by agent.
+
+    Args:
+        actions: see `DuoWizardVectorEnv.step`.
+        count: number of environments.
+        agents: names of the agents.
+
+    Raises:
+        ValueError: `actions` has another form, or not as many values as there are environments.
+    """
+    if isinstance(actions, Mapping):
+        if missing := [agent for agent in agents if agent not in actions]:
+            raise ValueError(f"the action of {missing[0]} is missing; it is needed from {', '.join(agents)}")
+        stacks = [_unstacked(agent, actions[agent], count) for agent in agents]
+        return [dict(zip(agents, own, strict=True)) for own in zip(*stacks, strict=True)]
+    if not isinstance(actions, Sequence) or isinstance(actions, str) or len(actions) != count:
+        raise ValueError(
+            f"actions is {short_repr(actions)}; it must be a dict of stacked actions by agent, or {count} dicts"
+        )
+    return actions
+
+
+def _unstacked(agent: str, fields: object, count: int) -> list[dict[str, object]]:
+    if not isinstance(fields, Mapping):
+        raise ValueError(f"action of {agent}: expected a dict, got {type(fields).__name__}")
+    columns = []
+    for name, values in fields.items():
+        listed = isinstance(values, Sequence) and not isinstance(values, str)
+        if not (listed or (isinstance(values, np.ndarray) and values.ndim)) or len(values) != count:
+            raise ValueError(
+                f"action of {agent}: field {name!r} is {short_repr(values)}; it must have {count} values, "
+                "one for each environment"
+            )
+        one_each = isinstance(values, np.ndarray) and values.ndim == 1
+        columns.append(values.tolist() if one_each else list(values))
+    return [dict(zip(fields, own, strict=True)) for own in zip(*columns, strict=True)]
