@@ -64,6 +64,17 @@ class RecordArray(Protocol[Record]):
         ...
 
 
+Row = TypeVar("Row", covariant=True)
+
+
+class Rows(Protocol[Row]):
+    """Sequence in Python, or array in compiled code, for functions that both call."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, key: int, /) -> Row: ...
+
+
 def record_dtype(kind: type) -> np.dtype[np.void]:
     """Returns the dtype of a record class, aligned as in C.
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation.by_reference import by_reference, gives_row
 from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray
+from dorothie_gym.envs.interference import PlansRecord
 from dorothie_gym.maps.model import Array
 
 CRUISE_LIMIT: Final = 100
@@ -92,11 +93,13 @@ class DriveArrays(NamedTuple):
         state: (1,) the decision.
         rows: int32 (landmarks,) row of the costs to each landmark, without roadblocks.
         waypoints: (landmarks, 2) places where the ego arrives [m].
+        plans: (1,) plans of the scripted Ad-Wizard.
     """
 
     state: RecordArray[DriveRecord]
     rows: NDArray[np.int32]
     waypoints: Array
+    plans: RecordArray[PlansRecord]
 
 
 @by_reference

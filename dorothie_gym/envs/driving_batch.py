@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import ClassVar
@@ -20,10 +19,9 @@ from dorothie_gym.envs.driving_arrays import EVENTS, Event, Stage, row_of
 from dorothie_gym.envs.driving_rows import DrivingFace, DrivingRows, RowHolder
 from dorothie_gym.envs.driving_start import write_scenario
 from dorothie_gym.envs.driving_steps import act_share, guide_share
-from dorothie_gym.envs.interference import Interference
+from dorothie_gym.envs.interference import Interference, permits_changes
 from dorothie_gym.ontology import LandmarkName, MentalAction, Role
 from dorothie_gym.sim.batch.threads import ThreadPool
-from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.ego_controller import set_goals
 from dorothie_gym.sim.state.world_arrays import lengthened
 from dorothie_gym.sim.world_start import WorldSeeds, start_world
@@ -75,13 +73,12 @@ class DrivingBatch(DrivingRows):
             scenario, [self._row_of_costs((mark.lane, mark.station), ()) for mark in marks],
             number, self._drivers, self._guidances, self._drives,
         )  # fmt: skip
-        self._due[number], self._waited[number] = math.inf, 0
         self._noted.discard(number)
         self._faulty.discard(number)
-        self._note_task(number, TaskState(scenario.storyboard))
         if self._config.exceptions > 0.0:
             face.interference = Interference(self.town, self._limits, scenario, self._config.exceptions)
-            self._due[number] = face.interference.due
+            face.interference.write(self._plans[number])
+        self._note_task(number, TaskState(scenario.storyboard))
 
     # --- A decision ---------------------------------------------------------------------------------------------------
 
@@ -105,7 +102,6 @@ class DrivingBatch(DrivingRows):
         if events & _NEAR:
             for number in np.flatnonzero(state["near"] & playing).tolist():
                 self._arrive(number)
-        self._foresee(playing)
         self._guide()
 
     def _act(self) -> int:
@@ -130,6 +126,7 @@ class DrivingBatch(DrivingRows):
             self._add_costs()
             events |= self._share_guide()
         if events & _LOST:
+            self._foresee()
             self._act()
             self._share_guide()
         if events & _TOLD:
@@ -176,32 +173,25 @@ class DrivingBatch(DrivingRows):
             self._faulty.discard(number)
 
     def _interfere(self, playing: NDArray[np.bool_]) -> None:
-        """Lets the Ad-Wizards act that may."""
+        """Lets the Ad-Wizards act whose plans find a moment."""
         if self._config.exceptions <= 0.0:
             return
-        acts = playing & (plain(self.worlds.clock)[:, 0]["frame"] / FRAME_RATE >= self._due)
-        for number in np.flatnonzero(acts).tolist():
-            face, live = self._face(number), self._live_session(number)
+        for number in np.flatnonzero(playing & self._plans["acts"]).tolist():
+            face, live, plans = self._face(number), self._live_session(number), self._plans[number]
             assert face.interference is not None
-            face.interference.wait(int(self._waited[number]))
             live.begin_decision()
             seen, face.seen = face.seen or LazyObservations(live), None
-            live.play_ad_wizard(face.interference.act(seen))
+            live.play_ad_wizard(face.interference.act(seen, int(plans["count"])))
             self._move_in(number)
-            self._due[number] = face.interference.due
+            face.interference.write(plans)
             self._look(number)
             weather = tuple(live.world.weather.values.values())
             plain(self._drivers.inputs)["weather"][number, 0] = weather
             self._note_task(number, live.task)
-        self._waited[acts] = 0
-        self._waited[playing & ~acts] += 1
 
-    def _foresee(self, playing: NDArray[np.bool_]) -> None:
-        """Lets the Ad-Wizards that may act next observe the path that was driven, before it may be replaced."""
-        if self._config.exceptions <= 0.0 or not self.pedals:
-            return
-        acts = playing & (plain(self.worlds.clock)[:, 0]["frame"] / FRAME_RATE >= self._due)
-        for number in np.flatnonzero(acts).tolist():
+    def _foresee(self) -> None:
+        """Lets the Ad-Wizards that act next observe the paths that are to be replaced."""
+        for number in np.flatnonzero(self._plans["acts"] & (self._decisions["stage"] == Stage.LOST)).tolist():
             self._face(number).seen = seen = LazyObservations(self._live_session(number))
             seen[Role.AD_WIZARD]  # builds them
 
@@ -235,6 +225,7 @@ class DrivingBatch(DrivingRows):
         if task.version == face.version:
             return
         face.version = task.version
+        self._plans[number]["changes"] = face.interference is not None and permits_changes(task)
         subgoals = plain(self._guidances.subgoals)[number]
         for index in range(min(len(task.storyboard.subgoals), len(subgoals))):
             is_open = index in task.live and not task.reached(index)

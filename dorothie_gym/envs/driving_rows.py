@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -48,7 +47,7 @@ ROOMS: Final = ("vehicles", "pedestrians", "props", "course", "steps", "goals")
 """Arrays of a world whose lengths differ between worlds of a town."""
 
 
-CHANGES: Final = ("faces", "_stacks", "_due", "_waited", "_live", "_noted", "_faulty")
+CHANGES: Final = ("faces", "_stacks", "_live", "_noted", "_faulty")
 """Attributes of a batch that hold what changes."""
 
 
@@ -108,7 +107,7 @@ class DrivingRows(Lookups):
         threads: number of threads, the caller's included.
     """
 
-    LOOKED_UP: ClassVar[tuple[str, ...]] = ("_rows", "_blanks", "_decisions", "outcomes", "infractions")
+    LOOKED_UP: ClassVar[tuple[str, ...]] = ("_rows", "_blanks", "_decisions", "_plans", "outcomes", "infractions")
 
     def __init__(
         self, town: Town, template: StoryboardTemplate | None, config: NavigationConfig, count: int, threads: int,
@@ -140,7 +139,6 @@ class DrivingRows(Lookups):
         self.frames, self.pedals = self._session_config.frames, pedals
         self.faces: list[DrivingFace | None] = [None] * count
         self._stacks: list[Any] = []
-        self._due, self._waited = np.full(count, math.inf), np.zeros(count, dtype=np.int64)
         self._live = np.zeros(count, dtype=np.int64)
         self._turns = turns_of(count, self.threads)
         self._noted, self._faulty = set[int](), set[int]()
@@ -278,6 +276,10 @@ class DrivingRows(Lookups):
     @cached_property
     def _decisions(self) -> NDArray[np.void]:
         return plain(self._drives.state)[:, 0]
+
+    @cached_property
+    def _plans(self) -> NDArray[np.void]:
+        return plain(self._drives.plans)[:, 0]
 
     def heard(self, number: int) -> HeardInstruction:
         """Returns the last instruction of an environment, as its driver remembers it."""

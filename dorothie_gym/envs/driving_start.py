@@ -13,6 +13,7 @@ from dorothie_gym.compilation.records import empty_records, plain
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.envs.driving_arrays import DriveArrays, DriveRecord, Stage, row_of
 from dorothie_gym.envs.episode import EpisodeArrays, episode_arrays
+from dorothie_gym.envs.interference import PlansRecord
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.pedals import CONTINUOUS_FIELDS
 from dorothie_gym.maps import Town
@@ -68,8 +69,9 @@ def blank_parts(
     guidance.now["by_name"] = config.guidance is Guidance.GOALS
     drive = DriveArrays(
         empty_records(DriveRecord, 1), np.zeros(limits.landmarks, dtype=np.int32),
-        np.full((limits.landmarks, 2), math.inf),
+        np.full((limits.landmarks, 2), math.inf), empty_records(PlansRecord, 1),
     )  # fmt: skip
+    drive.plans["due"] = math.inf
     drive.state["landmark"] = drive.state["goal_lane"] = drive.state["told_lane"] = -1
     drive.state["stage"], drive.state["begins"] = Stage.GUIDING, True
     return driver, guidance, episode_arrays(config), drive

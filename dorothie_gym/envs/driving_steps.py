@@ -25,6 +25,7 @@ from dorothie_gym.envs.driving_arrays import (
     row_of,
 )
 from dorothie_gym.envs.episode import EpisodeArrays, judge
+from dorothie_gym.envs.interference import look_for_moment
 from dorothie_gym.envs.pedals import find_path, has_lost_path, instructed_manoeuvre, observe_path
 from dorothie_gym.maps.route_arrays import RouteSearch
 from dorothie_gym.maps.routing_graph import RoutingGraph
@@ -315,6 +316,7 @@ def guide_share(
             world, driver, guidance = row_of(worlds, number), row_of(drivers, number), row_of(guidances, number)
             waited = state.stage == _NO_COSTS
             if state.stage == _GUIDING:
+                look_for_moment(tables.lanes, guidance.marks, world, drive.plans[0])
                 guide(tables, graph, row_of(searches, home), town, common, world, driver, guidance, drive)
             if state.stage == _GUIDING or waited:
                 finish(graph, common, world, guidance, row_of(episodes, number), drive)

@@ -6,10 +6,11 @@ import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
+from dorothie_gym.compilation.records import Rows
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar
@@ -161,6 +162,20 @@ class AdWizardState:
         return replace(self, roadblocks=self.roadblocks + 1)
 
 
+class PlaceOfLandmark(Protocol):
+    """Landmark, in an observation or in an array."""
+
+    @property
+    def lane(self) -> int:
+        """Lane of the place where a car stops for it."""
+        ...
+
+    @property
+    def station(self) -> float:
+        """Distance of that place along the lane [m]."""
+        ...
+
+
 Outcome: TypeAlias = tuple[AdWizardAction | None, AdWizardState]
 """Action of a trick, or None where it finds no moment, and the new state."""
 
@@ -296,11 +311,11 @@ def _roadblock(state: AdWizardState, observation: ObservationMapping, now: float
         return None, state
     lane, station = place
     town_lane = state.town.lanes[lane]
-    goals = [mark.station for mark in read_landmarks(observation, state.town) if mark.lane == lane]
-    begin, end = config.roadblock_margins
-    if town_lane.in_junction or not begin < station < town_lane.length - end:
-        return None, state
-    if any(abs(goal - station) < config.roadblock_clearance for goal in goals):
+    marks = read_landmarks(observation, state.town)
+    suits = suits_roadblock(
+        marks, lane, station, town_lane.length, config.roadblock_margins, config.roadblock_clearance
+    )  # fmt: skip
+    if town_lane.in_junction or not suits:
         return None, state
     point = town_lane.position(round(station))
     removal = Restoration(at=now + config.roadblock_time, prop=(float(point[0]), float(point[1])))
@@ -310,6 +325,28 @@ def _roadblock(state: AdWizardState, observation: ObservationMapping, now: float
         place=LanePosition(lane=lane, metres=round(station)),
     )
     return action, state.after_roadblock().with_restoration(removal)
+
+
+def suits_roadblock(
+    marks: Rows[PlaceOfLandmark], lane: int, station: float, length: float, margins: tuple[float, float],
+    clearance: float,
+) -> bool:  # fmt: skip
+    """Returns whether a roadblock at a place leaves room before it, behind it, and around landmarks.
+
+    Args:
+        marks: landmarks.
+        lane: number of the lane.
+        station: distance along it [m].
+        length: its length [m].
+        margins: least distances from its beginning and its end [m].
+        clearance: least distance from places where a car stops for a landmark [m].
+    """
+    if not margins[0] < station < length - margins[1]:
+        return False
+    for k in range(len(marks)):
+        if marks[k].lane == lane and abs(marks[k].station - station) < clearance:
+            return False
+    return True
 
 
 def _weather(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:

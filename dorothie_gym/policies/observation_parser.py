@@ -6,10 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dorothie_gym.compilation.records import Rows
 from dorothie_gym.dialogue import ParsedText, guess_spans, understand
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import (
@@ -229,16 +231,38 @@ def place_on_path(town: Town, observation: ObservationMapping, ahead: float) -> 
         observation: observation of the Ad-Wizard.
         ahead: distance along the path [m].
     """
-    lanes = [int(lane) - 1 for lane in observation["path_lanes"] if lane > 0]
-    current = int(observation["lane"])
-    if not lanes or lanes[0] != current:
-        return None
-    left = scalar(observation, "station") + ahead
-    for lane in lanes:
-        if left <= town.lanes[lane].length:
-            return lane, left
-        left -= town.lanes[lane].length
-    return None
+    start = scalar(observation, "station") + ahead
+    lane, station = place_ahead(town.lanes, observation["path_lanes"].tolist(), int(observation["lane"]), start)
+    return (lane, station) if lane >= 0 else None
+
+
+class LaneLength(Protocol):
+    """Lane of a town or of its arrays."""
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        ...
+
+
+def place_ahead(lanes: Rows[LaneLength], path: Rows[int], lane: int, ahead: float) -> tuple[int, float]:
+    """Returns lane and station of a place on a path; lane -1 beyond its end, and if the path does not begin here.
+
+    Args:
+        lanes: lanes of the town.
+        path: 1 + number of each lane of the path, 0 behind its end.
+        lane: lane of the car.
+        ahead: distance from the beginning of that lane [m].
+    """
+    for k in range(len(path)):
+        number = path[k] - 1
+        if number < 0 or (k == 0 and number != lane):
+            break
+        length = lanes[number].length
+        if ahead <= length:
+            return number, ahead
+        ahead -= length
+    return -1, 0.0
 
 
 # --- heard utterances -------------------------------------------------------------------------------------------------

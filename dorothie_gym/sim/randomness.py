@@ -54,6 +54,16 @@ def seed_of(first: int, second: int, pool: NDArray[np.int64]) -> int:
         second: likewise.
         pool: (4,) scratch.
     """
+    _fill_pool(first, second, pool)
+    return _hashed(pool[0], _OUTPUT, _OUTPUT_FACTOR)
+
+
+_OUTPUT, _OUTPUT_FACTOR = 0x8B51F9DD, 0x58F38DED
+"""First constant of the hash of the pool's words, and its factor from each to the next."""
+
+
+@compiled
+def _fill_pool(first: int, second: int, pool: NDArray[np.int64]) -> None:
     constant = 0x43B0D7E5
     for k in range(POOL):
         pool[k] = _hashed(first if k == 0 else second if k == 1 else 0, constant, 0x931E8875)
@@ -65,7 +75,6 @@ def seed_of(first: int, second: int, pool: NDArray[np.int64]) -> int:
                 mixed = 0xCA01F9DD * int(pool[target]) - 0x4973F715 * hashed & MASK
                 pool[target] = mixed ^ mixed >> 16
                 constant = constant * 0x931E8875 & MASK
-    return _hashed(pool[0], 0x8B51F9DD, 0x58F38DED)
 
 
 @compiled
@@ -101,6 +110,40 @@ def begin_stream(stream: RandomStream, generator: np.random.Generator) -> None:
 
 
 @compiled
+def seed_stream(stream: RandomStream, first: int, second: int, pool: NDArray[np.int64]) -> None:
+    """Begins the stream of `numpy.random.default_rng((first, second))`; see `seed_of`."""
+    _fill_pool(first, second, pool)
+    stream.state_high, stream.state_low = _seed_words(pool, 0) & _MASK64, _seed_words(pool, 2) & _MASK64
+    high, low = _seed_words(pool, 4), _seed_words(pool, 6)
+    stream.step_high = (high << 1 | (low >> 63 & 1)) & _MASK64
+    stream.step_low = (low << 1 | 1) & _MASK64
+    _add_step(stream)
+    _next_bits(stream)
+
+
+@compiled
+def _seed_words(pool: NDArray[np.int64], first: int) -> int:
+    """Returns two of the words that a seed sequence generates as a number of 64 bits, the lower one first."""
+    constant, bits = _OUTPUT, 0
+    for k in range(first + 2):
+        word = _hashed(pool[k % POOL], constant, _OUTPUT_FACTOR)
+        constant = constant * _OUTPUT_FACTOR & MASK
+        if k >= first:
+            bits |= word << 32 * (k - first)
+    return bits
+
+
+@compiled
+def _add_step(stream: RandomStream) -> None:
+    """Adds the increment of a stream to its state."""
+    low, step = int(stream.state_low), int(stream.step_low)
+    total = (low + step) & _MASK64
+    overflow = (((low & step) | ((low | step) & ~total)) >> 63) & 1
+    stream.state_high = (int(stream.state_high) + int(stream.step_high) + overflow) & _MASK64
+    stream.state_low = total
+
+
+@compiled
 def _next_bits(stream: RandomStream) -> int:
     """Returns 64 random bits, and advances a stream (PCG's XSL-RR).
 
@@ -113,19 +156,16 @@ def _next_bits(stream: RandomStream) -> int:
     carry = ((first >> 32) & MASK) + (second & MASK) + (third & MASK)
     product = fourth + ((second >> 32) & MASK) + ((third >> 32) & MASK) + (carry >> 32)
     high = (product + high * _LOW + low * _HIGH) & _MASK64
-    low = (low * _LOW) & _MASK64
-    step = int(stream.step_low)
-    total = (low + step) & _MASK64
-    overflow = (((low & step) | ((low | step) & ~total)) >> 63) & 1
-    high, low = (high + int(stream.step_high) + overflow) & _MASK64, total
-    stream.state_high, stream.state_low = high, low
+    stream.state_high, stream.state_low = high, (low * _LOW) & _MASK64
+    _add_step(stream)
+    high, low = int(stream.state_high), int(stream.state_low)
     turn, bits = (high >> 58) & 63, high ^ low
     return ((bits >> turn) & (_MASK64 >> turn)) | ((bits << ((64 - turn) & 63)) & _MASK64)
 
 
 @compiled
-def _next_share(stream: RandomStream) -> float:
-    """Returns a number in [0, 1)."""
+def draw_share(stream: RandomStream) -> float:
+    """Returns a number in [0, 1), as `numpy.random.Generator.random`, and advances a stream."""
     return float(((_next_bits(stream) >> 11) & 0x1FFFFFFFFFFFFF) * (1.0 / 9007199254740992.0))
 
 
@@ -142,10 +182,10 @@ def draw_normal(stream: RandomStream) -> float:
             return float(number)
         if layer == 0:
             while True:
-                beyond = -_INVERSE_TAIL * math.log1p(-_next_share(stream))
-                height = -math.log1p(-_next_share(stream))
+                beyond = -_INVERSE_TAIL * math.log1p(-draw_share(stream))
+                height = -math.log1p(-draw_share(stream))
                 if height + height > beyond * beyond:
                     return -(_TAIL + beyond) if (place >> 8) & 1 else _TAIL + beyond
-        height = (_HEIGHTS[layer - 1] - _HEIGHTS[layer]) * _next_share(stream) + _HEIGHTS[layer]
+        height = (_HEIGHTS[layer - 1] - _HEIGHTS[layer]) * draw_share(stream) + _HEIGHTS[layer]
         if height < math.exp(-0.5 * number * number):
             return float(number)

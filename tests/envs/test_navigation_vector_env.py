@@ -10,11 +10,16 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
+from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_continuous_vector_env import NavigationContinuousVectorEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.ad_wizard import AdWizardState, ScriptedAdWizard
+from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.state.codes import Walk
+from dorothie_gym.spaces import AdWizardAction, Observation, SpaceLimits
 from tests.envs.navigation_drivers import drive, obey
 
 NAVIGATION, CONTINUOUS = "dorothie_gym/Navigation-v0", "dorothie_gym/Navigation-continuous-v0"
@@ -272,3 +277,33 @@ def test_session_that_is_looked_up_late_is_the_one_that_was_played() -> None:
         np.testing.assert_array_equal(late.world.localizer.pose, session.world.localizer.pose)
         np.testing.assert_array_equal(late.world.seen(), session.world.seen())
     assert any(session.beliefs.goals for session in sessions)
+
+
+@pytest.mark.parametrize("town", ["brookside", "midtown"])
+def test_ad_wizard_is_asked_at_the_decisions_at_which_it_acts(town: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, step = [], ScriptedAdWizard.step
+
+    def note(wizard: ScriptedAdWizard, observation: Observation, state: AdWizardState) -> Any:
+        asked.append((state.seed, state.count))
+        return step(wizard, observation, state)
+
+    monkeypatch.setattr(ScriptedAdWizard, "step", note)
+    env = NavigationVectorEnv(10, town, traffic="medium", exceptions=4.0, autoreset_mode=AutoresetMode.DISABLED)
+    observations, infos = env.reset(seed=20)
+    (batch,) = env.batches
+    wizard = ScriptedAdWizard(SpaceLimits.for_town(batch.town), rate=4.0)
+    seeds = [policy_seed(batch.catch_up(number).scenario.seed, Role.AD_WIZARD) for number in range(10)]
+    states, idle = [wizard.initial_state(seed, batch.town) for seed in seeds], AdWizardAction().encode(wizard.limits)
+    expected = []
+    for _ in range(400):
+        for number, before in enumerate(states):
+            seen = LazyObservations(batch.catch_up(number))["ad_wizard"]
+            action, states[number] = step(wizard, seen, before)
+            if any(not np.array_equal(action[name], idle[name]) for name in idle):
+                expected.append((before.seed, before.count))
+        actions = [obey(*each) for each in zip(observations, infos["action_mask"], strict=True)]
+        observations, _, terminations, truncations, infos = env.step(np.array(actions))
+        if (terminations | truncations).any():
+            break
+    assert len(expected) > 3
+    assert asked == expected

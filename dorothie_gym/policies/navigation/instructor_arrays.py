@@ -63,7 +63,10 @@ class SubgoalRecord:
 
 
 class MarkRecord:
-    """A landmark: its place, name (`LandmarkName`, 0 for an unused row), and whether the Co-Wizard's map shows it."""
+    """A landmark: its place, name (`LandmarkName`), and whether the Co-Wizard's map shows it.
+
+    An unused row has the lane -1 and the name 0.
+    """
 
     station: Float
     lane: Int32
@@ -156,5 +159,6 @@ def instructor_arrays(*, subgoals: int, landmarks: int, streets: int, things: in
         ahead=np.zeros(LEGS_AHEAD, dtype=np.int32),
         said=argument(empty_records(InstructionRecord, 1)),
     )
+    arrays.marks["lane"] = NONE
     arrays.route["subgoal"] = arrays.route["landmark"] = NONE
     return arrays

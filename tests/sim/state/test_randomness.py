@@ -4,7 +4,7 @@ import pytest
 from dorothie_gym.compilation import compiled
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle
-from dorothie_gym.sim.randomness import POOL, begin_stream, choose, draw, draw_normal, seed_of
+from dorothie_gym.sim.randomness import POOL, begin_stream, choose, draw, draw_normal, draw_share, seed_of, seed_stream
 from dorothie_gym.sim.state.records import LocalizerRecord, empty_records
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
@@ -41,6 +41,26 @@ def test_seeds_are_those_of_numpy():
     numbers = np.random.default_rng(0).integers(0, 1 << 32, (500, 2)).tolist()
     for first, second in [(0, 0), (1, 0), ((1 << 32) - 1, (1 << 32) - 1), *numbers]:
         assert seed_of(first, second, pool) == np.random.SeedSequence((first, second)).generate_state(1)[0]
+
+
+@compiled
+def fill_shares(stream, first, second, pool, numbers):
+    seed_stream(stream, first, second, pool)
+    for k in range(len(numbers)):
+        numbers[k] = draw_share(stream)
+
+
+def test_seeded_streams_are_those_of_numpy():
+    pool, drawn, stream = np.zeros(POOL, dtype=np.int64), np.empty(20), empty_records(LocalizerRecord, 1)[0]
+    numbers = np.random.default_rng(1).integers(0, 1 << 32, (500, 2)).tolist()
+    for first, second in [(0, 0), (1, 0), ((1 << 32) - 1, (1 << 32) - 1), *numbers]:
+        fill_shares(stream, first, second, pool, drawn)
+        assert drawn.tobytes() == np.random.default_rng((first, second)).random(20).tobytes()
+    plain = getattr(seed_stream, "py_func", seed_stream)
+    other = empty_records(LocalizerRecord, 1)[0]
+    plain(other, first, second, pool)
+    seed_stream(stream, first, second, pool)
+    assert other == stream
 
 
 @compiled
