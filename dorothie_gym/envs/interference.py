@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.records import Flag, Float, Int32, Int64, RecordArray, UInt64
-from dorothie_gym.engine.path_measurements import write_lanes
 from dorothie_gym.engine.scenario import Scenario
+from dorothie_gym.engine.view_steps import write_lanes
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing_graph import RoutingLane
 from dorothie_gym.ontology import Role
@@ -128,7 +128,6 @@ def finds_moment(
 @compiled
 def note_path(world: WorldArrays, path: NDArray[np.int64]) -> None:
     """Writes the lanes ahead, as the Ad-Wizard observes them."""
-    path[:] = 0
     points = int(world.plan[0].points)
     write_lanes(world.course, points, point_before(world.course, points, world.car[0].s), path)
 
