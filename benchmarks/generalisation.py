@@ -20,6 +20,7 @@ from dorothie_gym.analysis.intervals import Estimate
 from dorothie_gym.baselines.rl.checkpoint import load_model
 from dorothie_gym.baselines.rl.evaluation import FIRST_SEED, EpisodeStatistics, evaluate_settings, greedy_policy
 from dorothie_gym.baselines.rl.run import BEST
+from dorothie_gym.cli.output import reporting_errors
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
 
 FIRST_TEST: Final = FIRST_SEED + 500_000
@@ -32,13 +33,16 @@ def main(
     guidance: Annotated[str, typer.Option(help="turns or goals")] = "goals",
     exceptions: Annotated[float, typer.Option(help="average number of exceptions in a session")] = 2.0,
     steps: Annotated[int | None, typer.Option(help="steps of a training; default: tuned")] = None,
-    seeds: Annotated[int, typer.Option(help="number of trainings")] = 5,
-    episodes: Annotated[int, typer.Option(help="episodes in each map")] = 100,
+    seeds: Annotated[int, typer.Option(min=1, help="number of trainings")] = 5,
+    episodes: Annotated[int, typer.Option(min=1, help="episodes in each map")] = 100,
     work: Annotated[Path, typer.Option(help="folder of the trainings")] = Path("runs/generalisation"),
     as_json: Annotated[bool, typer.Option("--json")] = False,
 ) -> None:
     """Prints success by town with the 95 % interval of the mean over trainings."""
     torch.set_num_threads(1)
+    with reporting_errors():
+        for each in maps or []:
+            load_town(each)  # before the first training
     towns = [*SEEN_TOWNS, *UNSEEN_TOWNS, *(maps or [])]
     rows: dict[str, dict[int, EpisodeStatistics]] = {town: {} for town in towns}
     for seed in range(seeds):

@@ -1,4 +1,4 @@
-"""Steps per second of `Navigation-v0`: as a batch, alone, its physics alone, and highway-env's `intersection-v0`."""
+"""Steps per second of `Navigation-v0`: as a batch, alone, its physics alone; of highway-env and MetaDrive."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from dorothie_gym.bench.metadrive import MetaDriveReference, metadrive_reference
 from dorothie_gym.bench.timing import Figures, Progress, ignore_progress, rounded, wall_seconds
 from dorothie_gym.envs.driving_arrays import row_of
 from dorothie_gym.envs.driving_batch import DrivingBatch
@@ -60,8 +61,9 @@ def measure(
 
     Returns:
         `batch_steps_per_second` of all environments together, `kernel_steps_per_second` of the physics of the same
-        worlds alone, `single_steps_per_second` of one environment, `stock_steps_per_second` of `intersection-v0`, and
-        `step_shares` of the time of a step of the batch by `PARTS`.
+        worlds alone, `single_steps_per_second` of one environment, `stock_steps_per_second` of `intersection-v0`,
+        `metadrive_steps_per_second` of MetaDrive or None where it is not installed, and `step_shares` of the time of a
+        step of the batch by `PARTS`.
     """
     progress("environments", 0.0)
     rng = np.random.default_rng(seed)
@@ -72,13 +74,16 @@ def measure(
     single = NavigationEnv(town, traffic=traffic, exceptions=exceptions)
     envs.reset(seed=seed)
     single.reset(seed=seed)
-    stock = StockIntersection(seed)
+    references: dict[str, StockIntersection | MetaDriveReference] = {"stock": StockIntersection(seed)}
+    metadrive = metadrive_reference(seed)
+    if metadrive is not None:
+        references["metadrive"] = metadrive
     kernel = _Kernel(envs)
     works: dict[str, Callable[[], tuple[float, int]]] = {
         "batch": lambda: _play_batch(envs, rng, decisions),
         "kernel": kernel.step,
         "single": lambda: _play_single(single, rng, 2 * decisions),
-        "stock": lambda: _play_stock(stock, 10),
+        **{name: partial(_play_reference, reference, 10) for name, reference in references.items()},
     }
     for _ in range(2):
         _play_batch(envs, rng, WARM_UP_DECISIONS // 2)
@@ -93,7 +98,8 @@ def measure(
                 seconds, steps = work()
             rates[name].append(steps / seconds)
             spent["total"] += seconds if name == "batch" else 0.0
-    stock.close()
+    for reference in references.values():
+        reference.close()
     envs.close()
     medians = {name: statistics.median(values) for name, values in rates.items()}
     acting, guiding = spent["act_share"] / spent["total"], spent["guide_share"] / spent["total"]
@@ -105,6 +111,7 @@ def measure(
         "exceptions": exceptions,
         "batch": environments,
         "threads": envs.threads,
+        "metadrive_steps_per_second": None,
         **{f"{name}_steps_per_second": rounded(rate) for name, rate in medians.items()},
         "of_kernel": round(medians["batch"] / medians["kernel"], 3),
         "step_shares": {name: round(value, 3) for name, value in zip(PARTS, shares, strict=True)},
@@ -156,12 +163,12 @@ def _play_single(env: NavigationEnv, rng: np.random.Generator, decisions: int) -
     return spent, decisions
 
 
-def _play_stock(stock: StockIntersection, steps: int) -> tuple[float, int]:
-    """Returns the time of some steps of highway-env's environment, without resets, and their number."""
+def _play_reference(reference: StockIntersection | MetaDriveReference, steps: int) -> tuple[float, int]:
+    """Returns the time of some steps of another simulator's environment, without resets, and their number."""
     spent = 0.0
     for _ in range(steps):
-        stock.prepare()
-        spent += wall_seconds(stock.step)
+        reference.prepare()
+        spent += wall_seconds(reference.step)
     return spent, steps
 
 

@@ -210,6 +210,8 @@ def rl_report(figures: Figures) -> Report:
                 label="intersection-v0\nof highway-env", value=figures["stock_steps_per_second"], reference=True
             ),
         ]  # fmt: skip
+        if figures["metadrive_steps_per_second"] is not None:
+            rows.append(Measurement(label="MetaDrive", value=figures["metadrive_steps_per_second"], reference=True))
         parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in figures["step_shares"].items())
         notes.append(f"a step of the batch: {parts}; {figures['of_kernel']:.0%} of the rate of its physics")
         notes.append(f"memory: {figures['bytes_per_environment'] / 1024:.0f} KB an environment")

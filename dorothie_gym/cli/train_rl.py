@@ -31,6 +31,9 @@ Settings = TypeVar("Settings", bound="RunSettings")
 DEFAULT_ENV = "dorothie_gym/Navigation-v0"
 """Environment of train-rl."""
 
+CONTINUOUS_ENV = "dorothie_gym/Navigation-continuous-v0"
+"""Environment of algorithms that need continuous actions."""
+
 Given: TypeAlias = Mapping[str, object]
 """Settings from the command line, by name; None keeps the default."""
 
@@ -49,7 +52,7 @@ def train_rl(
         str | None,
         typer.Option(
             metavar="ID",
-            help=f"Id of the environment; default {DEFAULT_ENV}; selfplay has its own.",
+            help=f"Id of the environment; default {DEFAULT_ENV}, for sac {CONTINUOUS_ENV}; selfplay has its own.",
             autocompletion=complete_env,
         ),
     ] = None,
@@ -82,6 +85,9 @@ def train_rl(
             metavar="DIR", help="Corpus for behaviour cloning before training (PPO and A2C on Navigation-v0; selfplay)."
         ),
     ] = None,
+    device: Annotated[
+        str | None, typer.Option(help="Device of the networks, such as cuda; default cpu. Not for selfplay.")
+    ] = None,
     ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:
@@ -101,9 +107,12 @@ def train_rl(
         if algorithm == "selfplay":
             if env is not None:
                 fail("--env: selfplay uses DuoWizardEnv; omit the option, and choose a town with --set town=NAME")
+            if device is not None:
+                fail("--device: the networks of selfplay are trained on the processor; omit the option")
             _train_selfplay(out, given, changes, ray=ray, as_json=as_json)
         else:
-            _train(algorithm, env or DEFAULT_ENV, out, given, changes, ray=ray, as_json=as_json)
+            env = env or (CONTINUOUS_ENV if algorithm == "sac" else DEFAULT_ENV)
+            _train(algorithm, env, out, given, changes, ray=ray, device=device, as_json=as_json)
 
 
 def _read_settings(given: list[str]) -> dict[str, object]:
@@ -145,7 +154,15 @@ def _reporting_errors() -> Iterator[None]:
 
 
 def _train(
-    algorithm: str, env: str, out: Path, given: Given, changes: Given, *, ray: str | None, as_json: bool
+    algorithm: str,
+    env: str,
+    out: Path,
+    given: Given,
+    changes: Given,
+    *,
+    ray: str | None,
+    device: str | None,
+    as_json: bool,
 ) -> None:
     """Trains a model of stable-baselines3 and prints the result.
 
@@ -156,6 +173,7 @@ def _train(
         given: arguments of the environment.
         changes: other settings.
         ray: address of a Ray cluster that steps the environments, or None.
+        device: device of the networks; None for the processor.
         as_json: whether to print one JSON object and nothing else.
     """
     from dorothie_gym.baselines.rl import Training, tuned_settings
@@ -168,7 +186,7 @@ def _train(
     if ray is None and settings.env.startswith("dorothie_gym/"):
         compile_first(batches=has_batch(settings.env) and settings.workers == 0)
     with _progress(settings.steps, out, _line, quiet=as_json) as (on_progress, on_stage):
-        result = Training(settings, out, on_progress, ray, on_stage).run()
+        result = Training(settings, out, on_progress, ray, on_stage, device or "cpu").run()
     if as_json:
         best = best_of(result.rows)
         print_json({**_facts(result, settings), "best": None if best is None else best.as_json()})
@@ -176,6 +194,7 @@ def _train(
         _show(result, settings)
     if not result.finished:
         arguments = [settings.algorithm, "--env", settings.env, "--out", str(out)]
+        arguments += ["--device", device] if device else []
         _exit_interrupted(result.steps, settings, out, _command(arguments, given, settings, ray))
 
 

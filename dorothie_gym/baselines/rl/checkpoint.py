@@ -29,7 +29,7 @@ from dorothie_gym.baselines.rl.settings import (
 )
 from dorothie_gym.baselines.rl.vector_env import AnyEnv
 from dorothie_gym.baselines.tensor_files import save_tensors
-from dorothie_gym.errors import InputFileError, ModelFileError, SettingsError, one_line
+from dorothie_gym.errors import InputFileError, ModelFileError, SettingsError, one_line, short_repr
 from dorothie_gym.files import replacing
 from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, raising, read_json
 from dorothie_gym.policies.policy_loader import DESCRIPTION
@@ -52,16 +52,19 @@ MODEL_FORMAT: Final = 1
 """Version of the two files."""
 
 
-def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv) -> Model:
+def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv, device: str = "cpu") -> Model:
     """Returns an untrained model.
 
     Args:
         settings: settings of the training.
         env: an environment, or a vector of them.
+        device: device of the networks, as torch names it: `cpu`, `cuda`, `cuda:1`.
 
     Raises:
-        SettingsError: the algorithm does not accept the environment's actions, or a parameter.
+        SettingsError: the algorithm does not accept the environment's actions, or a parameter; or this machine has no
+            such device.
     """
+    _check_device(device)
     package, name = ALGORITHMS[settings.algorithm]
     parameters = dict(settings.parameters)
     last = parameters.pop(FINAL_RATE, None)
@@ -70,11 +73,23 @@ def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv) -> Model:
         parameters["learning_rate"] = LinearSchedule(float(parameters["learning_rate"]), float(last))
     try:
         return getattr(import_module(package), name)(
-            "MlpPolicy", env, policy_kwargs={"net_arch": list(settings.network)}, seed=settings.seed, device="cpu",
+            "MlpPolicy", env, policy_kwargs={"net_arch": list(settings.network)}, seed=settings.seed, device=device,
             **parameters,
         )  # fmt: skip
-    except (AssertionError, TypeError, ValueError) as error:
+    except AssertionError as error:
+        raise SettingsError(
+            f"{settings.algorithm} on {settings.env}: {settings.algorithm} cannot choose actions of {env.action_space}"
+        ) from error
+    except (TypeError, ValueError) as error:
         raise SettingsError(f"{settings.algorithm} on {settings.env}: {error}") from error
+
+
+def _check_device(device: str) -> None:
+    """Raises `SettingsError` unless torch can calculate on a device."""
+    try:
+        torch.zeros(1, device=device).item()
+    except (RuntimeError, AssertionError, NotImplementedError) as error:  # torch raises any of these
+        raise SettingsError(f"device {short_repr(device)} cannot be used: {one_line(error)}") from error
 
 
 class LinearSchedule:

@@ -52,7 +52,7 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
     try:
         env: AnyEnv = gym.make(name, disable_env_checker=True, **each_town(settings or {})[0])
     except (gym.error.Error, TypeError, ValueError) as error:
-        raise SettingsError(f"env {name}: {error}") from error
+        raise SettingsError(f"env {name}: {error.__cause__ or error}") from error
     observed, acted = env.observation_space, env.action_space
     if isinstance(observed, spaces.Box) and len(observed.shape) == 1 and isinstance(acted, _PLAIN):
         return env
@@ -60,10 +60,16 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
 
 
 def each_town(settings: Arguments) -> list[Arguments]:
-    """Returns the arguments of an environment for each of its towns, which several environments take in turn."""
+    """Returns the arguments of an environment for each of its towns, which several environments take in turn.
+
+    Raises:
+        SettingsError: the list of towns is empty.
+    """
     towns = settings.get(TOWN)
-    if not isinstance(towns, list | tuple) or not towns:
+    if not isinstance(towns, list | tuple):
         return [settings]
+    if not towns:
+        raise SettingsError(f"{TOWN} is []; it must have at least one town")
     return [{**settings, TOWN: town} for town in towns]
 
 

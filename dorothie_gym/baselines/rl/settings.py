@@ -146,18 +146,23 @@ class TrainingSettings(RunSettings):
     def __post_init__(self) -> None:
         _check_algorithm(self.algorithm)
         super().__post_init__()
-        entropy = self.parameters.get("ent_coef")
-        falls = self.algorithm in ON_POLICY and isinstance(entropy, int | float)
-        if FINAL_ENTROPY in self.parameters and not falls:
-            raise SettingsError(
-                f"parameters.{FINAL_ENTROPY} needs a number ent_coef of {', '.join(ON_POLICY)}; "
-                f"ent_coef of {self.algorithm} is {short_repr(entropy)}"
-            )
+        if FINAL_ENTROPY in self.parameters:
+            self._check_entropy()
         if self.warm_start is not None and (self.algorithm not in ON_POLICY or self.env != NAVIGATION):
             raise SettingsError(
                 f"warm_start: {self.algorithm} on {self.env} cannot learn from a corpus; {', '.join(ON_POLICY)} "
                 f"on {NAVIGATION} can"
             )
+
+    def _check_entropy(self) -> None:
+        entropy, final = self.parameters.get("ent_coef"), self.parameters[FINAL_ENTROPY]
+        if self.algorithm not in ON_POLICY or not isinstance(entropy, int | float):
+            raise SettingsError(
+                f"parameters.{FINAL_ENTROPY} needs a number ent_coef of {', '.join(ON_POLICY)}; "
+                f"ent_coef of {self.algorithm} is {short_repr(entropy)}"
+            )
+        if not isinstance(final, int | float):
+            raise SettingsError(f"parameters.{FINAL_ENTROPY} is {short_repr(final)}; it must be a number")
 
     @property
     def masked(self) -> bool:

@@ -19,6 +19,7 @@ from dorothie_gym.processors import available_processors
 
 ALONE = (
     "batch_steps_per_second", "kernel_steps_per_second", "single_steps_per_second", "stock_steps_per_second",
+    "metadrive_steps_per_second",
 )  # fmt: skip
 """Figures without a learner; None for other environments than `Navigation-v0`."""
 

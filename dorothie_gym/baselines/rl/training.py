@@ -87,6 +87,7 @@ class Training(Run[TrainingEvaluation]):
         on_progress: OnProgress[TrainingEvaluation] | None = None,
         ray: str | None = None,
         on_stage: OnStage = ignore_stage,
+        device: str = "cpu",
     ) -> None:
         """Prepares a training, or resumes the one in the folder.
 
@@ -96,9 +97,10 @@ class Training(Run[TrainingEvaluation]):
             on_progress: callback for the progress.
             ray: address of a Ray cluster that steps the environments; None for this machine.
             on_stage: callback for the progress of a warm start.
+            device: device of the networks, as torch names it; the files do not depend on it.
 
         Raises:
-            SettingsError: the folder holds a training with other settings, or the settings are invalid.
+            SettingsError: the folder holds a training with other settings, or the settings or the device are invalid.
             ProcessError: Ray is not installed, or there is no cluster at the address.
             SessionError: the corpus of the warm start cannot be read or replayed.
             ModelFileError: the run in the folder is damaged.
@@ -111,7 +113,7 @@ class Training(Run[TrainingEvaluation]):
         self._checkpoint_after = 0.0  # time of `time.perf_counter`
         self._vector = make_training_env(settings, ray)
         try:
-            self.model: Model = make_model(settings, self._vector)
+            self.model: Model = make_model(settings, self._vector, device)
             self.model.set_logger(self._make_logger(settings.algorithm))
             if begun is not None:
                 restore_state(self.model, begun)

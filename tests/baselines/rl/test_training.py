@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+pytest.importorskip("torch", reason="needs the extra 'baselines'")
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+
+import torch
 
 from dorothie_gym.baselines.rl import ALGORITHMS, Training, TrainingSettings, load_model, tuned_settings
 from dorothie_gym.baselines.rl import training as training_module
@@ -69,6 +72,8 @@ def test_weight_of_the_entropy_falls_to_its_last_value(tmp_path: Path) -> None:
         settings_for("sac", parameters={**SMALL["sac"], "final_ent_coef": 0.0})
     with pytest.raises(SettingsError, match="final_ent_coef"):
         settings_for("ppo", parameters={"final_ent_coef": 0.0})
+    with pytest.raises(SettingsError, match="final_ent_coef is 'low'"):
+        settings_for("ppo", parameters={"ent_coef": 0.01, "final_ent_coef": "low"})
 
 
 def test_rollouts_keep_their_size_with_other_numbers_of_environments() -> None:
@@ -90,6 +95,33 @@ def test_driver_of_several_towns(tmp_path: Path) -> None:
         Training(settings_for("maskable_ppo", env_settings=towns, workers=2), tmp_path / "workers")
     with pytest.raises(SettingsError, match="town"):
         Training(settings_for("maskable_ppo", env_settings={"town": ["brookside", "nowhere"]}), tmp_path / "unknown")
+    with pytest.raises(SettingsError, match="at least one town"):
+        Training(settings_for("maskable_ppo", env_settings={"town": []}), tmp_path / "none")
+
+
+def test_algorithm_that_cannot_choose_the_actions_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match=r"sac cannot choose actions of Discrete\(18\)"):
+        Training(settings_for("sac", env=DISCRETE), tmp_path)
+
+
+def test_unknown_device_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="device 'abacus' cannot be used"):
+        Training(settings_for("ppo"), tmp_path, device="abacus")
+
+
+def test_network_on_a_gpu_is_saved_and_resumed(tmp_path: Path) -> None:
+    if not torch.cuda.is_available():
+        pytest.skip("needs a GPU")
+    first = Training(settings_for("ppo"), tmp_path, device="cuda")
+    assert first.model.device.type == "cuda"
+    first.run()
+    again = Training(settings_for("ppo", steps=128), tmp_path)
+    observations = np.stack([again.model.observation_space.sample() for _ in range(20)])
+    there, here = (
+        each.model.policy.predict_values(each.model.policy.obs_to_tensor(observations)[0]) for each in (first, again)
+    )
+    np.testing.assert_allclose(there.detach().cpu(), here.detach(), atol=1e-5)
+    assert again.run().steps >= 128
 
 
 def test_resumed_run_keeps_weights_optimiser_and_evaluations(tmp_path: Path) -> None:
