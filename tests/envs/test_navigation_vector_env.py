@@ -17,10 +17,12 @@ from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import AdWizardState, ScriptedAdWizard
+from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.state.codes import Walk
 from dorothie_gym.spaces import AdWizardAction, Observation, SpaceLimits
 from tests.envs.navigation_drivers import drive, obey
+from tests.malformed.memory import peak_memory
 
 NAVIGATION, CONTINUOUS = "dorothie_gym/Navigation-v0", "dorothie_gym/Navigation-continuous-v0"
 SHORT: dict[str, Any] = {"max_seconds": 40.0, "patience": 20.0}
@@ -127,6 +129,24 @@ def test_hundreds_of_episodes_are_equal_to_those_of_single_environments(
             threads, max_seconds=25.0, patience=12.0, **settings,
         )  # fmt: skip
     assert ended >= 130
+
+
+@pytest.mark.slow
+def test_a_day_of_driving_leaks_no_memory() -> None:
+    envs = NavigationVectorEnv(
+        64, ["brookside", "midtown"], guidance="goals", traffic="medium", exceptions=2.0, autoreset_mode="SameStep"
+    )
+    rng = np.random.default_rng(0)
+
+    def drive(hours: float) -> int:
+        for _ in range(round(hours * 3600.0 * DECISION_FREQUENCY / envs.num_envs)):
+            masks = envs.action_masks()
+            envs.step((rng.random(masks.shape) * masks).argmax(axis=1))
+        return peak_memory()
+
+    envs.reset(seed=0)
+    after_some_hours = drive(6.0)
+    assert drive(24.0) - after_some_hours < 8_000_000
 
 
 def test_environment_does_not_depend_on_its_place_in_the_batch() -> None:
