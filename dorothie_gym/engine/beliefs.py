@@ -63,16 +63,18 @@ def refined(before: PlaceEstimate | None, mark: PlaceEstimate, drift: float = 0.
     """
     if before is None:
         return mark
-    mean, noise = np.array(before.mean), np.array(mark.covariance)
-    covariance = np.array(before.covariance) + drift**2 * np.eye(2)
-    innovation = np.array(mark.mean) - mean
-    spread = np.linalg.inv(covariance + noise)
-    if float(innovation @ spread @ innovation) > GATE:
+    # Imported here: filterpy imports matplotlib, which is slow.
+    from filterpy.kalman import KalmanFilter
+
+    refine = KalmanFilter(dim_x=2, dim_z=2)
+    refine.x, refine.P = np.array(before.mean), np.array(before.covariance)
+    refine.F, refine.H = np.eye(2), np.eye(2)
+    refine.Q, refine.R = drift**2 * np.eye(2), np.array(mark.covariance)
+    refine.predict()
+    refine.update(np.array(mark.mean))
+    if float(refine.y @ refine.SI @ refine.y) > GATE:
         return mark
-    gain = covariance @ spread
-    rest = np.eye(2) - gain
-    # Joseph's form: exactly symmetric, but for rounding, and positive
-    return PlaceEstimate.of(mean + gain @ innovation, rest @ covariance @ rest.T + gain @ noise @ gain.T)
+    return PlaceEstimate.of(refine.x, refine.P)
 
 
 def about(before: PlaceEstimate | None, points: Array, sigma: float) -> PlaceEstimate:

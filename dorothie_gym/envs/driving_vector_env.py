@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import ClassVar, Final, TypeAlias
 
@@ -73,6 +74,7 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         names = [town] if isinstance(town, str | Path | Town) else list(town)
         if not names:
             raise ValueError("town is an empty sequence; it must name at least one town")
+        import_module("filterpy.kalman")  # takes a second, for which no decision should wait: see `beliefs.refined`
         loaded = [each if isinstance(each, Town) else load_town(each) for each in names]
         self.towns = [loaded[i % len(loaded)] for i in range(num_envs)]
         self.num_envs, self.render_mode, self.config = num_envs, render_mode, config

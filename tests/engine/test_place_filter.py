@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from filterpy.kalman import KalmanFilter
 
-from dorothie_gym.engine.beliefs import GATE, PlaceEstimate, about, near, refined
+from dorothie_gym.engine.beliefs import PlaceEstimate, about, near, refined
 
 STREET = np.column_stack((np.arange(-200.0, 201.0, 10.0), np.zeros(41)))
 ELLIPSE_95 = 5.991
@@ -90,21 +89,3 @@ def test_coverage_of_ellipse_equals_its_probability() -> None:
         place = refined(place, near(float(mark[0]), float(mark[1]), 20.0))
         inside.append(place.distance(float(truth[0]), float(truth[1])) <= ELLIPSE_95)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.035)
-
-
-def test_marks_are_updates_of_a_kalman_filter() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        (before, noise), drift = rng.normal(scale=20.0, size=(2, 2, 2)), float(rng.choice([0.0, 15.0]))
-        place = PlaceEstimate.of(rng.uniform(-400.0, 400.0, 2), before @ before.T + np.eye(2))
-        mark = PlaceEstimate.of(place.mean + rng.normal(scale=5.0, size=2), noise @ noise.T + 25.0 * np.eye(2))
-        reference = KalmanFilter(dim_x=2, dim_z=2)
-        reference.F = reference.H = np.eye(2)
-        reference.x, reference.P = np.array(place.mean), np.array(place.covariance)
-        reference.Q, reference.R = drift**2 * np.eye(2), np.array(mark.covariance)
-        reference.predict()
-        reference.update(np.array(mark.mean))
-        if float(reference.y @ reference.SI @ reference.y) < GATE:
-            assert refined(place, mark, drift) == PlaceEstimate.of(reference.x, reference.P)
-        else:
-            assert refined(place, mark, drift) == mark
