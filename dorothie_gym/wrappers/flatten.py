@@ -103,6 +103,13 @@ class FlatObservations:
         clipped: NDArray[np.float32] = np.clip(row, self.low, self.high)
         return clipped
 
+    def vectors(self, stacked: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+        """Returns the flat vectors of observations by field with a leading axis (m, ...), as (m, n) float32."""
+        parts = [stacked[name].reshape(len(stacked[name]), -1) for name in self._numeric]
+        rows = np.concatenate(parts, axis=1, dtype=np.float32, casting="unsafe")
+        clipped: NDArray[np.float32] = np.clip(rows, self.low, self.high)
+        return clipped
+
 
 def _parts(space: AnySpace) -> dict[str, AnySpace]:
     return dict(space.spaces) if isinstance(space, spaces.Dict) else {_WHOLE: space}

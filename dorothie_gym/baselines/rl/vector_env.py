@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias, runtime_checkable
 
 import gymnasium as gym
 import numpy as np
@@ -22,6 +22,21 @@ AnyEnv: TypeAlias = gym.Env[Any, Any]
 
 MakeEnv: TypeAlias = Callable[[], AnyEnv]
 """Factory of an environment; can be sent to another process."""
+
+
+@runtime_checkable
+class MakeBatch(Protocol):
+    """Factory of environments that has a batch form, too."""
+
+    def batch(self, count: int) -> VecEnv:
+        """Returns several environments as one."""
+        ...
+
+
+def several(make: MakeEnv, count: int) -> VecEnv:
+    """Returns several environments in this process, as a batch if the factory makes one."""
+    return make.batch(count) if isinstance(make, MakeBatch) else DummyVecEnv([make] * count)
+
 
 Command: TypeAlias = tuple[str, tuple[Any, ...]]
 """Command to a worker and its arguments, see `execute`."""
@@ -44,7 +59,7 @@ def make_vector_env(make: MakeEnv, environments: int, workers: int, ray: str | N
     """
     if ray is not None:
         return RayVecEnv(make, environments, workers, ray)
-    return ProcessVecEnv(make, environments, workers) if workers else DummyVecEnv([make] * environments)
+    return ProcessVecEnv(make, environments, workers) if workers else several(make, environments)
 
 
 class WorkerVecEnv(VecEnv, ABC):
@@ -169,7 +184,7 @@ def shares(environments: int, workers: int) -> list[range]:
     return [range(begin, end) for begin, end in itertools.pairwise(bounds)]
 
 
-def execute(vector: DummyVecEnv, command: Command) -> tuple[bool, Answer]:
+def execute(vector: VecEnv, command: Command) -> tuple[bool, Answer]:
     """Executes a command in a worker; returns whether it succeeded, and its result or the message of its error."""
     try:
         return True, _result(vector, *command)
@@ -177,7 +192,7 @@ def execute(vector: DummyVecEnv, command: Command) -> tuple[bool, Answer]:
         return False, f"{type(error).__name__}: {error}"
 
 
-def _result(vector: DummyVecEnv, name: str, arguments: tuple[Any, ...]) -> Answer:
+def _result(vector: VecEnv, name: str, arguments: tuple[Any, ...]) -> Answer:
     if name == "step":
         return vector.step(arguments[0])
     if name == "spaces":
@@ -246,7 +261,7 @@ class ProcessVecEnv(WorkerVecEnv):
 def _serve(connection: Connection, make: MakeEnv, count: int) -> None:
     """Executes commands in a worker process until the connection closes."""
     exit_with_parent()
-    vector = DummyVecEnv([make] * count)
+    vector = several(make, count)
     try:
         while True:
             connection.send(execute(vector, connection.recv()))
@@ -330,7 +345,7 @@ class _Actor:
     """Ray actor that holds some environments."""
 
     def __init__(self, make: MakeEnv, count: int) -> None:
-        self._vector = DummyVecEnv([make] * count)
+        self._vector = several(make, count)
 
     def execute(self, commands: Sequence[Command]) -> tuple[bool, Answer]:
         """Executes commands in order, and returns the answer of the last."""

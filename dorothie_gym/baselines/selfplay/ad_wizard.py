@@ -128,7 +128,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory, AdWizardAction]):
             mask[macro] = self._subgoal(macro, observation) is not None
         return mask
 
-    def permitted(self, observation: ObservationMapping, masks: ActionMapping) -> Mask:
+    def permitted(self, observation: ObservationMapping, memory: AdWizardMemory, masks: ActionMapping) -> Mask:
         """Returns the actions whose kind of exception the environment permits."""
         return np.asarray(masks["exception"])[_KINDS].astype(np.bool_)
 

@@ -31,7 +31,7 @@ from dorothie_gym.policies.navigation.actions import (
     physical_of,
 )
 from dorothie_gym.policies.navigation.demonstrations import action_of
-from dorothie_gym.policies.navigation.driver_view import driver_of
+from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_of
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits, nearest_sector
 from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, NavigationEncoder
@@ -78,6 +78,7 @@ class CoWizardMemory:
         noted: landmark that is set as goal.
         instruction: last instruction, in the form of `Navigation-v0`.
         previous: observation of the previous decision.
+        driver: view of the driver at that decision.
     """
 
     heard: LastUtterance | None = None
@@ -85,6 +86,7 @@ class CoWizardMemory:
     noted: LandmarkName | None = None
     instruction: HeardInstruction = field(default_factory=HeardInstruction)
     previous: ObservationMapping | None = None
+    driver: DriverArrays | None = field(default=None, compare=False)
 
 
 class CoWizardInterface(RoleInterface[CoWizardMemory, CoWizardAction]):
@@ -117,7 +119,16 @@ class CoWizardInterface(RoleInterface[CoWizardMemory, CoWizardAction]):
             if heard.landmark is not None:
                 named = heard.landmark
                 instruction = replace(instruction, goal=self._place(observation, heard.landmark))
-        return replace(memory, heard=heard, named=named, instruction=instruction, previous=observation)
+        driver = driver_of(observation, self._exits)
+        return replace(
+            memory, heard=heard, named=named, instruction=instruction, previous=observation, driver=driver
+        )  # fmt: skip
+
+    def _driver(self, observation: ObservationMapping, memory: CoWizardMemory) -> DriverArrays:
+        """Returns the view of the driver: that of `update`, if it was called with the same observation."""
+        if memory.driver is not None and memory.previous is observation:
+            return memory.driver
+        return driver_of(observation, self._exits)
 
     def utterances(self, memory: CoWizardMemory) -> tuple[LastUtterance | None, ...]:
         """Returns the participant's last utterance."""
@@ -132,15 +143,15 @@ class CoWizardInterface(RoleInterface[CoWizardMemory, CoWizardAction]):
     def mask(self, observation: ObservationMapping, memory: CoWizardMemory) -> Mask:
         """Returns the actions that the car would probably carry out and that change something."""
         mask = np.zeros(self.actions, dtype=np.bool_)
-        mask[: len(ACTIONS)] = self._feasible.mask(driver_of(observation, self._exits))
+        mask[: len(ACTIONS)] = self._feasible.mask(self._driver(observation, memory))
         mask[ExtraAction.NOTE_GOAL] = memory.named is not None and memory.named is not memory.noted
         mask[list(_SPEECH)] = scalar(observation, "speaking") <= 0.0
         return mask
 
-    def permitted(self, observation: ObservationMapping, masks: ActionMapping) -> Mask:
+    def permitted(self, observation: ObservationMapping, memory: CoWizardMemory, masks: ActionMapping) -> Mask:
         """Returns the actions that the car would carry out, or already prepares."""
         permitted = np.ones(self.actions, dtype=np.bool_)
-        driver = driver_of(observation, self._exits)
+        driver = self._driver(observation, memory)
         for action in ACTIONS[1:]:
             physical = physical_of(action, driver)
             if physical is None:
@@ -159,9 +170,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory, CoWizardAction]):
             return CoWizardAction(mental=note), replace(memory, noted=memory.named)
         if choice in _SPEECH:
             return CoWizardAction(speech=_SPEECH[choice]), memory
-        return CoWizardAction(
-            physical=physical_of(NavigationAction(choice), driver_of(observation, self._exits))
-        ), memory
+        return CoWizardAction(physical=physical_of(NavigationAction(choice), self._driver(observation, memory))), memory
 
     def choice_of(self, action: CoWizardAction, observation: ObservationMapping, memory: CoWizardMemory) -> int:
         """Returns the number of the driving action, else of the goal that is set, else of the utterance."""

@@ -1,4 +1,4 @@
-"""`DuoWizardEnv` for self-play: one environment for all roles, with one row as observation and three numbers as action.
+"""Sessions for self-play: all roles at once, with one row as observation and three numbers as action.
 
 A `RoleLayout` describes the rows.
 """
@@ -6,13 +6,14 @@ A `RoleLayout` describes the rows.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.selfplay.ad_wizard import AdWizardInterface
@@ -20,7 +21,7 @@ from dorothie_gym.baselines.selfplay.co_wizard import CoWizardInterface
 from dorothie_gym.baselines.selfplay.participant import ParticipantInterface
 from dorothie_gym.baselines.selfplay.role_interface import AnyRoleInterface, Mask
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv, Stacked
 from dorothie_gym.envs.navigation_config import TRAFFIC
 from dorothie_gym.errors import SettingsError, StoryboardError
 from dorothie_gym.maps import Town
@@ -30,6 +31,7 @@ from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.spaces import ActionDict, Observation, SpaceLimits, StepInfo
 
 _PARTICIPANT = AGENT_ROLES.index(Role.PARTICIPANT)
@@ -77,6 +79,16 @@ class RoleLayout:
         return sum(self.sizes) + sum(self.actions)
 
     @property
+    def observation_space(self) -> spaces.Space[Vector]:
+        """Space of a row."""
+        return spaces.Box(-1.0, 1.0, (self.width,), dtype=np.float32)
+
+    @property
+    def action_space(self) -> spaces.Space[NDArray[np.int64]]:
+        """Space of the numbers of the roles' actions."""
+        return spaces.MultiDiscrete(list(self.actions))
+
+    @property
     def padded_size(self) -> int:
         """Length of a padded vector."""
         return max(self.sizes) + len(self.sizes)
@@ -116,25 +128,209 @@ def pad_masks(masks: Mask, actions: int) -> Mask:
     return padded
 
 
-# --- Environment ------------------------------------------------------------------------------------------------------
+# --- Sessions ---------------------------------------------------------------------------------------------------------
 
 
-class SelfPlayEnv(gym.Env[Vector, NDArray[np.int64]]):
-    """All three roles of a session as one environment.
+class RolePlayers:
+    """What the three roles of one session keep between decisions.
+
+    Attributes:
+        scripted: roles that the built-in policies play; a change takes effect at the next session.
+        memories: memories of the roles, each of the type that its interface uses.
+        policy_states: states of the scripted roles.
+        render_mode: None, which stable-baselines3 asks for.
+    """
+
+    render_mode = None
+
+    def __init__(self, town: Town, scripted: Collection[Role]) -> None:
+        self.scripted = scripted
+        self.memories: list[Any] = []
+        self.policy_states: dict[Role, object] = {}
+        self._cost_to_go = CostToGo(town)
+        self._distance = math.inf  # to the current subgoal [m]
+
+    def set_target(self, planner: LocalPlanner) -> None:
+        """Sets the participant's current subgoal as the target of the distance."""
+        target = self.memories[_PARTICIPANT].target
+        self._cost_to_go.aim(None if target is None else target.route.goal)
+        self._distance = self._distance_left(planner)
+
+    def approach(self, planner: LocalPlanner) -> float:
+        """Returns by how much the distance to the previous decision's subgoal has decreased [m]."""
+        left = self._distance_left(planner)
+        return self._distance - left if math.isfinite(left) and math.isfinite(self._distance) else 0.0
+
+    def _distance_left(self, planner: LocalPlanner) -> float:
+        return self._cost_to_go.from_place(planner.lane, planner.station)
+
+
+class SelfPlaySessions:
+    """Sessions of which all three roles are played by numbers of actions, in one batch.
 
     Observations are rows of a `RoleLayout`. An action holds one number per role, see `RoleInterface`. Participant and
     Co-Wizard receive the mean of their rewards in `DuoWizardEnv`, the Ad-Wizard its own; each metre by which the route
     to the current subgoal gets shorter adds `progress` for the team and subtracts it for the Ad-Wizard.
+
+    Attributes:
+        duo: the environments inside.
+        layout: layout of the rows.
+        interfaces: interfaces of the roles, in the order of `AGENT_ROLES`.
+        players: what the roles of each session keep.
+        rows: present observations (n, width).
+    """
+
+    def __init__(
+        self,
+        count: int,
+        town: str = "brookside",
+        storyboard: str | None = None,
+        traffic: str = "light",
+        max_seconds: float = 600.0,
+        progress: float = 0.02,
+        scripted: Collection[Role] = (),
+        threads: int | None = None,
+    ) -> None:
+        """Prepares sessions.
+
+        Args:
+            count: number of sessions.
+            town: name of a town, or path of a file.
+            storyboard: name of a template, or path of a file; None draws one each reset.
+            traffic: "none", "light", "medium" or "heavy".
+            max_seconds: length of a session [s].
+            progress: reward per metre; a potential difference, which does not change the optimal policies.
+            scripted: roles that the built-in policies play; actions for these roles are ignored.
+            threads: number of threads; None for one per processor.
+
+        Raises:
+            SettingsError: an argument is invalid.
+        """
+        if traffic not in TRAFFIC:
+            raise SettingsError(f"traffic is {traffic!r}; it must be one of {', '.join(TRAFFIC)}")
+        vehicles, pedestrians = TRAFFIC[traffic]
+        try:
+            config = EnvConfig(max_seconds=max_seconds, world=WorldConfig(vehicles=vehicles, pedestrians=pedestrians))
+            self._progress = float(progress)
+            self.duo = DuoWizardVectorEnv(
+                count, town, storyboard, config=config, threads=threads, autoreset_mode=AutoresetMode.DISABLED
+            )
+        except (TypeError, ValueError, OSError, StoryboardError) as error:
+            raise SettingsError(f"selfplay: {error}") from error
+        limits, self.town = self.duo.limits, self.duo.towns[0]
+        self._policies = {role: make_policy("scripted", role, limits) for role in AGENT_ROLES}
+        self.interfaces = [make_interface(role, self.town, limits) for role in AGENT_ROLES]
+        self.layout = RoleLayout.of(limits)
+        self.players = [RolePlayers(self.town, scripted) for _ in range(count)]
+        self.rows: Vector = np.zeros((count, self.layout.width), dtype=np.float32)
+        self._seen: dict[str, list[Observation]] = {str(role): [{}] * count for role in AGENT_ROLES}
+
+    def observation(self, role: Role, number: int) -> Observation:
+        """Returns the present observation of a role in a session."""
+        return self._seen[role][number]
+
+    def begin(self, seeds: Mapping[int, int | None]) -> None:
+        """Begins sessions, see `DuoWizardVectorEnv.reset`.
+
+        Args:
+            seeds: seed by number of the session; None takes the next of its series.
+        """
+        mask = np.zeros(len(self.players), dtype=np.bool_)
+        mask[list(seeds)] = True
+        every = [seeds.get(number) for number in range(len(self.players))]
+        observations, infos = self.duo.reset(every, {"reset_mask": mask})
+        for number in seeds:
+            player, scenario = self.players[number], self.duo.engines[number].scenario
+            player.memories = [interface.initial_memory() for interface in self.interfaces]
+            player.policy_states = {
+                role: self._policies[role].initial_state(policy_seed(scenario.seed, role), self.town)
+                for role in player.scripted
+            }
+        self._look(sorted(seeds), observations, infos)
+
+    def step(
+        self, actions: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Plays a decision of all roles in all sessions; those that are over are to begin anew before the next.
+
+        Args:
+            actions: numbers of the actions (n, 3).
+
+        Returns:
+            Rewards of the roles (n, 3); whether sessions were terminated, were truncated, and succeeded (n,).
+
+        Raises:
+            ValueError: a number is not an action of its role.
+        """
+        for k, role in enumerate(AGENT_ROLES):
+            wrong = actions[(actions[:, k] < 0) | (actions[:, k] >= self.layout.actions[k]), k]
+            if wrong.size:
+                raise ValueError(f"action of {role} is {wrong[0]}; it must be in 0..{self.layout.actions[k] - 1}")
+        chosen = [self._act(number, own.tolist()) for number, own in enumerate(actions)]
+        observations, rewards, terminations, truncations, infos = self.duo.step(chosen)
+        terminated, truncated = terminations[Role.CO_WIZARD], truncations[Role.CO_WIZARD]
+        sums = np.zeros((len(self.players), len(AGENT_ROLES)))
+        successes = np.zeros(len(self.players), dtype=np.bool_)
+        for number, player in enumerate(self.players):
+            shaping = self._progress * player.approach(self._planner(number))
+            team = (rewards[Role.PARTICIPANT][number] + rewards[Role.CO_WIZARD][number]) / 2.0 + shaping
+            sums[number] = team, team, rewards[Role.AD_WIZARD][number] - shaping
+            successes[number] = self.duo.engines[number].session.success
+        self._look(range(len(self.players)), observations, infos)
+        return sums, terminated, truncated, successes & (terminated | truncated)
+
+    def close(self) -> None:
+        """Closes the environments inside."""
+        self.duo.close()
+
+    def _planner(self, number: int) -> LocalPlanner:
+        return self.duo.engines[number].session.world.planner
+
+    def _act(self, number: int, choices: Sequence[int]) -> dict[str, ActionDict]:
+        """Returns the actions of a session's roles."""
+        player, actions = self.players[number], {}
+        for k, (role, choice) in enumerate(zip(AGENT_ROLES, choices, strict=True)):
+            seen = self._seen[role][number]
+            if role in player.policy_states:
+                actions[str(role)], player.policy_states[role] = self._policies[role].step(
+                    seen, player.policy_states[role]
+                )
+                continue
+            own, player.memories[k] = self.interfaces[k].act(choice, seen, player.memories[k])
+            actions[str(role)] = own.encode(self.duo.limits)
+        return actions
+
+    def _look(self, numbers: Sequence[int], observations: Mapping[str, Stacked], infos: Mapping[str, StepInfo]) -> None:
+        """Updates memories, rows and targets of some sessions with their observations."""
+        vectors, masks = [], []
+        for k, (role, interface) in enumerate(zip(AGENT_ROLES, self.interfaces, strict=True)):
+            stacked, allowed = observations[role], infos[role]["action_mask"]
+            own, memories = [], []
+            for number in numbers:
+                seen = {name: values[number] for name, values in stacked.items()}
+                memory = self.players[number].memories[k] = interface.update(seen, self.players[number].memories[k])
+                permitted = {name: None if mask is None else mask[number] for name, mask in allowed.items()}
+                own.append(interface.mask(seen, memory) & interface.permitted(seen, memory, permitted))
+                memories.append(memory)
+                self._seen[role][number] = seen
+            masks.append(own)
+            chosen = {name: stacked[name][numbers] for name in (*interface.fields, "pose")}
+            vectors.append(interface.vectors(chosen, [self._seen[role][number] for number in numbers], memories))
+        self.rows[numbers] = np.concatenate([*vectors, *masks], axis=1)
+        for number in numbers:
+            self.players[number].set_target(self._planner(number))
+
+
+# --- Environment ------------------------------------------------------------------------------------------------------
+
+
+class SelfPlayEnv(gym.Env[Vector, NDArray[np.int64]]):
+    """All three roles of a session as one environment: `SelfPlaySessions` with one session.
+
     `info["rewards"]` holds the three rewards; the returned reward is that of the team.
 
     Args:
-        town: name of a town, or path of a file.
-        storyboard: name of a template, or path of a file; None draws one each reset.
-        traffic: "none", "light", "medium" or "heavy".
-        max_seconds: length of a session [s].
-        progress: reward per metre; a potential difference, which does not change the optimal policies.
-        scripted: roles that the built-in policies play; actions for these roles are ignored. A change takes effect at
-            the next reset.
+        town, storyboard, traffic, max_seconds, progress, scripted: see `SelfPlaySessions`.
 
     Raises:
         SettingsError: an argument is invalid.
@@ -149,92 +345,25 @@ class SelfPlayEnv(gym.Env[Vector, NDArray[np.int64]]):
         progress: float = 0.02,
         scripted: Collection[Role] = (),
     ) -> None:
-        if traffic not in TRAFFIC:
-            raise SettingsError(f"traffic is {traffic!r}; it must be one of {', '.join(TRAFFIC)}")
-        vehicles, pedestrians = TRAFFIC[traffic]
-        try:
-            config = EnvConfig(max_seconds=max_seconds, world=WorldConfig(vehicles=vehicles, pedestrians=pedestrians))
-            self._progress = float(progress)
-            self.duo = DuoWizardEnv(town, storyboard, config=config)
-        except (TypeError, ValueError, OSError, StoryboardError) as error:
-            raise SettingsError(f"selfplay: {error}") from error
-        limits = self.duo.limits
-        self.scripted = scripted
-        self._policies = {role: make_policy("scripted", role, limits) for role in AGENT_ROLES}
-        self._interfaces = [make_interface(role, self.duo.town, limits) for role in AGENT_ROLES]
-        self.layout = RoleLayout.of(limits)
-        self.observation_space = spaces.Box(-1.0, 1.0, (self.layout.width,), dtype=np.float32)
-        self.action_space = spaces.MultiDiscrete(list(self.layout.actions))
-        self._cost_to_go = CostToGo(self.duo.town)
-        self._memories: list[Any] = []  # by role, of the type that its interface uses
-        self._observations: Mapping[str, Observation] = {}
-        self._policy_states: dict[Role, object] = {}
-        self._distance = math.inf  # to the current subgoal [m]
+        self.sessions = SelfPlaySessions(1, town, storyboard, traffic, max_seconds, progress, scripted, threads=1)
+        self.layout = self.sessions.layout
+        self.observation_space = self.layout.observation_space
+        self.action_space = self.layout.action_space
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, object] | None = None) -> tuple[Vector, StepInfo]:
         """Begins a session, see `DuoWizardEnv.reset`."""
         super().reset(seed=seed)
-        self._observations, infos = self.duo.reset(seed=seed, options=options)
-        self._memories = [interface.initial_memory() for interface in self._interfaces]
-        self._policy_states = {
-            role: self._policies[role].initial_state(policy_seed(self.duo.scenario.seed, role), self.duo.town)
-            for role in self.scripted
-        }
-        row = self._row(infos)
-        self._set_target()
-        return row, {}
+        self.sessions.begin({0: seed})
+        return self.sessions.rows[0].copy(), {}
 
     def step(self, action: NDArray[np.int64]) -> tuple[Vector, float, bool, bool, StepInfo]:
         """Plays a decision of all roles; raises `ValueError` if a number is not an action of its role."""
-        actions: dict[str, ActionDict] = {}
-        for k, role in enumerate(AGENT_ROLES):
-            if not 0 <= int(action[k]) < self.layout.actions[k]:
-                raise ValueError(f"action of {role} is {action[k]}; it must be in 0..{self.layout.actions[k] - 1}")
-            observation = self._observations[role]
-            if role in self._policy_states:
-                policy = self._policies[role]
-                actions[role], self._policy_states[role] = policy.step(observation, self._policy_states[role])
-                continue
-            own, self._memories[k] = self._interfaces[k].act(int(action[k]), observation, self._memories[k])
-            actions[role] = own.encode(self.duo.limits)
-        self._observations, rewards, terminations, truncations, infos = self.duo.step(actions)
-        shaping = self._progress * self._approach()
-        team = (rewards[Role.PARTICIPANT] + rewards[Role.CO_WIZARD]) / 2.0 + shaping
-        opponent = rewards[Role.AD_WIZARD] - shaping
-        row = self._row(infos)
-        self._set_target()
-        info: StepInfo = {"rewards": np.array([team, team, opponent], dtype=np.float32)}
-        terminated, truncated = terminations[Role.CO_WIZARD], truncations[Role.CO_WIZARD]
-        if terminated or truncated:
-            info["is_success"] = bool(self.duo.summary()["success"])
-        return row, team, terminated, truncated, info
+        rewards, terminated, truncated, successes = self.sessions.step(np.asarray(action)[None])
+        info: StepInfo = {"rewards": rewards[0].astype(np.float32)}
+        if terminated[0] or truncated[0]:
+            info["is_success"] = bool(successes[0])
+        return self.sessions.rows[0].copy(), float(rewards[0, 0]), bool(terminated[0]), bool(truncated[0]), info
 
     def close(self) -> None:
         """Closes the environment inside."""
-        self.duo.close()
-
-    def _row(self, infos: Mapping[str, StepInfo]) -> Vector:
-        """Returns the row of the three roles' vectors and masks."""
-        vectors, masks = [], []
-        for k, (role, interface) in enumerate(zip(AGENT_ROLES, self._interfaces, strict=True)):
-            observation = self._observations[role]
-            memory = self._memories[k] = interface.update(observation, self._memories[k])
-            vectors.append(interface.vector(observation, memory))
-            permitted = interface.permitted(observation, infos[role]["action_mask"])
-            masks.append(interface.mask(observation, memory) & permitted)
-        return np.concatenate([*vectors, *masks]).astype(np.float32)
-
-    def _set_target(self) -> None:
-        """Sets the participant's current subgoal as the target of the distance."""
-        target = self._memories[_PARTICIPANT].target
-        self._cost_to_go.aim(None if target is None else target.route.goal)
-        self._distance = self._distance_left()
-
-    def _approach(self) -> float:
-        """Returns by how much the distance to the previous decision's subgoal has decreased [m]."""
-        left = self._distance_left()
-        return self._distance - left if math.isfinite(left) and math.isfinite(self._distance) else 0.0
-
-    def _distance_left(self) -> float:
-        planner = self.duo.session.world.planner
-        return self._cost_to_go.from_place(planner.lane, planner.station)
+        self.sessions.close()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from typing import Final
 
 import numpy as np
@@ -12,10 +12,11 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import set_random_seed
 
 from dorothie_gym.baselines.rl.checkpoint import Model
-from dorothie_gym.baselines.rl.settings import Arguments, SelfPlaySettings
+from dorothie_gym.baselines.rl.settings import SelfPlaySettings
 from dorothie_gym.baselines.rl.vector_env import make_vector_env
 from dorothie_gym.baselines.selfplay.env import RoleLayout, SelfPlayEnv
 from dorothie_gym.baselines.selfplay.learner import Learner, make_network, sample_actions
+from dorothie_gym.baselines.selfplay.vec_env import SelfPlayEnvFactory
 from dorothie_gym.ontology import AGENT_ROLES, Role
 
 AD_WIZARD: Final = AGENT_ROLES.index(Role.AD_WIZARD)
@@ -64,17 +65,6 @@ class OpponentPool:
 # --- Rollouts ---------------------------------------------------------------------------------------------------------
 
 
-class SelfPlayEnvFactory:
-    """Picklable factory of a `SelfPlayEnv`."""
-
-    def __init__(self, settings: Arguments, scripted: Collection[Role] = ()) -> None:
-        self._settings, self._scripted = dict(settings), tuple(scripted)
-
-    def __call__(self) -> SelfPlayEnv:
-        """Returns a new environment."""
-        return SelfPlayEnv(**self._settings, scripted=self._scripted)
-
-
 class MultiAgentRollout:
     """Collects rollouts of all roles, and updates the learners with them.
 
@@ -120,7 +110,7 @@ class MultiAgentRollout:
         ad_wizard = self.learners[-1]
         self._opponent = make_network(settings.learner(), ad_wizard.size, ad_wizard.actions)
         self._opponent_envs = np.arange(count - settings.past_environments, count)
-        make = SelfPlayEnvFactory(settings.env_settings)
+        make = SelfPlayEnvFactory(settings.env_settings, threads=1 if settings.workers or ray is not None else None)
         self._vector = make_vector_env(make, count, settings.workers, ray)
         for env, scripted in coached.items():
             self._vector.set_attr("scripted", scripted, indices=[env])

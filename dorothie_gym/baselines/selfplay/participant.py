@@ -145,7 +145,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory, ParticipantAction]):
         mask[ParticipantPhrase.NAME_GOAL] &= memory.target is not None
         return mask
 
-    def permitted(self, observation: ObservationMapping, masks: ActionMapping) -> Mask:
+    def permitted(self, observation: ObservationMapping, memory: ParticipantMemory, masks: ActionMapping) -> Mask:
         """Returns all actions: the environment never masks speech."""
         return np.ones(self.actions, dtype=np.bool_)
 

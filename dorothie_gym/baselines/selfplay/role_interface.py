@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
@@ -95,6 +95,10 @@ def last_utterance(
     return LastUtterance(act=said.acts[-1], direction=said.words.direction, time=scalar(observation, "time"))
 
 
+_SILENCE: Final[Vector] = np.zeros(UTTERANCE_SIZE, dtype=np.float32)
+"""Features of a speaker that has said nothing yet."""
+
+
 class RoleInterface(ABC, Generic[Memory, Action]):
     """Input vector and discrete actions of a role in a town.
 
@@ -155,7 +159,7 @@ class RoleInterface(ABC, Generic[Memory, Action]):
         """Returns the actions that are feasible and useful as far as the role can infer (actions,)."""
 
     @abstractmethod
-    def permitted(self, observation: ObservationMapping, masks: ActionMapping) -> Mask:
+    def permitted(self, observation: ObservationMapping, memory: Memory, masks: ActionMapping) -> Mask:
         """Returns the actions that `info["action_mask"]` permits (actions,)."""
 
     @abstractmethod
@@ -168,33 +172,53 @@ class RoleInterface(ABC, Generic[Memory, Action]):
 
     def vector(self, observation: ObservationMapping, memory: Memory) -> Vector:
         """Returns the input vector (size,), each in -1..1; `memory` is the result of `update`."""
-        now = scalar(observation, "time")
-        flat = self._flat.vector(in_car_frame(observation, self.fields))
-        heard = [
-            np.zeros(UTTERANCE_SIZE, dtype=np.float32) if utterance is None else utterance.features(now)
-            for utterance in self.utterances(memory)
-        ]
-        own = np.array(self.own_features(observation, memory), dtype=np.float32)
-        whole: Vector = np.clip(np.concatenate([squashed(flat), *heard, own]), -1.0, 1.0)
+        stacked = {name: np.asarray(observation[name])[None] for name in (*self.fields, "pose")}
+        whole: Vector = self.vectors(stacked, [observation], [memory])[0]
         return whole
+
+    def vectors(
+        self, stacked: ObservationMapping, observations: Sequence[ObservationMapping], memories: Sequence[Memory]
+    ) -> Vector:
+        """Returns the input vectors of several sessions (n, size), see `vector`.
+
+        Args:
+            stacked: fields of the observations with a leading axis (n, ...).
+            observations: observation of each session.
+            memories: memory of the role in each session.
+        """
+        flat = self._flat.vectors(in_car_frame(stacked, self.fields))
+        own = [
+            np.concatenate([*self._heard(memory, observation), self.own_features(observation, memory)])
+            for observation, memory in zip(observations, memories, strict=True)
+        ]
+        whole: Vector = np.clip(np.concatenate([squashed(flat), np.array(own, dtype=np.float32)], axis=1), -1.0, 1.0)
+        return whole
+
+    def _heard(self, memory: Memory, observation: ObservationMapping) -> list[Vector]:
+        """Returns the features of the last utterances."""
+        now = scalar(observation, "time")
+        return [_SILENCE if said is None else said.features(now) for said in self.utterances(memory)]
 
 
 AnyRoleInterface: TypeAlias = RoleInterface[Any, Any]
 """Interface of a role that is not known statically."""
 
 
-def in_car_frame(observation: ObservationMapping, fields: Iterable[str]) -> Observation:
-    """Returns fields of an observation, with positions as metres ahead and right of the car; unused rows stay 0."""
-    x, y, heading = observation["pose"].tolist()
-    sine, cosine = math.sin(heading), math.cos(heading)
-    turned = {name: observation[name] for name in fields}
+def in_car_frame(stacked: ObservationMapping, fields: Iterable[str]) -> Observation:
+    """Returns fields of stacked observations, positions as metres ahead and right of the car; unused rows stay 0."""
+    x, y, headings = (stacked["pose"][:, k, None] for k in range(3))
+    sine, cosine = (
+        np.array([[function(heading)] for heading in headings.ravel().tolist()]) for function in (math.sin, math.cos)
+    )
+    turned = {name: stacked[name] for name in fields}
     for name, column in _POSITION_COLUMNS.items():
         if name not in turned:
             continue
-        table = np.array(turned[name], dtype=np.float64)
-        used = table.any(axis=1)
-        east, south = (table[:, column] - x) * used, (table[:, column + 1] - y) * used
-        table[:, column], table[:, column + 1] = east * cosine + south * sine, south * cosine - east * sine
+        table = np.array(turned[name], dtype=np.float64)  # (n, rows, columns)
+        used = table.any(axis=2)
+        east, south = (table[:, :, column] - x) * used, (table[:, :, column + 1] - y) * used
+        table[:, :, column] = east * cosine + south * sine
+        table[:, :, column + 1] = south * cosine - east * sine
         turned[name] = table
     return turned
 

@@ -33,7 +33,8 @@ from dorothie_gym.baselines.rl.run import (
 from dorothie_gym.baselines.rl.settings import SELFPLAY, Page, SelfPlaySettings
 from dorothie_gym.baselines.selfplay.demonstrations import read_demonstrations
 from dorothie_gym.baselines.selfplay.learner import sample_actions
-from dorothie_gym.baselines.selfplay.multi_agent_rollout import AD_WIZARD, MultiAgentRollout, SelfPlayEnvFactory
+from dorothie_gym.baselines.selfplay.multi_agent_rollout import AD_WIZARD, MultiAgentRollout
+from dorothie_gym.baselines.selfplay.vec_env import SelfPlayEnvFactory
 from dorothie_gym.input_files import checked
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.navigation.observation_vector import Vector

@@ -40,16 +40,16 @@ def test_learned_roles_play_reproducibly(folder: Path) -> None:
 def test_policy_input_equals_that_of_training(folder: Path) -> None:
     env = SelfPlayEnv(traffic="none", max_seconds=10.0)
     row, _ = env.reset(seed=0)
-    policies = [read_policy(folder / role, role, env.duo.limits) for role in AGENT_ROLES]
-    states = [policy.initial_state(0, env.duo.town) for policy in policies]
+    policies = [read_policy(folder / role, role, env.sessions.duo.limits) for role in AGENT_ROLES]
+    states = [policy.initial_state(0, env.sessions.town) for policy in policies]
     for _ in range(10):
         for k, (role, policy) in enumerate(zip(AGENT_ROLES, policies, strict=True)):
             interface, memory = states[k].interface, states[k].memory
-            seen = env._observations[role]
+            seen = env.sessions.observation(role, 0)
             vector = interface.vector(seen, interface.update(seen, memory))
             np.testing.assert_array_equal(vector, env.layout.vectors(row[None], k, padded=False)[0])
             _, states[k] = policy.step(seen, states[k])
-        env._memories = [state.memory for state in states]
+        env.sessions.players[0].memories = [state.memory for state in states]
         row, *_ = env.step(np.zeros(3, dtype=np.int64))
 
 

@@ -35,7 +35,7 @@ def test_rows_hold_vectors_and_masks_of_all_roles(env: SelfPlayEnv) -> None:
         masks = [env.layout.masks(row[None], role, padded=False)[0] for role in range(3)]
         assert all(mask[0] for mask in masks)  # nothing can always be done
         row, team, *_, info = env.step(np.array([rng.choice(np.flatnonzero(mask)) for mask in masks]))
-        refused += [reason for reasons in env.duo.session.refused.values() for reason in reasons]
+        refused += [reason for reasons in env.sessions.duo.engines[0].session.refused.values() for reason in reasons]
         assert info["rewards"][0] == info["rewards"][1] == pytest.approx(team)
     assert len(refused) <= 2  # fields are masked one by one; how they combine may still not do
 
@@ -54,7 +54,7 @@ def test_co_wizard_remembers_the_direction_of_an_utterance(env: SelfPlayEnv) -> 
     env.step(np.array([ParticipantPhrase.TURN_LEFT, 0, 0]))
     for _ in range(12):
         env.step(NOTHING)
-    heard = env._memories[1].heard
+    heard = env.sessions.players[0].memories[1].heard
     assert heard.act.move is DialogueMove.INSTRUCT and ActionValue.J_TURN in heard.act.slots
     assert heard.direction is Direction.LEFT
 
@@ -66,7 +66,7 @@ def test_co_wizard_can_set_the_named_goal(env: SelfPlayEnv) -> None:
         row, *_ = env.step(NOTHING)
     assert env.layout.masks(row[None], 1, padded=False)[0][ExtraAction.NOTE_GOAL]
     row, *_ = env.step(np.array([0, ExtraAction.NOTE_GOAL, 0]))
-    assert env.duo.session.beliefs.goals == (env._memories[0].target.name,)
+    assert env.sessions.duo.engines[0].session.beliefs.goals == (env.sessions.players[0].memories[0].target.name,)
     assert not env.layout.masks(row[None], 1, padded=False)[0][ExtraAction.NOTE_GOAL]
 
 
@@ -75,7 +75,7 @@ def test_co_wizard_turns_to_the_exit_of_a_sector() -> None:
     observations, infos = duo.reset(seed=0)
     interface, seen = CoWizardInterface(duo.town, duo.limits), observations["co_wizard"]
     memory = interface.update(seen, interface.initial_memory())
-    mask = interface.mask(seen, memory) & interface.permitted(seen, infos["co_wizard"]["action_mask"])
+    mask = interface.mask(seen, memory) & interface.permitted(seen, memory, infos["co_wizard"]["action_mask"])
     turns = [
         k for k in np.flatnonzero(mask) if k < len(NavigationAction) and NavigationAction(int(k)).sector is not None
     ]
@@ -115,7 +115,7 @@ def test_scripted_ad_wizard_ignores_chosen_actions() -> None:
     assert not (terminated or truncated)
     *_, truncated, info = env.step(NOTHING)
     assert truncated and info["is_success"] is False
-    assert env.duo.summary()["exceptions"] > 0
+    assert env.sessions.duo.engines[0].summary()["exceptions"] > 0
 
 
 def test_actions_are_mapped_back_to_their_numbers(env: SelfPlayEnv) -> None:
@@ -124,9 +124,9 @@ def test_actions_are_mapped_back_to_their_numbers(env: SelfPlayEnv) -> None:
     row, _ = env.reset(seed=2)
     for _ in range(119):
         choices = np.zeros(3, dtype=np.int64)
-        for k, (role, interface) in enumerate(zip(AGENT_ROLES, env._interfaces, strict=True)):
+        for k, (role, interface) in enumerate(zip(AGENT_ROLES, env.sessions.interfaces, strict=True)):
             choices[k] = rng.choice(np.flatnonzero(env.layout.masks(row[None], k, padded=False)[0]))
-            seen, memory = env._observations[role], env._memories[k]
+            seen, memory = env.sessions.observation(role, 0), env.sessions.players[0].memories[k]
             done, _ = interface.act(int(choices[k]), seen, memory)
             found = interface.choice_of(done, seen, memory)
             assert found == choices[k] or done == type(done)()  # a turn that is planned already is asked for by nothing
@@ -157,7 +157,10 @@ def test_utterances_are_mapped_to_phrases(
     env: SelfPlayEnv, act: DialogueAct, text: str, phrase: ParticipantPhrase
 ) -> None:
     said = ParticipantAction(speech=Speech(act=act, text=text))
-    assert ParticipantInterface(env.duo.town, env.duo.limits).choice_of(said, {}, ParticipantMemory()) is phrase
+    assert (
+        ParticipantInterface(env.sessions.town, env.sessions.duo.limits).choice_of(said, {}, ParticipantMemory())
+        is phrase
+    )
 
 
 def test_scripted_roles_reach_all_subgoals_and_ignore_chosen_actions() -> None:
@@ -170,11 +173,11 @@ def test_scripted_roles_reach_all_subgoals_and_ignore_chosen_actions() -> None:
         )
         ended = terminated or truncated
     assert info["is_success"]
-    env.scripted = ()
+    env.sessions.players[0].scripted = ()
     env.reset(seed=0)
     for _ in range(120):
         env.step(NOTHING)
-    assert env.duo.summary()["exceptions"] == 0
+    assert env.sessions.duo.engines[0].summary()["exceptions"] == 0
 
 
 def test_invalid_actions_and_arguments_are_refused(env: SelfPlayEnv) -> None:

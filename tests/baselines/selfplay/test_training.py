@@ -17,7 +17,7 @@ from safetensors.torch import load_file
 from dorothie_gym.baselines.rl.resumption import CHECKPOINT
 from dorothie_gym.baselines.rl.settings import SelfPlaySettings, selfplay_settings
 from dorothie_gym.baselines.selfplay import training as training_module
-from dorothie_gym.baselines.selfplay.env import SelfPlayEnv
+from dorothie_gym.baselines.selfplay.env import SelfPlaySessions
 from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
 from dorothie_gym.errors import ModelFileError, SettingsError
 from dorothie_gym.ontology import AGENT_ROLES, Role
@@ -146,16 +146,18 @@ def test_coached_roles_learn_beside_scripted_ones(shared: bool, tmp_path: Path) 
 
 @pytest.mark.parametrize("shared", [False, True])
 def test_masked_actions_are_never_chosen(shared: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    step, seen = SelfPlayEnv.step, []
+    step, seen = SelfPlaySessions.step, []
 
-    def watched(self: SelfPlayEnv, action: Any) -> Any:
-        for k, (role, interface) in enumerate(zip(AGENT_ROLES, self._interfaces, strict=True)):
-            observation, masks = self._observations[role], self.duo.session.masks.mask(role)
-            allowed = interface.mask(observation, self._memories[k]) & interface.permitted(observation, masks)
-            seen.append(bool(allowed[action[k]]))
-        return step(self, action)
+    def watched(self: SelfPlaySessions, actions: Any) -> Any:
+        for number, chosen in enumerate(actions):
+            for k, (role, interface) in enumerate(zip(AGENT_ROLES, self.interfaces, strict=True)):
+                observation, memory = self.observation(role, number), self.players[number].memories[k]
+                masks = self.duo.engines[number].mask(role)
+                allowed = interface.mask(observation, memory) & interface.permitted(observation, memory, masks)
+                seen.append(bool(allowed[chosen[k]]))
+        return step(self, actions)
 
-    monkeypatch.setattr(SelfPlayEnv, "step", watched)
+    monkeypatch.setattr(SelfPlaySessions, "step", watched)
     SelfPlayTraining(settings_for(shared=shared, max_seconds=60.0), tmp_path).run()
     assert len(seen) > 3 * 128 and all(seen)
 
