@@ -230,3 +230,39 @@ def test_options_of_a_compilation_equal_those_of_numba_with_the_same_values() ->
     plain.fastmath = True
     assert own != plain and plain != own
     assert own.copy() == own and hash(own.copy()) == hash(own)
+
+
+@compiled
+def digits(array, divisor):
+    total, most, flags = 0.0, -1, 0
+    for k in range(len(array)):
+        value = array[k] // divisor - array[k] % divisor * abs(array[-1])
+        total += max(value, 2) + min(value, divisor, 3.5) - (1 if bool(value) else 0) + int(value) ** 2
+        if value > most:
+            most, flags = int(value), flags ^ (k << 1) | 1
+        rest = value - most  # not used after the loop
+        total += rest / divisor if not rest < -4 else -rest
+    return total + most, flags
+
+
+def test_operators_and_built_in_functions_give_the_results_of_python_for_all_types():
+    plain = getattr(digits, "py_func", digits)
+    for values in ([7, -3, 12, 5], [7.5, -3.25, 0.0, -5.0]):
+        for array in (np.array(values), np.array(values).astype(np.float32), np.array(values).astype(np.int32)):
+            for divisor in (3, -2, 2.5):
+                assert digits(array, divisor) == pytest.approx(plain(array.tolist(), divisor), rel=1e-5)
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+def test_operator_of_a_type_that_is_registered_later_is_found():
+    class Pair(NamedTuple):
+        one: float
+        other: float
+
+    @compiled
+    def second(pair):
+        return pair[1]
+
+    assert second((1.0, 2.0)) == 2.0
+    assert second(Pair(3.0, 4.0)) == 4.0
+    assert second(np.array([5.0, 6.0])) == 6.0

@@ -23,9 +23,11 @@ from numba.core.dispatcher import _FunctionCompiler  # type: ignore[attr-defined
 from numba.core.registry import CPUDispatcher
 
 from dorothie_gym.compilation.cache import ContentCache
+from dorothie_gym.compilation.shortcuts import remembering, without_counts
 
 if TYPE_CHECKING:
     from numba.core.compiler import CompileResult
+    from numba.core.compiler_machinery import PassManager
 
 
 class _Library(JITCodeLibrary):  # type: ignore[misc]  # numba has no type information
@@ -96,14 +98,24 @@ def _others_of(library: _Library) -> list[CodeLibrary]:
     return [each for each in called if not isinstance(each, _Part)]
 
 
-class _WholeCompiler(Compiler):  # type: ignore[misc]  # numba has no type information
+class _Compiler(Compiler):  # type: ignore[misc]  # numba has no type information
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *others: Any) -> None:
+        super().__init__(typingctx, targetctx, library, *others)
+        if not self.state.flags.nrt:
+            self.state.typingctx = remembering(typingctx)
+
+    def define_pipelines(self) -> list[PassManager]:
+        return super().define_pipelines() if self.state.flags.nrt else [without_counts(self.state)]
+
+
+class _WholeCompiler(_Compiler):
     def __init__(self, typingctx: Any, targetctx: Any, library: Any, *others: Any) -> None:
         super().__init__(typingctx, targetctx, library, *others)
         self.state.library = _Library(self.state.targetctx.codegen(), "whole")
         self.state.library.enable_object_caching()
 
 
-class _PartCompiler(Compiler):  # type: ignore[misc]  # numba has no type information
+class _PartCompiler(_Compiler):
     def __init__(self, typingctx: Any, targetctx: Any, library: Any, *others: Any) -> None:
         super().__init__(typingctx, targetctx, library, *others)
         self.state.library = _Part(self.state.targetctx.codegen(), "part")

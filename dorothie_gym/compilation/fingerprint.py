@@ -21,7 +21,7 @@ import numpy as np
 
 PACKAGE: Final = "dorothie_gym"
 
-COMPILER: Final = ("__init__.py", "by_reference.py", "dispatcher.py")
+COMPILER: Final = ("__init__.py", "by_reference.py", "dispatcher.py", "shortcuts.py")
 """Files of this package that decide about machine code."""
 
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
