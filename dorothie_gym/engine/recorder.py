@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import LightColour, LightProgramme, Town
@@ -18,7 +19,6 @@ from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.recording import ACTOR_DTYPE, ActorKind, Decision, SessionWriter
 from dorothie_gym.sim.bodies import Pedestrian
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import ActionDict, ActionMapping, SpaceLimits, action_space, noop
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, concurrent
+from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.engine.view_arrays import (
     AdWizardArrays,
     CoWizardArrays,
@@ -29,7 +30,7 @@ from dorothie_gym.sim.ego.path_search import SEARCH, point_before, progress_on_p
 from dorothie_gym.sim.network.lane_lookup import closest_lane, wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import Feasible
-from dorothie_gym.sim.state.records import CoursePointRecord, RecordArray
+from dorothie_gym.sim.state.ego_records import CoursePointRecord
 from dorothie_gym.spaces import ExitColumn
 
 if TYPE_CHECKING:

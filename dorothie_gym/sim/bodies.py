@@ -20,11 +20,13 @@ import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.objects import Obstacle, RoadObject
 
+from dorothie_gym.compilation.records import record_dtype
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import LaneIndex, Route
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
+from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.record_views import (
     ArrayHolder,
@@ -38,7 +40,6 @@ from dorothie_gym.sim.state.record_views import (
     heading_field,
     int_field,
 )
-from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, VehicleRecord, record_dtype
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.parameters import PLANNED

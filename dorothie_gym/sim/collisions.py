@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.pedestrians.pacing import WALKER_RADIUS, WALKER_SIZE
+from dorothie_gym.sim.state.body_records import PlacedBody, VehicleRecord
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, EventCode, Kind, Walk
-from dorothie_gym.sim.state.records import PlacedBody, VehicleRecord
 from dorothie_gym.sim.state.world_arrays import log
 
 if TYPE_CHECKING:

@@ -14,13 +14,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.codes import EventCode
+from dorothie_gym.sim.state.ego_records import EventRecord
 from dorothie_gym.sim.state.record_views import ArrayHolder
-from dorothie_gym.sim.state.records import BreachRecord, EventRecord, plain
+from dorothie_gym.sim.state.sensing_records import BreachRecord
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation.records import RecordArray, empty_records, plain
 from dorothie_gym.maps.lane_neighbours import rightmost
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
@@ -18,8 +19,8 @@ from dorothie_gym.sim.pedestrians.footways import closest_walk, place_beside
 from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED
 from dorothie_gym.sim.pedestrians.walking import place_walker
 from dorothie_gym.sim.randomness import POOL, seed_of
+from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord
 from dorothie_gym.sim.state.codes import NOBODY, Footway, Kind, Walk
-from dorothie_gym.sim.state.records import PedestrianRecord, PropRecord, RecordArray, empty_records, plain
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import CAR_KEY, WorldArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild

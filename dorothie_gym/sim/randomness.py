@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import compiled
 
 if TYPE_CHECKING:
-    from dorothie_gym.sim.state.records import RandomBody, RandomStream
+    from dorothie_gym.sim.state.body_records import RandomBody, RandomStream
 
 MASK = 0xFFFFFFFF
 

@@ -17,8 +17,8 @@ from dorothie_gym.sim.ego.motion_control import guide
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
 from dorothie_gym.sim.sensing.localizer import localize
+from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import Kind, Refusal, Wait
-from dorothie_gym.sim.state.records import VehicleRecord
 from dorothie_gym.sim.state.world_arrays import note_pose, trace
 from dorothie_gym.sim.traffic.idm_traffic import drive
 from dorothie_gym.sim.traffic.lane_index import rebuild

@@ -26,6 +26,7 @@ from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
 from dorothie_gym.action_values import real_numbers, whole_number
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import load_town
@@ -34,7 +35,6 @@ from dorothie_gym.sim.network.network import LARGEST_COORDINATE, TownNetwork
 from dorothie_gym.sim.population import free_places, populate
 from dorothie_gym.sim.road import CompiledRoad
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.traffic.lane_index import rebuild

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import direct
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
@@ -30,9 +31,6 @@ from dorothie_gym.sim.sensing.localizer import Localizer
 from dorothie_gym.sim.sensing.perception import BODY, Perception, look_around
 from dorothie_gym.sim.sensing.visibility import Visibility
 from dorothie_gym.sim.state.codes import NO_SPACE
-from dorothie_gym.sim.state.records import (
-    plain,
-)
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
 from dorothie_gym.sim.traffic.parameters import FRAMES

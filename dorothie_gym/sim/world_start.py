@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.manoeuvres import BEGIN
 from dorothie_gym.sim.ego.planner import request_path
@@ -13,7 +14,6 @@ from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_car, populate
 from dorothie_gym.sim.sensing.localizer import switch_on
 from dorothie_gym.sim.state.record_views import ArrayHolder
-from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world, sow
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
@@ -17,8 +18,8 @@ from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.population import add_vehicle
+from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import Kind, Wait
-from dorothie_gym.sim.state.records import RecordArray, VehicleRecord
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
 from dorothie_gym.sim.step import update_lane

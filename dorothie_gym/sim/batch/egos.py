@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
+from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.batch.threads import take
 from dorothie_gym.sim.batch.worlds import world_of
 from dorothie_gym.sim.network.lane_lookup import project, value_near
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.randomness import choose
+from dorothie_gym.sim.state.body_records import MovingBody, PlacedBody, VehicleRecord
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.records import Flag, Float, Int32, MovingBody, PlacedBody, RecordArray, VehicleRecord
 from dorothie_gym.sim.step import step_around, update_lane
 from dorothie_gym.sim.traffic.parameters import AFTER_END, CAR_LENGTH, MAX_SPEED
 from dorothie_gym.sim.traffic.vehicle_models import slip_towards, steering_angle

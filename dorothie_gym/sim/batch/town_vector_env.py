@@ -19,6 +19,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
 from dorothie_gym.action_values import as_array
+from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.copying import Restorable
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps import load_town
@@ -43,7 +44,6 @@ from dorothie_gym.sim.batch.worlds import VectorWorld
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.population import add_vehicle, free_places
 from dorothie_gym.sim.state.codes import Kind
-from dorothie_gym.sim.state.records import RecordArray, empty_records
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.town_env import SEEDS, TownConfig, TownEnv, config_with_town, finite, populate_around

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.polyline import HEADING, HEIGHT, STATION, X, Y
 from dorothie_gym.sim.ego.limits import LATERAL_ACCELERATION, PROFILE_BRAKING, U_TURN_SPEED
 from dorothie_gym.sim.network.centre_lines import interpolated, position_on, project_on, segment_at, value_on
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
-from dorothie_gym.sim.state.records import CoursePointRecord, RecordArray
+from dorothie_gym.sim.state.ego_records import CoursePointRecord
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH
 
 if TYPE_CHECKING:

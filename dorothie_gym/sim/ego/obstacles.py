@@ -12,7 +12,8 @@ from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.sim.ego.course import PATH_SPACING, height_at_point
 from dorothie_gym.sim.ego.path import WIDEST_SWEEP, point_at
 from dorothie_gym.sim.state.codes import STATIC
-from dorothie_gym.sim.state.records import EgoRecord, SeenRecord
+from dorothie_gym.sim.state.ego_records import EgoRecord
+from dorothie_gym.sim.state.sensing_records import SeenRecord
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.course import SEARCH_RANGE
-from dorothie_gym.sim.state.records import CoursePointRecord, RecordArray, SweepRecord, VehicleRecord
+from dorothie_gym.sim.state.body_records import VehicleRecord
+from dorothie_gym.sim.state.ego_records import CoursePointRecord, SweepRecord
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.route import locate
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from dorothie_gym.compilation import compiled
-from dorothie_gym.sim.state.records import CoursePointRecord, RecordArray
+from dorothie_gym.compilation.records import RecordArray
+from dorothie_gym.sim.state.ego_records import CoursePointRecord
 
 SEARCH = 6.0
 """Half width of the search for a place on the path [m], to which twice the error of the pose estimate is added."""

@@ -13,6 +13,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from dorothie_gym.compilation import direct
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
@@ -22,7 +23,6 @@ from dorothie_gym.sim.ego.manoeuvres import find_feasible, request
 from dorothie_gym.sim.ego.path import Path
 from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE, Feasible, Refusal
 from dorothie_gym.sim.state.record_views import ArrayHolder
-from dorothie_gym.sim.state.records import plain
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
 

@@ -11,7 +11,7 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.polyline import HEADING, STATION, X, Y
 from dorothie_gym.sim.network.lane_lookup import closest_segment, stretch_near
-from dorothie_gym.sim.state.records import LaneRecord
+from dorothie_gym.sim.state.town_records import LaneRecord
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

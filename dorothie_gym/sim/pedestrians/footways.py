@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.lane_neighbours import LaneEdges, leftmost, oncoming_lanes, rightmost
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.pedestrians.pacing import FROM_ENDS, FROM_JUNCTION, KERB, SHORTEST_WALK, WALK_STEP
-from dorothie_gym.sim.state.records import LaneRecord, PedestrianRecord, RecordArray, WalkwayRecord
+from dorothie_gym.sim.state.body_records import PedestrianRecord
+from dorothie_gym.sim.state.town_records import LaneRecord, WalkwayRecord
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
@@ -161,7 +163,7 @@ def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edge
 
     Args:
         points: (p, 6) of the lanes' centre lines, as in `TownArrays`.
-        lanes: `records.LANE`.
+        lanes: `town_records.LaneRecord`.
         town: the town.
         edges: edges of its lanes.
     """

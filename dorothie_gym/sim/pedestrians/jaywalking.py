@@ -18,8 +18,8 @@ from dorothie_gym.sim.pedestrians.pacing import (
     walk_towards,
 )
 from dorothie_gym.sim.randomness import draw
+from dorothie_gym.sim.state.body_records import PedestrianRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Footway, Kind, Walk
-from dorothie_gym.sim.state.records import PedestrianRecord, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import ASKING, CRITICAL_GAP
 from dorothie_gym.sim.traffic.vehicle_models import brake_to
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
+from dorothie_gym.sim.state.body_records import PedestrianRecord, SizedBody
 from dorothie_gym.sim.state.codes import Kind, Walk
-from dorothie_gym.sim.state.records import PedestrianRecord, SizedBody
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

@@ -15,8 +15,9 @@ from dorothie_gym.sim.pedestrians.footways import KEEP_RIGHT, enter_next, find_s
 from dorothie_gym.sim.pedestrians.jaywalking import steps_out, stray
 from dorothie_gym.sim.pedestrians.pacing import OBSTACLE_PATIENCE, WALK_AHEAD, note_progress, walk_towards
 from dorothie_gym.sim.randomness import draw
+from dorothie_gym.sim.state.body_records import PedestrianRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
-from dorothie_gym.sim.state.records import CrossingRecord, PedestrianRecord, VehicleRecord, WalkwayRecord
+from dorothie_gym.sim.state.town_records import CrossingRecord, WalkwayRecord
 from dorothie_gym.sim.traffic.junctions import light
 from dorothie_gym.sim.traffic.parameters import TRAFFIC_STANDING
 

@@ -12,22 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym.compilation.records import RecordArray, empty_records, filled_records
 from dorothie_gym.maps.lane_neighbours import LaneEdges
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Crosswalk, Lane, Sidewalk
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import street_walks
 from dorothie_gym.sim.state.codes import NOBODY, Footway
-from dorothie_gym.sim.state.records import (
-    CrossingRecord,
-    LaneRecord,
-    MouthRecord,
-    PassageRecord,
-    RecordArray,
-    WalkwayRecord,
-    empty_records,
-    filled_records,
-)
+from dorothie_gym.sim.state.town_records import CrossingRecord, LaneRecord, MouthRecord, PassageRecord, WalkwayRecord
 
 SAME_END = 0.5
 """Distance within which ends of pavements are one place [m]."""
@@ -80,7 +72,7 @@ def build_walkways(network: TownNetwork, lanes: RecordArray[LaneRecord]) -> Walk
 
     Args:
         network: of the town.
-        lanes: `records.LANE`, complete but for the passages.
+        lanes: `town_records.LaneRecord`, complete but for the passages.
     """
     town = network.town
     edges = LaneEdges(town)

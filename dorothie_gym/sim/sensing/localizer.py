@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.randomness import begin_stream, draw_normal
 from dorothie_gym.sim.state.record_views import ArrayHolder
-from dorothie_gym.sim.state.records import LOCALIZER_STATES, ODOMETRY_DRAWS, plain
+from dorothie_gym.sim.state.sensing_records import LOCALIZER_STATES, ODOMETRY_DRAWS
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 SCALE_SIGMA = 0.02
@@ -80,7 +81,7 @@ def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: flo
     diagonal are not 0, so that it is applied row by row, then column by column.
 
     Args:
-        mean: (5,) see `records.LOCALIZER_STATES`; written.
+        mean: (5,) see `sensing_records.LOCALIZER_STATES`; written.
         covariance: (5, 5) of it; written.
         ahead: way ahead [m]; `right` to the right of that.
         right: [m].

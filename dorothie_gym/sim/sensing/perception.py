@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
@@ -25,16 +26,9 @@ from dorothie_gym.sim.sensing.visibility import (
     sight_in,
     signal,
 )
+from dorothie_gym.sim.state.body_records import PedestrianRecord, PlacedBody, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, Group, Kind, Walk
-from dorothie_gym.sim.state.records import (
-    EyeRecord,
-    PedestrianRecord,
-    PlacedBody,
-    PropRecord,
-    RecordArray,
-    SeenRecord,
-    VehicleRecord,
-)
+from dorothie_gym.sim.state.sensing_records import EyeRecord, SeenRecord
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

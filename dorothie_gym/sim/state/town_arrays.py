@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation.by_reference import by_reference
+from dorothie_gym.compilation.records import RecordArray, empty_records, filled_records
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
 from dorothie_gym.maps.polyline import WIDTH, LaneTable
@@ -22,7 +23,7 @@ from dorothie_gym.sim.network.lane_lookup import build_cells
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.walkways import build_walkways
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Relation, TrafficControl
-from dorothie_gym.sim.state.records import (
+from dorothie_gym.sim.state.town_records import (
     CellEntryRecord,
     CrossingRecord,
     ExitRecord,
@@ -31,12 +32,9 @@ from dorothie_gym.sim.state.records import (
     MouthRecord,
     PassageRecord,
     ProgrammeRecord,
-    RecordArray,
     SiblingRecord,
     StopLineRecord,
     WalkwayRecord,
-    empty_records,
-    filled_records,
 )
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CURVE_ACCELERATION, CYCLIST_ROADS
 

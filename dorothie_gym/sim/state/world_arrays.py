@@ -11,35 +11,35 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.compilation.records import Record
+from dorothie_gym.compilation.records import Record, RecordArray, empty_records, plain, record_dtype
 from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.state.body_records import (
+    ClockRecord,
+    LampRecord,
+    NodeRecord,
+    PedestrianRecord,
+    PropRecord,
+    VehicleRecord,
+)
 from dorothie_gym.sim.state.codes import NOBODY, U_TURN
-from dorothie_gym.sim.state.records import (
+from dorothie_gym.sim.state.ego_records import (
     POSE,
     TRACE,
-    BreachRecord,
-    ClockRecord,
     CoursePointRecord,
     EgoRecord,
     EventRecord,
-    EyeRecord,
     GoalRecord,
-    LampRecord,
     LaneStepRecord,
+    PlanRecord,
+    SweepRecord,
+)
+from dorothie_gym.sim.state.sensing_records import (
+    BreachRecord,
+    EyeRecord,
     LineMarkRecord,
     LocalizerRecord,
-    NodeRecord,
-    PedestrianRecord,
-    PlanRecord,
-    PropRecord,
-    RecordArray,
     SeenRecord,
-    SweepRecord,
-    VehicleRecord,
     WatchRecord,
-    empty_records,
-    plain,
-    record_dtype,
 )
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
@@ -90,8 +90,8 @@ class WorldArrays(NamedTuple):
         seen_props: (p, 3) x, y and height of the props that it sees [m].
         eye: (1,) its visibility.
         seen: bodies that it perceives, nearest first.
-        trace: (f, 10) its trajectory in the last call of `step`, see `records.TRACE`.
-        poses: (f + 1, 6) its poses before that call and after each of its substeps, see `records.POSE`.
+        trace: (f, 10) its trajectory in the last call of `step`, see `ego_records.TRACE`.
+        poses: (f + 1, 6) its poses before that call and after each of its substeps, see `ego_records.POSE`.
         events: its events in that call.
         localizer: (1,) its pose estimate.
         watch: (1,) numbers of its breaches of the rules.
@@ -317,7 +317,7 @@ def _extended(records: RecordArray[Record], count: int) -> RecordArray[Record]:
 
 @inlined
 def trace(world: WorldArrays) -> None:
-    """Logs the ego's state after a substep, see `records.TRACE` and `records.POSE`."""
+    """Logs the ego's state after a substep, see `ego_records.TRACE` and `ego_records.POSE`."""
     car, vehicle = world.car[0], world.vehicles[0]
     rows, k = world.trace, int(car.frames)
     car.frames += 1

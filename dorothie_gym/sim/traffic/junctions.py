@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.traffic_light_programs import YELLOW_BRAKING
+from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Kind, Relation, TrafficControl, Wait
-from dorothie_gym.sim.state.records import LaneRecord, VehicleRecord
+from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.parameters import (
     AFTER_END,
     AT_LINE,

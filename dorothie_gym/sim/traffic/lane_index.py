@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.sim.network.ahead import HORIZON, LANE_MARGIN
 from dorothie_gym.sim.network.lane_lookup import project
+from dorothie_gym.sim.state.body_records import NodeRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import NOBODY, Kind
-from dorothie_gym.sim.state.records import NodeRecord, RecordArray, VehicleRecord
 from dorothie_gym.sim.traffic.parameters import CAR_WIDTH
 
 if TYPE_CHECKING:

@@ -8,8 +8,9 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.network.ahead import HORIZON
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.randomness import choose
+from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import Kind
-from dorothie_gym.sim.state.records import LaneRecord, VehicleRecord
+from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.parameters import AFTER_END, CYCLIST_FROM_EDGE, PLANNED
 
 if TYPE_CHECKING:

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.network.lane_lookup import project, value_near, wrap_radians
+from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import Kind
-from dorothie_gym.sim.state.records import LaneRecord, VehicleRecord
+from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.lane_index import around
 from dorothie_gym.sim.traffic.parameters import (
     ACC_MAX,

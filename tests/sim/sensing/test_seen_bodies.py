@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.ontology import ObjectClass, PropKind, WeatherParameter
 from dorothie_gym.sim.ego.obstacles import PerceivedBody
 from dorothie_gym.sim.sensing.perception import (
@@ -21,16 +22,9 @@ from dorothie_gym.sim.sensing.perception import (
     see,
 )
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, Visibility
+from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Group, Kind, Walk
-from dorothie_gym.sim.state.records import (
-    EyeRecord,
-    PedestrianRecord,
-    PropRecord,
-    RecordArray,
-    SeenRecord,
-    VehicleRecord,
-    empty_records,
-)
+from dorothie_gym.sim.state.sensing_records import EyeRecord, SeenRecord
 from dorothie_gym.sim.weather import Weather
 
 P = WeatherParameter

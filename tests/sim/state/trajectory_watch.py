@@ -23,7 +23,7 @@ class TrajectoryWatch(WorldEventLog):
         super().__init__(network, self)
 
     def look(self, poses: Array, frame: int) -> list[WorldEvent]:
-        """Returns the breaches on a trajectory (n + 1, 6), columns `records.POSE`; `frame` is that of the first pose.
+        """Returns the breaches on poses (n + 1, 6), columns `ego_records.POSE`, of which the first has the number `frame`.
 
         The first pose is the last one of the stretch before.
         """
