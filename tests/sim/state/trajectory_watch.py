@@ -23,9 +23,9 @@ class TrajectoryWatch(WorldEventLog):
         super().__init__(network, self)
 
     def look(self, poses: Array, frame: int) -> list[WorldEvent]:
-        """Returns the breaches on poses (n + 1, 6), columns `ego_records.POSE`, of which the first has the number `frame`.
+        """Returns the breaches on a trajectory (n + 1, 6), columns `ego_records.POSE`.
 
-        The first pose is the last one of the stretch before.
+        The first pose is that of `frame`, and the last one of the stretch before.
         """
         for first in range(0, len(poses) - 1, FRAMES):
             part = poses[first : first + FRAMES + 1]
