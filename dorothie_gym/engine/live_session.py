@@ -49,6 +49,11 @@ def session_seeds(scenario: Scenario) -> list[np.random.SeedSequence]:
     return np.random.SeedSequence([scenario.seed, 1]).spawn(4)
 
 
+def world_seed_of(scenario: Scenario) -> np.random.SeedSequence:
+    """Returns the first of the seeds of a session, that of the world, without the others."""
+    return np.random.SeedSequence([scenario.seed, 1], spawn_key=(0,))
+
+
 class StepBegun(NamedTuple):
     """What the end of a decision needs to know of its beginning.
 

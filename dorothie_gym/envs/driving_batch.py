@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.engine.beliefs import goals_on_map
-from dorothie_gym.engine.live_session import session_seeds
+from dorothie_gym.engine.live_session import world_seed_of
 from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.envs.driving_arrays import EVENTS, Event, Stage, row_of
@@ -66,7 +66,7 @@ class DrivingBatch(DrivingRows):
         """Starts a session in a row."""
         face = self.faces[number] = DrivingFace(scenario)
         self._blanks.write(number)
-        seeds = WorldSeeds(*session_seeds(scenario)[0].spawn(5))
+        seeds = WorldSeeds(*world_seed_of(scenario).spawn(5))
         start_world(self._network, RowHolder(self, number), self._session_config.world, seeds, scenario.departure)
         marks = scenario.storyboard.landmarks[: self._limits.landmarks]
         write_scenario(

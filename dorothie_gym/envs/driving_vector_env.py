@@ -258,8 +258,9 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         self._infractions[numbers] = batch.infractions[changed]
         truncated = outcomes["ending"] == Ending.OUT_OF_TIME
         self._truncations[numbers], self._terminations[numbers] = truncated, (outcomes["ending"] > 0) & ~truncated
-        pairs = zip(np.flatnonzero(changed).tolist(), batch.any_refused[changed].tolist(), strict=True)
-        reasons = (batch.refused(place) if refused else [] for place, refused in pairs)
+        reasons: list[list[str]] = [[] for _ in range(len(numbers))]
+        for row in np.flatnonzero(batch.any_refused[changed]).tolist():
+            reasons[row] = batch.refused(int(np.flatnonzero(changed)[row]))
         self._refused[numbers] = np.fromiter(reasons, dtype=object, count=len(numbers))
         for number in numbers.tolist() if self._views else ():
             self._views[number].note(*self._places[number])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
@@ -154,8 +155,7 @@ class Interference:
             scenario: scenario of the session.
             rate: average number of exceptions in a session.
         """
-        self._policy = ScriptedAdWizard(limits, rate=rate)
-        self._decoder = ActionDecoder(Role.AD_WIZARD, limits)
+        self._policy, self._decoder = _wizard_of(limits, rate)
         self._plans = self._policy.initial_state(policy_seed(scenario.seed, Role.AD_WIZARD), town)
         self._story = plain_text(scenario.storyboard.story, STORY_LENGTH)
 
@@ -179,6 +179,12 @@ class Interference:
         """
         action, self._plans = self._policy.step(seen[Role.AD_WIZARD], replace(self._plans, count=count - 1))
         return self._decoder(action)
+
+
+@lru_cache(maxsize=16)
+def _wizard_of(limits: SpaceLimits, rate: float) -> tuple[ScriptedAdWizard, ActionDecoder]:
+    """Returns the policy, which has no state, and the decoder of its actions."""
+    return ScriptedAdWizard(limits, rate=rate), ActionDecoder(Role.AD_WIZARD, limits)
 
 
 def permits_changes(task: TaskState) -> bool:

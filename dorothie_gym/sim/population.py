@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation import compiled, direct
 from dorothie_gym.compilation.records import RecordArray, empty_records, plain
 from dorothie_gym.maps.lane_neighbours import rightmost
 from dorothie_gym.maps.model import Array, Lane
@@ -66,7 +66,9 @@ def add_vehicle(
     if not len(empty):
         raise ValueError(f"the world has room for {len(world.vehicles)} vehicles, and all are there")
     number = int(empty[0])
-    _put_vehicle(town, world, number, int(kind), lane, float(station), desired, np.zeros(POOL, dtype=np.int64))
+    _place_vehicle(
+        town, world, number, int(kind), int(lane), float(station), float(desired), np.zeros(POOL, dtype=np.int64)
+    )  # fmt: skip
     return number
 
 
@@ -90,6 +92,9 @@ def _put_vehicle(
         vehicle.desired = min(max(desired, CYCLIST_SPEEDS[0]), CYCLIST_SPEEDS[1])
     put_on_lane(town, vehicle, lane, station)
     rebuild(town, world)
+
+
+_place_vehicle = direct(_put_vehicle)
 
 
 def add_car(town: TownArrays, world: WorldArrays, lane: int, station: float) -> None:
@@ -353,6 +358,7 @@ def _rideable(network: TownNetwork) -> NDArray[np.bool_]:
     return rideable
 
 
+@direct
 @compiled
 def _fill_lanes(
     town: TownArrays, world: WorldArrays, lanes: NDArray[np.int64], stations: Array, rideable: NDArray[np.bool_],
@@ -409,6 +415,7 @@ def _footways(network: TownNetwork) -> Array:
     return np.zeros(0)
 
 
+@direct
 @compiled
 def _fill_footways(
     town: TownArrays, world: WorldArrays, walks: NDArray[np.int64], shares: Array, room: int,
