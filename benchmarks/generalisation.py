@@ -26,6 +26,9 @@ from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
 FIRST_TEST: Final = FIRST_SEED + 500_000
 """Seed of the first episode; the evaluations of the training have lower ones."""
 
+EVALUATIONS: Final = 10
+"""Number of evaluations of a training whose steps are given."""
+
 
 def main(
     maps: Annotated[list[str] | None, typer.Argument(help="further maps to try the drivers in")] = None,
@@ -49,7 +52,9 @@ def main(
         folder = work / f"seed-{seed}"
         command = ["train-rl", algorithm, "--out", str(folder), "--seed", str(seed)]
         command += ["--set", f"town=[{','.join(SEEN_TOWNS)}]", "--set", f"guidance={guidance}"]
-        command += ["--set", f"exceptions={exceptions:g}", *(["--steps", str(steps)] if steps else [])]
+        command += ["--set", f"exceptions={exceptions:g}"]
+        if steps is not None:
+            command += ["--steps", str(steps), "--evaluate-every", str(max(steps // EVALUATIONS, 1))]
         print(f"dorothie-gym {' '.join(command)}", file=sys.stderr, flush=True)
         subprocess.run([sys.executable, "-m", "dorothie_gym", *command], check=True, stdout=sys.stderr)
         for town in towns:

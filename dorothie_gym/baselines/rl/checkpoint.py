@@ -18,6 +18,7 @@ from safetensors.torch import load_file
 from stable_baselines3.common.vec_env import VecEnv
 
 from dorothie_gym.baselines.rl.environments import make_env_of_model
+from dorothie_gym.baselines.rl.fine_inputs import FineInputs
 from dorothie_gym.baselines.rl.settings import (
     ALGORITHMS,
     FINAL_ENTROPY,
@@ -71,11 +72,13 @@ def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv, device: str = "
     parameters.pop(FINAL_ENTROPY, None)  # see `training.EntropySchedule`
     if last is not None:
         parameters["learning_rate"] = LinearSchedule(float(parameters["learning_rate"]), float(last))
+    policy: dict[str, object] = {"net_arch": list(settings.network)}
+    if settings.fine_inputs:
+        policy["features_extractor_class"] = FineInputs
     try:
         return getattr(import_module(package), name)(
-            "MlpPolicy", env, policy_kwargs={"net_arch": list(settings.network)}, seed=settings.seed, device=device,
-            **parameters,
-        )  # fmt: skip
+            "MlpPolicy", env, policy_kwargs=policy, seed=settings.seed, device=device, **parameters
+        )
     except AssertionError as error:
         raise SettingsError(
             f"{settings.algorithm} on {settings.env}: {settings.algorithm} cannot choose actions of {env.action_space}"

@@ -137,11 +137,13 @@ class TrainingSettings(RunSettings):
         algorithm: one of `ALGORITHMS`.
         env: id of the environment.
         env_settings: arguments of the environment.
+        fine_inputs: whether networks get each input in two scales, see `FineInputs`.
     """
 
     algorithm: str
     env: str
     env_settings: Arguments = field(default_factory=dict)
+    fine_inputs: bool = False
 
     def __post_init__(self) -> None:
         _check_algorithm(self.algorithm)

@@ -63,6 +63,22 @@ def test_saved_model_acts_like_the_trained_one(algorithm: str, tmp_path: Path) -
     assert not list(tmp_path.rglob("*.zip")) and not list(tmp_path.rglob("*.pkl"))
 
 
+@pytest.mark.parametrize("algorithm", ["maskable_ppo", "sac"])
+def test_network_gets_its_inputs_in_two_scales(algorithm: str, tmp_path: Path) -> None:
+    training = Training(settings_for(algorithm, fine_inputs=True), tmp_path)
+    size = training.model.observation_space.shape[0]
+    first = next(value for name, value in training.model.policy.named_parameters() if value.ndim == 2)
+    assert first.shape[1] == 2 * size
+    training.run()
+    model, settings = load_model(tmp_path)
+    assert settings.fine_inputs
+    slow, standing = np.zeros((2, size), dtype=np.float32)
+    slow[0] = 0.03
+    inputs = model.policy.actor.features_extractor if algorithm == "sac" else model.policy.features_extractor
+    difference = (inputs(torch.from_numpy(slow[None])) - inputs(torch.from_numpy(standing[None]))).abs().max()
+    assert float(difference) == pytest.approx(0.3)
+
+
 def test_weight_of_the_entropy_falls_to_its_last_value(tmp_path: Path) -> None:
     training = Training(settings_for("ppo"), tmp_path)
     assert training.model.ent_coef == 0.01
