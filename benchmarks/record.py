@@ -15,6 +15,8 @@ BENCHMARKS = {
     "world_100_vehicles": ("world", "--vehicles", "100", "--pedestrians", "50"),
     "env": ("env",),
     "vector": ("vector",),
+    "rl": ("rl",),
+    "rl_medium_traffic": ("rl", "--town", "midtown", "--traffic", "medium", "--exceptions", "2"),
     "import": ("import",),
 }
 
