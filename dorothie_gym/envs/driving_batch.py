@@ -164,7 +164,7 @@ class DrivingBatch(DrivingRows):
 
     def _look(self, number: int) -> None:
         """Updates what the ego sees after a change of weather or faults."""
-        world = self._live_session(number).world
+        world = self.catch_up(number).world
         world.write_weather()
         self._decisions["faulty"][number] = bool(world.faults)
         if world.faults:
@@ -177,7 +177,7 @@ class DrivingBatch(DrivingRows):
         if self._config.exceptions <= 0.0:
             return
         for number in np.flatnonzero(playing & self._plans["acts"]).tolist():
-            face, live, plans = self._face(number), self._live_session(number), self._plans[number]
+            face, live, plans = self._face(number), self.catch_up(number), self._plans[number]
             assert face.interference is not None
             live.begin_decision()
             seen, face.seen = face.seen or LazyObservations(live), None
@@ -192,7 +192,7 @@ class DrivingBatch(DrivingRows):
     def _foresee(self) -> None:
         """Lets the Ad-Wizards that act next observe the paths that are to be replaced."""
         for number in np.flatnonzero(self._plans["acts"] & (self._decisions["stage"] == Stage.LOST)).tolist():
-            self._face(number).seen = seen = LazyObservations(self._live_session(number))
+            self._face(number).seen = seen = LazyObservations(self.catch_up(number))
             seen[Role.AD_WIZARD]  # builds them
 
     def _send_note(self, number: int) -> None:
@@ -203,7 +203,7 @@ class DrivingBatch(DrivingRows):
             face.goals = note.goals
             set_goals(RowHolder(self, number), goals_on_map(face.scenario, note.goals))
         else:
-            live = self._live_session(number)
+            live = self.catch_up(number)
             live.begin_decision()
             reason = live.update_beliefs(note)
             self._move_in(number)
@@ -214,7 +214,7 @@ class DrivingBatch(DrivingRows):
 
     def _arrive(self, number: int) -> None:
         """Completes the subgoals whose waypoint the standing ego has reached."""
-        live = self._live_session(number)
+        live = self.catch_up(number)
         live.begin_decision()
         live.note_arrivals()
         self._note_task(number, live.task)

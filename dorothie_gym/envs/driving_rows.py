@@ -304,10 +304,6 @@ class DrivingRows(Lookups):
         """Whether every environment has a session."""
         return None not in self.faces
 
-    def catch_up(self, number: int) -> LiveSession:
-        """Returns the session of an environment, as it is after the last decision."""
-        return self._live_session(number)
-
     # --- Sessions and rows ------------------------------------------------------------------------------------------
 
     def _face(self, number: int) -> DrivingFace:
@@ -316,7 +312,7 @@ class DrivingRows(Lookups):
         assert face is not None
         return face
 
-    def _live_session(self, number: int) -> LiveSession:
+    def catch_up(self, number: int) -> LiveSession:
         """Returns the session of an environment, with the time and place of its row."""
         face = self._face(number)
         if face.live is None:
@@ -330,7 +326,7 @@ class DrivingRows(Lookups):
 
     def _move_in(self, number: int) -> None:
         """Copies the world of a session into its row, and makes the session show the row."""
-        actors = self._live_session(number).world.actors
+        actors = self.catch_up(number).world.actors
         if actors.arrays is self.row(number):
             return
         self.make_room(actors.arrays)
