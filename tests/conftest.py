@@ -10,11 +10,15 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 from dorothie_gym.compilation import compiled_folder
 from dorothie_gym.engine.warm_up import is_warm, warm_up
 from dorothie_gym.envs import warm_up as navigation
 from dorothie_gym.user_cache import CACHE_VARIABLE
+
+settings.register_profile("patient", deadline=None)  # durations are no results: another process may use the cores
+settings.load_profile("patient")
 
 BATCHED = frozenset(["baselines", "envs"])
 """Folders of tests that step batches of the navigation environments."""

@@ -88,7 +88,7 @@ def test_ctrl_c_while_a_corpus_is_read_is_reported(
         (["ppo", "--set", "guidance=stars", "--workers", "1"], "guidance is 'stars'"),
         (["ppo", "--env", "dorothie_gym/Nope-v0", "--workers", "1"], "Nope"),
         (["ppo", "--env", "dorothie_gym/NoSuch-v0"], "dorothie_gym/NoSuch-v0"),
-        (["sac"], "sac on dorothie_gym/Navigation-v0"),
+        (["sac", "--env", "dorothie_gym/Navigation-v0"], "sac on dorothie_gym/Navigation-v0"),
         (["selfplay", "--set", "colour=red"], "selfplay has no 'colour'"),
         (["selfplay", "--set", "town=atlantis"], "atlantis"),
         (["selfplay", "--env", "dorothie_gym/CoWizard-v0"], "omit the option"),
