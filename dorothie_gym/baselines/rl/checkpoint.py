@@ -79,12 +79,10 @@ def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv, device: str = "
         return getattr(import_module(package), name)(
             "MlpPolicy", env, policy_kwargs=policy, seed=settings.seed, device=device, **parameters
         )
-    except AssertionError as error:
-        raise SettingsError(
-            f"{settings.algorithm} on {settings.env}: {settings.algorithm} cannot choose actions of {env.action_space}"
-        ) from error
-    except (TypeError, ValueError) as error:
-        raise SettingsError(f"{settings.algorithm} on {settings.env}: {error}") from error
+    except (AssertionError, TypeError, ValueError) as error:
+        unfit = isinstance(error, AssertionError) and "as action spaces" in str(error)
+        reason = f"{settings.algorithm} cannot choose actions of {env.action_space}" if unfit else error
+        raise SettingsError(f"{settings.algorithm} on {settings.env}: {reason}") from error
 
 
 def _check_device(device: str) -> None:

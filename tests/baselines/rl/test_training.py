@@ -118,6 +118,8 @@ def test_driver_of_several_towns(tmp_path: Path) -> None:
 def test_algorithm_that_cannot_choose_the_actions_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"sac cannot choose actions of Discrete\(18\)"):
         Training(settings_for("sac", env=DISCRETE), tmp_path)
+    with pytest.raises(SettingsError, match="batch_size"):
+        Training(settings_for("ppo", parameters={"n_steps": 16, "batch_size": 1}), tmp_path)
 
 
 def test_unknown_device_is_refused(tmp_path: Path) -> None:
