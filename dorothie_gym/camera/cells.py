@@ -1,0 +1,217 @@
+"""Square cells of a mesh, drawn from the near to the far ones as far as they are in view and not hidden."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.camera.mesh import Mesh
+from dorothie_gym.camera.pose import View
+from dorothie_gym.camera.rasterizer import NEAR, VisibilityBuffer, draw_triangles
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.by_reference import by_reference
+from dorothie_gym.copying import shared
+from dorothie_gym.maps.model import Array
+
+CELL = 24.0
+"""Size of a cell [m]."""
+
+TILE = 16
+"""Size of a tile of samples [samples]."""
+
+_RINGS = 128  # distances at which cells are sorted
+_RING = 8.0  # [m]
+
+
+@by_reference
+@shared
+class CellTable(NamedTuple):
+    """Boxes of the cells of a mesh that is sorted by them.
+
+    Attributes:
+        low: (m, 3) smallest coordinates of a cell's triangles [m].
+        high: (m, 3) largest coordinates [m].
+        ranges: (m, 2) int32 first triangle of the cell, and the one after its last.
+    """
+
+    low: Array
+    high: Array
+    ranges: NDArray[np.int32]
+
+
+@by_reference
+class CellOrder(NamedTuple):
+    """Scratch space of `draw_cells`.
+
+    Attributes:
+        rings: (_RINGS + 1,) int32 where the cells of a distance begin in `order`.
+        order: (m,) int32 cells in view, from near to far.
+        ring: (m,) int32 distance of each cell in rings, -1 if it is out of view.
+        tiles: (rows, columns) float32 smallest nearness in a tile of samples [1/m].
+        line: (w,) float32 smallest nearness in the columns of a row of tiles [1/m].
+    """
+
+    rings: NDArray[np.int32]
+    order: NDArray[np.int32]
+    ring: NDArray[np.int32]
+    tiles: NDArray[np.float32]
+    line: NDArray[np.float32]
+
+
+def sorted_by_cell(mesh: Mesh, size: float = CELL) -> tuple[Mesh, CellTable, NDArray[np.int64]]:
+    """Returns the mesh sorted by the cells of its triangles' centres, the cells, and the order of the rows."""
+    if not mesh.size:
+        empty = np.zeros((0, 3))
+        return mesh, CellTable(empty, empty, np.zeros((0, 2), np.int32)), np.zeros(0, np.int64)
+    place = np.floor(mesh.corners.mean(axis=1, dtype=np.float64)[:, :2] / size).astype(np.int64)
+    order = np.lexsort((place[:, 0], place[:, 1]))
+    whole, place = mesh.part(order), place[order]
+    first = np.flatnonzero(np.concatenate(([True], (np.diff(place, axis=0) != 0).any(axis=1))))
+    low = np.minimum.reduceat(whole.corners.min(axis=1), first).astype(np.float64)
+    high = np.maximum.reduceat(whole.corners.max(axis=1), first).astype(np.float64)
+    ranges = np.column_stack((first, np.append(first[1:], mesh.size))).astype(np.int32)
+    return whole, CellTable(low, high, ranges), order
+
+
+def new_order(cells: CellTable, width: int, height: int) -> CellOrder:
+    """Returns scratch space for some cells and a picture."""
+    count = len(cells.ranges)
+    return CellOrder(
+        np.zeros(_RINGS + 1, np.int32), np.zeros(count, np.int32), np.zeros(count, np.int32),
+        np.zeros((-(-height // TILE), -(-width // TILE)), np.float32), np.zeros(width, np.float32),
+    )  # fmt: skip
+
+
+@compiled
+def draw_cells(
+    view: View, buffer: VisibilityBuffer, mesh: Mesh, cells: CellTable, scratch: CellOrder, number: int
+) -> int:
+    """Draws the cells of a mesh that are in view and not hidden by nearer ones; returns the number of their triangles.
+
+    Args:
+        view: projection.
+        buffer: to be drawn to.
+        mesh: sorted by cell.
+        cells: of the mesh.
+        scratch: from `new_order`; its tiles remain those of the buffer.
+        number: of the first triangle of the mesh.
+    """
+    _sort_cells(view, cells, scratch)
+    drawn, ring, due = 0, 0, 1
+    while ring < _RINGS:
+        if ring == due:  # twice as far as the last time
+            find_tiles(view, buffer, scratch)
+            due *= 2
+        for k in range(scratch.rings[ring], scratch.rings[ring + 1]):
+            cell = scratch.order[k]
+            if ring == 0 or not is_hidden(view, scratch.tiles, cells.low[cell], cells.high[cell]):
+                first, last = cells.ranges[cell, 0], cells.ranges[cell, 1]
+                draw_triangles(view, buffer, mesh, first, last, number + first)
+                drawn += last - first
+        ring += 1
+    find_tiles(view, buffer, scratch)
+    return drawn
+
+
+@compiled
+def _sort_cells(view: View, cells: CellTable, scratch: CellOrder) -> None:
+    """Sorts the cells in view by their distance, in rings."""
+    rings, ring = scratch.rings, scratch.ring
+    rings[:] = 0
+    for k in range(len(ring)):
+        ring[k] = -1
+        if is_in_view(view, cells.low[k], cells.high[k]):
+            x = max(cells.low[k, 0] - view.origin[0], 0.0, view.origin[0] - cells.high[k, 0])
+            y = max(cells.low[k, 1] - view.origin[1], 0.0, view.origin[1] - cells.high[k, 1])
+            ring[k] = min(int(math.sqrt(x * x + y * y) / _RING), _RINGS - 1)
+            rings[ring[k] + 1] += 1
+    for k in range(_RINGS):
+        rings[k + 1] += rings[k]
+    for k in range(len(ring) - 1, -1, -1):  # fills each ring from its end, and leaves the ends one ring too far
+        if ring[k] >= 0:
+            rings[ring[k] + 1] -= 1
+            scratch.order[rings[ring[k] + 1]] = k
+    total = 0
+    for k in range(len(ring)):
+        total += ring[k] >= 0
+    for k in range(_RINGS):
+        rings[k] = rings[k + 1]
+    rings[_RINGS] = total
+
+
+@compiled
+def is_in_view(view: View, low: Array, high: Array) -> bool:
+    """Returns whether a box (3,), (3,) [m] touches the pyramid of the picture; for some boxes beside it as well."""
+    wide, tall = 0.5 * view.width / view.focal, 0.5 * view.height / view.focal
+    for side in range(5):
+        across = 0 if side < 2 else 1
+        sign = 1.0 if side % 2 == 0 else -1.0
+        slope = wide if side < 2 else tall
+        if side == 4:
+            sign, slope = 0.0, 1.0
+        best = 0.0
+        for k in range(3):
+            normal = sign * view.axes[across, k] + slope * view.axes[2, k]
+            best += normal * ((high[k] if normal > 0.0 else low[k]) - view.origin[k])
+        if best < 0.0:
+            return False
+    return True
+
+
+@compiled
+def find_tiles(view: View, buffer: VisibilityBuffer, scratch: CellOrder) -> None:
+    """Writes the smallest nearness in each tile of samples."""
+    height, width = view.height, view.width
+    tiles, line = scratch.tiles, scratch.line
+    for row in range(tiles.shape[0]):
+        first = row * TILE
+        line[:] = np.inf
+        for y in range(first, min(first + TILE, height)):
+            _lower(line, buffer.nearness[y])
+        for column in range(tiles.shape[1]):
+            least = line[column * TILE]
+            for x in range(column * TILE + 1, min((column + 1) * TILE, width)):
+                least = min(least, line[x])
+            tiles[row, column] = least
+
+
+@inlined
+def _lower(values: NDArray[np.float32], others: NDArray[np.float32]) -> None:
+    for k in range(len(values)):
+        values[k] = others[k] if others[k] < values[k] else values[k]
+
+
+@compiled
+def is_hidden(view: View, tiles: NDArray[np.float32], low: Array, high: Array) -> bool:
+    """Returns whether all samples that a box (3,), (3,) [m] may cover see something nearer than the whole box."""
+    left, right, top, bottom, nearest = np.inf, -np.inf, np.inf, -np.inf, np.inf
+    for corner in range(8):
+        x = (high[0] if corner & 1 else low[0]) - view.origin[0]
+        y = (high[1] if corner & 2 else low[1]) - view.origin[1]
+        z = (high[2] if corner & 4 else low[2]) - view.origin[2]
+        depth = x * view.axes[2, 0] + y * view.axes[2, 1] + z * view.axes[2, 2]
+        if depth < NEAR:
+            return False
+        scale = view.focal / depth
+        across = 0.5 * view.width + (x * view.axes[0, 0] + y * view.axes[0, 1] + z * view.axes[0, 2]) * scale
+        down = 0.5 * view.height - (x * view.axes[1, 0] + y * view.axes[1, 1] + z * view.axes[1, 2]) * scale
+        left, right, top, bottom = min(left, across), max(right, across), min(top, down), max(bottom, down)
+        nearest = min(nearest, depth)
+    return _is_covered(tiles, left, right, top, bottom, 1.0 / nearest)
+
+
+@compiled
+def _is_covered(
+    tiles: NDArray[np.float32], left: float, right: float, top: float, bottom: float, nearness: float
+) -> bool:
+    rows, columns = tiles.shape
+    first = int(min(max(left / TILE, 0.0), columns - 1.0))
+    last = int(min(max(right / TILE, 0.0), columns - 1.0))
+    for row in range(int(min(max(top / TILE, 0.0), rows - 1.0)), int(min(max(bottom / TILE, 0.0), rows - 1.0)) + 1):
+        for column in range(first, last + 1):
+            if tiles[row, column] <= nearness:
+                return False
+    return True

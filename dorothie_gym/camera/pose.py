@@ -1,0 +1,95 @@
+"""Pose of a camera and its pinhole projection.
+
+The world's x axis points east, its y axis south, z up; headings turn clockwise as seen from above. Picture coordinates
+run to the right and down, in pixels; the centre of the first pixel is at (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from dorothie_gym.compilation.by_reference import by_reference
+from dorothie_gym.copying import shared
+from dorothie_gym.maps.model import Array
+
+
+@shared
+@dataclass(frozen=True)
+class CameraPose:
+    """Place and direction of a camera, which does not roll.
+
+    Attributes:
+        x: [m].
+        y: [m].
+        z: [m].
+        heading: [rad].
+        pitch: upwards [rad].
+    """
+
+    x: float
+    y: float
+    z: float
+    heading: float
+    pitch: float = 0.0
+
+    def moved(self, forward: float, up: float) -> Self:
+        """Returns the pose moved along the heading and upwards [m], as a mount on a car is."""
+        x, y = self.x + forward * math.cos(self.heading), self.y + forward * math.sin(self.heading)
+        return type(self)(x, y, self.z + up, self.heading, self.pitch)
+
+
+@by_reference
+class View(NamedTuple):
+    """Pinhole projection from a pose: square pixels, the principal point in the middle.
+
+    Attributes:
+        origin: (3,) position [m].
+        axes: (3, 3) unit vectors to the right, up and forward.
+        focal: focal length [pixels].
+        width: of the picture [pixels].
+        height: of the picture [pixels].
+    """
+
+    origin: Array
+    axes: Array
+    focal: float
+    width: int
+    height: int
+
+    def scaled(self, factor: int) -> View:
+        """Returns the projection of the same picture with more pixels."""
+        return self._replace(focal=self.focal * factor, width=self.width * factor, height=self.height * factor)
+
+    def rays(self) -> Array:
+        """Returns the directions (h, w, 3) through the centres of the pixels, of length 1 along the axis."""
+        right = (np.arange(self.width) + 0.5 - 0.5 * self.width) / self.focal
+        down = (np.arange(self.height) + 0.5 - 0.5 * self.height) / self.focal
+        return np.asarray(self.axes[2] + right[None, :, None] * self.axes[0] - down[:, None, None] * self.axes[1])
+
+    def project(self, points: Array) -> tuple[Array, Array]:
+        """Returns the picture coordinates (n, 2) [pixels] of points (n, 3) [m], and their depths (n,) [m]."""
+        right, up, depth = ((points - self.origin) @ self.axes.T).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = 0.5 * self.width + self.focal * right / depth
+            y = 0.5 * self.height - self.focal * up / depth
+        return np.column_stack((x, y)), depth
+
+
+def view_from(pose: CameraPose, width: int, height: int, field_of_view: float) -> View:
+    """Returns the projection of a picture.
+
+    Args:
+        pose: of the camera.
+        width: [pixels].
+        height: [pixels].
+        field_of_view: horizontal [degrees].
+    """
+    c, s = math.cos(pose.heading), math.sin(pose.heading)
+    cp, sp = math.cos(pose.pitch), math.sin(pose.pitch)
+    axes = np.array([[-s, c, 0.0], [-sp * c, -sp * s, cp], [cp * c, cp * s, sp]])
+    focal = 0.5 * width / math.tan(0.5 * math.radians(field_of_view))
+    return View(np.array([pose.x, pose.y, pose.z]), axes, focal, width, height)
