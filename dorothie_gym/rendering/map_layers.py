@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,7 @@ from dorothie_gym.rendering.levels import LevelLookup, stretches
 from dorothie_gym.rendering.markings import lane_arrows
 from dorothie_gym.rendering.medians import find_pockets, held, pocket_paint
 from dorothie_gym.rendering.shapes import Shape, TownSamples
-from dorothie_gym.rendering.surfaces import BEYOND_BRIDGE, deck, streets
+from dorothie_gym.rendering.surfaces import BEYOND_BRIDGE, deck, streets, tunnel_floors
 
 _SIGN_ASIDE = 1.5  # [m] from the edge of the lane
 SHOWN = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
@@ -122,11 +122,51 @@ class MapLayers:
         self.pockets = find_pockets(town, borders)
         self.posts = posts(town, borders, self.stops)
 
+    @property
+    def bridge_levels(self) -> list[int]:
+        """Levels of the bridges, lower ones first."""
+        return sorted({part.level for part in self.stretches if part.level > 0})
+
     @cached_property
     def shapes(self) -> list[Shape]:
         """All polygons, in the order of painting."""
         ground = streets(self.town, self._samples, self.borders.lines, self.stretches, self.pockets)
         return [*landscape(self.town, self._border), *ground, *self._layers(list(self._paint()))]
+
+    def ground_shapes(self) -> list[Shape]:
+        """Returns the polygons on the ground without bridges, as if streets under bridges lay in the open.
+
+        Roads on bridges are left out; the place of a bridge shows the floor of a tunnel where nothing else is.
+        """
+        parts = [replace(part, level=-1) for part in self.stretches]
+        ground = streets(self.town, self._samples, self.borders.lines, parts, self.pockets)
+        left_out = LevelLookup(self._samples, self.stretches)
+        paint = self._held(list(self._paint()), left_out, wanted=False)
+        return [*landscape(self.town, self._border), *ground, *paint]
+
+    def bridge_shapes(self, level: int) -> list[Shape]:
+        """Returns the polygons of the bridges of one level: parapets, asphalt and paint."""
+        parts = [part for part in self.stretches if part.level == level]
+        lines = self.borders.lines
+        above = LevelLookup(self._samples, parts, BEYOND_BRIDGE)
+        shapes = deck(self.town, parts, lines, LevelLookup(self._samples, parts))
+        return [*shapes, *self._held(list(self._paint()), above)]
+
+    def tunnel_shapes(self) -> list[Shape]:
+        """Returns the polygons in tunnels: floors and the lines on them."""
+        parts = [part for part in self.stretches if part.level < 0]
+        if not parts:
+            return []
+        covered = LevelLookup(self._samples, parts)
+        inside = [line.part(run) for line in self.borders.lines for run in held(line, covered)]
+        floors = tunnel_floors(self.town, parts, self.borders.lines, covered)
+        return [*floors, *markings.lines(inside, self.detail), *self._held(list(self._paint()), covered)]
+
+    @staticmethod
+    def _held(paint: list[Shape], places: LevelLookup, wanted: bool = True) -> Iterator[Shape]:
+        """Yields the road markings that lie (or do not lie) on the stretches of a lookup."""
+        centres = np.array([[*shape.points.mean(axis=0), shape.height] for shape in paint]).reshape(-1, 3)
+        yield from (shape for shape, on in zip(paint, places.hold(centres).tolist(), strict=True) if on == wanted)
 
     def _paint(self) -> Iterator[Shape]:
         pen = self.detail.pen
@@ -147,14 +187,9 @@ class MapLayers:
     def _layers(self, paint: list[Shape]) -> Iterator[Shape]:
         """Yields road markings on the ground, then level by level the bridges with their markings."""
         samples = self._samples
-        if not paint:
-            places = np.zeros((0, 3))
-        else:
-            places = np.array([[*shape.points.mean(axis=0), shape.height] for shape in paint])
-        hidden = LevelLookup(samples, [part for part in self.stretches if part.level < 0]).hold(places)
-        yield from (shape for shape, under in zip(paint, hidden.tolist(), strict=True) if not under)
-        for level in sorted({part.level for part in self.stretches if part.level > 0}):
+        tunnels = LevelLookup(samples, [part for part in self.stretches if part.level < 0])
+        yield from self._held(paint, tunnels, wanted=False)
+        for level in self.bridge_levels:
             parts = [part for part in self.stretches if part.level == level]
             yield from deck(self.town, parts, self.borders.lines, LevelLookup(samples, parts))
-            above = LevelLookup(samples, parts, BEYOND_BRIDGE).hold(places)
-            yield from (shape for shape, over in zip(paint, above.tolist(), strict=True) if over)
+            yield from self._held(paint, LevelLookup(samples, parts, BEYOND_BRIDGE))

@@ -1,0 +1,120 @@
+"""Lookup of the material of the ground at a point: the top-most polygon of the map that contains it, exactly.
+
+A grid of square cells says for most points what lies there. In a cell with several materials, the polygons that have an
+edge in it are tried from the top: a path from the corner of the cell to the point, first along y and then along x, is
+crossed an odd number of times by the edges of a polygon if one end is inside and the other outside.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation.by_reference import by_reference
+from dorothie_gym.copying import shared
+from dorothie_gym.maps.model import Array
+
+
+@by_reference
+@shared
+class GroundArrays(NamedTuple):
+    """Materials and colours of all sheets of ground.
+
+    Sheet 0 is the ground, others are bridges and tunnels. Cells of a sheet are numbered row by row.
+
+    Attributes:
+        origins: (sheets, 2) positions of the first corners of the grids [m].
+        shapes: (sheets, 2) columns and rows of cells.
+        firsts: (sheets,) number of the first cell of each sheet.
+        outside: (sheets,) material beyond the grid.
+        size: (1,) width of a cell [m].
+        cells: material of a cell, or -1 - k for the mixed cell k.
+        bases: material of each mixed cell below all polygons with edges in it.
+        entries: range of candidates of mixed cell k: entries[k] to entries[k + 1], from the top.
+        materials: material of each candidate.
+        parities: whether the first corner of the cell lies inside the candidate.
+        uses: range of the edges of candidate e: uses[e] to uses[e + 1].
+        edges: rows of `segments`.
+        segments: (n, 4) edges x0, y0, x1, y1 [m].
+        colours: (materials, 3) RGB, 0..255.
+        grains: (materials,) strength of the noise.
+        classes: (materials,) semantic class, `ObjectClass`.
+        noise: (256, 256), 128 in the mean.
+        levels: (sheets, levels, 3) columns, rows, and first texel of each picture of averaged colours.
+        texels: (n, 3) averaged colours.
+    """
+
+    origins: Array
+    shapes: NDArray[np.int64]
+    firsts: NDArray[np.int64]
+    outside: NDArray[np.uint8]
+    size: Array
+    cells: NDArray[np.int32]
+    bases: NDArray[np.uint8]
+    entries: NDArray[np.int32]
+    materials: NDArray[np.uint8]
+    parities: NDArray[np.bool_]
+    uses: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    segments: Array
+    colours: NDArray[np.float32]
+    grains: NDArray[np.float32]
+    classes: NDArray[np.uint8]
+    noise: NDArray[np.uint8]
+    levels: NDArray[np.int64]
+    texels: NDArray[np.uint8]
+
+    @property
+    def nbytes(self) -> int:
+        """Size of all arrays [bytes]."""
+        return sum(array.nbytes for array in self)
+
+
+@compiled
+def cell_at(ground: GroundArrays, sheet: int, x: float, y: float) -> int:
+    """Returns the value of the cell at a position [m]: a material, or -1 - k for the mixed cell k."""
+    column = int(np.floor((x - ground.origins[sheet, 0]) / ground.size[0]))
+    row = int(np.floor((y - ground.origins[sheet, 1]) / ground.size[0]))
+    if column < 0 or row < 0 or column >= ground.shapes[sheet, 0] or row >= ground.shapes[sheet, 1]:
+        return int(ground.outside[sheet])
+    return int(ground.cells[ground.firsts[sheet] + row * ground.shapes[sheet, 0] + column])
+
+
+@compiled
+def material_in(ground: GroundArrays, sheet: int, mixed: int, x: float, y: float) -> int:
+    """Returns the material at a position [m] in a mixed cell."""
+    size = ground.size[0]
+    left = ground.origins[sheet, 0] + np.floor((x - ground.origins[sheet, 0]) / size) * size
+    top = ground.origins[sheet, 1] + np.floor((y - ground.origins[sheet, 1]) / size) * size
+    for entry in range(ground.entries[mixed], ground.entries[mixed + 1]):
+        inside = ground.parities[entry]
+        for use in range(ground.uses[entry], ground.uses[entry + 1]):
+            edge = ground.edges[use]
+            ax, ay = ground.segments[edge, 0], ground.segments[edge, 1]
+            bx, by = ground.segments[edge, 2], ground.segments[edge, 3]
+            if (ax < left) != (bx < left):
+                at = ay + (left - ax) / (bx - ax) * (by - ay)
+                inside ^= (at > top) != (at > y)
+            if (ay > y) != (by > y):
+                at = ax + (y - ay) / (by - ay) * (bx - ax)
+                inside ^= (at < left) != (at < x)
+        if inside:
+            return int(ground.materials[entry])
+    return int(ground.bases[mixed])
+
+
+@compiled
+def material_at(ground: GroundArrays, sheet: int, x: float, y: float) -> int:
+    """Returns the material of a sheet at a position [m]: of the top-most polygon that contains it."""
+    value = cell_at(ground, sheet, x, y)
+    return value if value >= 0 else material_in(ground, sheet, -1 - value, x, y)
+
+
+@compiled
+def materials_at(ground: GroundArrays, sheet: int, points: Array, out: NDArray[np.uint8]) -> None:
+    """Writes the materials of a sheet at positions (n, 2) [m] to `out` (n,)."""
+    for k in range(len(points)):
+        out[k] = material_at(ground, sheet, points[k, 0], points[k, 1])
