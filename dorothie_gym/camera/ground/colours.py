@@ -74,9 +74,9 @@ def _noise(ground: GroundArrays, x: float, y: float, footprint: float) -> float:
     coarse = ground.noise[int(y * _COARSE + _SHIFT) & mask, int(x * _COARSE + _SHIFT) & mask] / 128.0 - 1.0
     visible = 1.0 - footprint * 6.0
     if visible <= 0.0:
-        return coarse * _COARSE_SHARE * max(0.0, 1.0 - footprint / TEXEL)
+        return float(coarse * _COARSE_SHARE * max(0.0, 1.0 - footprint / TEXEL))
     fine = ground.noise[int(y * _FINE + _SHIFT) & mask, int(x * _FINE + _SHIFT) & mask] / 128.0 - 1.0
-    return fine * visible + coarse * _COARSE_SHARE * (1.0 - footprint / TEXEL)
+    return float(fine * visible + coarse * _COARSE_SHARE * (1.0 - footprint / TEXEL))
 
 
 @compiled
@@ -155,7 +155,7 @@ def halved(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     rows, columns, _ = picture.shape
     even = np.pad(picture, ((0, rows % 2), (0, columns % 2), (0, 0)), mode="edge").astype(np.uint16)
     total = even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2]
-    return ((total + 2) // 4).astype(np.uint8)
+    return np.asarray((total + 2) // 4).astype(np.uint8)
 
 
 def ground_noise() -> NDArray[np.uint8]:
@@ -173,4 +173,4 @@ def ground_noise() -> NDArray[np.uint8]:
         smooth = across[low] * (1.0 - share)[:, None] + across[(low + 1) % cells] * share[:, None]
         total += smooth * 0.62**octave
     total = total / np.abs(total).max() * 110.0 + rng.normal(0.0, 9.0, total.shape)
-    return np.clip(128.0 + total - total.mean(), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(128.0 + total - total.mean(), 0, 255)).astype(np.uint8)
