@@ -1,48 +1,53 @@
-"""Fixtures of all tests: a cache folder of this run, a compiled simulation, a Ray cluster."""
+"""Set-up of all tests: their order, a cache folder of this run, a compiled simulation, a Ray cluster."""
 
 from __future__ import annotations
 
 import fcntl
 import os
+import subprocess
+import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import settings
 
 from dorothie_gym.compilation import compiled_folder
-from dorothie_gym.engine.warm_up import is_warm, warm_up
+from dorothie_gym.engine.warm_up import is_warm
 from dorothie_gym.envs import warm_up as navigation
 from dorothie_gym.user_cache import CACHE_VARIABLE
 
 settings.register_profile("patient", deadline=None)  # durations are no results: another process may use the cores
 settings.load_profile("patient")
 
-BATCHED = frozenset(["baselines", "envs"])
-"""Folders of tests that step batches of the navigation environments."""
-
-SIMULATED = frozenset(
+UNCOMPILED = frozenset(
     [
-        "baselines",
-        "bench",
-        "benchmark",
-        "engine",
-        "envs",
-        "policies",
-        "recording",
-        "rollout",
-        "sim",
-        "testing",
-        "wrappers",
-        "test_docs.py",
-        "test_environment_pages.py",
-        "test_readme.py",
+        "analysis", "dialogue", "maps", "ontology", "spaces", "tasks", "test_by_reference.py", "test_compilation.py",
+        "test_errors.py", "test_files.py", "test_package.py", "test_user_cache.py",
     ]
-)
-"""Folders and files whose tests step the simulation."""
+)  # fmt: skip
+"""Folders and files whose tests step no simulation."""
 
+SESSIONS = frozenset(["benchmark", "engine", "recording", "rendering", "rollout", "test_routing.py"])
+"""Folders and files whose tests step sessions; those of all others may step batches, too."""
+
+COMPILE = """
+import os, subprocess, sys
+from dorothie_gym.engine.warm_up import warm_up
+warm_up()
+os.close(int(sys.argv[1]))
+if sys.argv[2:]:
+    batches = "from dorothie_gym.envs.warm_up import warm_up; warm_up()"
+    with subprocess.Popen([sys.executable, "-c", batches]):
+        warm_up(everything=True)
+"""
+"""Program that compiles sessions, gives the first lock back, and compiles batches if it is asked to."""
+
+_COMPILER = pytest.StashKey[subprocess.Popen[bytes]]()
+_COMPILED = pytest.StashKey[set[int]]()
 _FOLDER = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 
 
@@ -63,30 +68,67 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Removes the folder."""
-    folder = config.stash.get(_FOLDER, None)
+    """Ends the compilation and removes the folder."""
+    compiler, folder = config.stash.get(_COMPILER, None), config.stash.get(_FOLDER, None)
+    if compiler is not None:
+        compiler.kill()
+        compiler.wait()
     if folder is not None:
         folder.cleanup()
 
 
-@pytest.fixture(scope="session", autouse=True)
-def compiled_simulation(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> None:
-    """Compiles the simulation before the first test, one worker at a time.
+# --- Compilation ------------------------------------------------------------------------------------------------------
 
-    With a cold cache this takes a minute or two. Time limits hold for the body of a test only
-    (`timeout_func_only`), so that no test fails because it happens to be the first. Workers take turns: the later ones
-    find the machine code of the first in the cache.
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Puts tests first that need little compilation: they run while the rest is compiled."""
+    items.sort(key=_stage)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Starts to compile what the tests need and is not in the cache: in one process, also for parallel workers.
+
+    The process holds a lock until sessions are compiled, and one until batches are.
     """
-    if not any(SIMULATED & set(item.path.parts) for item in request.session.items):
+    last = max(map(_stage, session.items), default=0)
+    warm = is_warm(everything=last > 1) and (navigation.is_warm() or last < 2)
+    first = os.environ.get("PYTEST_XDIST_WORKER", "gw0") == "gw0" and not session.config.option.collectonly
+    if last == 0 or warm or not first or compiled_folder() is None:
         return
-    root = tmp_path_factory.getbasetemp()
-    shared = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
-    with (shared / "compiling.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not is_warm():
-            warm_up()
-        if any(BATCHED & set(item.path.parts) for item in request.session.items) and not navigation.is_warm():
-            navigation.warm_up()
+    with _lock(1).open("w") as one, _lock(2).open("w") as two:
+        locks = [one.fileno(), two.fileno()]
+        for lock in locks:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        session.config.stash[_COMPILER] = subprocess.Popen(
+            [sys.executable, "-c", COMPILE, str(locks[0]), *["batches"][: last - 1]],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(entry or os.getcwd() for entry in sys.path)},
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, pass_fds=locks,
+        )  # fmt: skip
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Waits for the compilation of what a test and its fixtures need.
+
+    With a cold cache this takes a minute or two. Time limits hold for the body of a test only (`timeout_func_only`), so
+    that no test fails because it happens to be the first.
+    """
+    stage, compiled = _stage(item), item.config.stash.setdefault(_COMPILED, {0})
+    if stage not in compiled:
+        with _lock(stage).open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH)
+        compiled.add(stage)
+
+
+def _stage(item: pytest.Item) -> int:
+    """Returns 0 for a test that steps no simulation, 1 for one that steps sessions, 2 for one of batches."""
+    names = set(item.nodeid.partition("::")[0].split("/"))
+    return 1 if names & SESSIONS else 0 if names & UNCOMPILED else 2
+
+
+def _lock(stage: int) -> Path:
+    return Path(os.environ[CACHE_VARIABLE], f"compiling-{stage}.lock")
 
 
 @pytest.fixture
