@@ -10,8 +10,6 @@ import json
 import os
 import random
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -20,11 +18,10 @@ import pytest
 from typer.testing import CliRunner
 
 from dorothie_gym.cli.app import app
+from tests.forked_commands import start_command
 
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-
-ROOT = Path(__file__).parents[1]
 
 SHORT = (
     "--environments", "4", "--evaluate-every", "512", "--episodes", "1", "--set", "max_seconds=20",
@@ -33,32 +30,28 @@ SHORT = (
 
 
 def command(*words: str, out: Path) -> list[str]:
-    return [sys.executable, "-m", "dorothie_gym", "train-rl", *words, *SHORT, "--out", str(out)]
-
-
-def start(words: list[str], folder: Path) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        words, cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True, stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-    )  # fmt: skip
+    return ["train-rl", *words, *SHORT, "--out", str(out)]
 
 
 def finish(words: list[str], folder: Path) -> None:
-    process = start(words, folder)
-    _, errors = process.communicate(timeout=240)
-    assert process.returncode == 0, errors
+    process = start_command(words, folder, folder / "errors")
+    process.join(240)
+    assert process.exitcode == 0, (folder / "errors").read_text()
 
 
 def interrupt(words: list[str], folder: Path, sent: signal.Signals, when: Callable[[], bool]) -> bool:
     """Starts a command and sends a signal as soon as a condition holds; returns whether that was before its end."""
-    process = start(words, folder)
-    while process.poll() is None and not when():
+    process = start_command(words, folder, folder / "errors")
+    assert process.pid is not None
+    while process.is_alive() and not when():
         time.sleep(0.005)
-    process.send_signal(sent)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode in (0, -sent if sent == signal.SIGKILL else 128 + sent), errors
+    if process.is_alive():
+        os.kill(process.pid, sent)
+    process.join(60)
+    errors = (folder / "errors").read_text()
+    assert process.exitcode in (0, -sent if sent == signal.SIGKILL else 128 + sent), errors
     assert "Traceback" not in errors, errors
-    return process.returncode != 0
+    return process.exitcode != 0
 
 
 def rows(out: Path) -> int:
@@ -84,22 +77,21 @@ def results(out: Path) -> dict[str, object]:
 
 
 def test_killed_and_interrupted_training_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
-    rollouts = ("--environments", "64", "--evaluate-every", "8192")  # an evaluation after each rollout
-    training = ("maskable_ppo", "--steps", "40960", "--workers", "0")
+    training = ("a2c", "--steps", "3072", "--workers", "0")  # its rollouts are the shortest
     whole, cut = tmp_path / "whole", tmp_path / "cut"
-    finish([*command(*training, out=whole), *rollouts], tmp_path)
-    words = [*command(*training, out=cut), *rollouts]
+    finish(command(*training, out=whole), tmp_path)
+    words = command(*training, out=cut)
     seen = [
         interrupt(words, tmp_path, signal.SIGKILL, lambda: rows(cut) >= 2),
         interrupt(words, tmp_path, signal.SIGTERM, lambda: rows(cut) >= 3),
     ]
-    other = CliRunner().invoke(app, [*words[3:], "--seed", "1"])
+    other = CliRunner().invoke(app, [*words, "--seed", "1"])
     assert other.exit_code == 2 and "another seed" in other.stderr and other.stderr.count("\n") == 1
     seen.append(interrupt(words, tmp_path, signal.SIGINT, lambda: rows(cut) >= 4))
     assert all(seen)  # each in the middle
     finish(words, tmp_path)
     assert results(cut) == results(whole)
-    assert rows(cut) == 5
+    assert rows(cut) == 6
 
 
 @pytest.mark.slow
