@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import ClassVar, Final, TypeAlias
+from typing import ClassVar, Final
 
 import gymnasium as gym
 import numpy as np
@@ -16,8 +16,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.scenario import Scenario, check_options, scenario_option, template_option
+from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.driving_batch import DrivingBatch
 from dorothie_gym.envs.driving_rows import INFRACTIONS
 from dorothie_gym.envs.driving_view import DrivingView
@@ -25,34 +25,23 @@ from dorothie_gym.envs.episode import TERMS, Ending
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.processors import available_processors
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.vector_infos import Infos, mask_of, masked_infos, seeds_of
-
-Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
-"""A town, or several that the environments of a batch play in turn."""
 
 LARGEST_SEED: Final = 2**31
 """Seeds of sessions that follow without a seed of their own are below."""
 
 
-class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArray[np.generic]]):
+class DrivingVectorEnv(
+    BatchedEnv[NavigationConfig, DrivingBatch], VectorEnv[Vector, NDArray[np.generic], NDArray[np.generic]]
+):
     """Base class of the vectorised navigation environments.
 
     Each environment has episodes of its own: they depend on its seed and actions, and neither on the other
     environments, nor on its place among them, nor on the number of threads.
-
-    Attributes:
-        autoreset_mode: when environments that are over begin anew, as `SyncVectorEnv` has it.
-        towns: town of each environment.
-        config: settings.
-        batches: a batch for each town.
     """
-
-    metadata: dict[str, object] = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     CHANGES: ClassVar[Sequence[str]] = (
         "_observations", "_rewards", "_terminations", "_truncations", "_terms", "_infractions", "_refused", "_subgoals",
@@ -65,22 +54,9 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         action_space: spaces.Space[np.int64] | spaces.Space[NDArray[np.float32]], render_mode: str | None, view: str,
         threads: int | None, autoreset_mode: str | AutoresetMode, *, pedals: bool,
     ) -> None:  # fmt: skip
-        if num_envs < 1:
-            raise ValueError(f"num_envs is {num_envs}; it must be at least 1")
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode is {render_mode!r}; it must be None or 'rgb_array' for several environments")
-        if threads is not None and threads < 1:
-            raise ValueError(f"threads is {threads}; it must be at least 1, or None for one per processor")
-        names = [town] if isinstance(town, str | Path | Town) else list(town)
-        if not names:
-            raise ValueError("town is an empty sequence; it must name at least one town")
+        super().__init__(num_envs, town, config, render_mode, threads, autoreset_mode)
         import_module("filterpy.kalman")  # takes a second, for which no decision should wait: see `beliefs.refined`
-        loaded = [each if isinstance(each, Town) else load_town(each) for each in names]
-        self.towns = [loaded[i % len(loaded)] for i in range(num_envs)]
-        self.num_envs, self.render_mode, self.config = num_envs, render_mode, config
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
-        frequency = config.decision_frequency
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": frequency}
+        self.metadata = {**self.metadata, "render_fps": config.decision_frequency}
         self.single_observation_space, self.single_action_space = observation_space, action_space
         self.observation_space = batch_space(observation_space, num_envs)
         self.action_space = batch_space(action_space, num_envs)
@@ -96,29 +72,14 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
         self._begun = np.zeros(num_envs, dtype=np.bool_)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int] = [-1] * num_envs
-        template, threads = template_option(storyboard), threads or available_processors()
-        towns: dict[Town, list[int]] = {}
-        for number, each in enumerate(self.towns):
-            towns.setdefault(each, []).append(number)
-        self._members = [np.array(numbers) for numbers in towns.values()]
-        self.batches = [
-            DrivingBatch(each, template, config, len(numbers), threads, pedals=pedals)
-            for each, numbers in towns.items()
-        ]
-        self._places = {
-            int(number): (batch, place)
-            for batch, numbers in zip(self.batches, self._members, strict=True)
-            for place, number in enumerate(numbers)
-        }
+        template = template_option(storyboard)
+        self._make_batches(
+            lambda each, numbers, threads: DrivingBatch(each, template, config, len(numbers), threads, pedals=pedals)
+        )
         self._views = [
-            DrivingView(SessionView.of_role(Role.CO_WIZARD, view, render_mode, frequency))
+            DrivingView(SessionView.of_role(Role.CO_WIZARD, view, render_mode, config.decision_frequency))
             for _ in range(num_envs if render_mode is not None else 0)
         ]
-
-    @property
-    def threads(self) -> int:
-        """Number of threads that step the environments."""
-        return max(batch.threads for batch in self.batches)
 
     @property
     def nbytes(self) -> int:
@@ -182,11 +143,6 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
             infos = self._infos(np.ones(self.num_envs, dtype=np.bool_))
         return self._observations.copy(), rewards, terminations, truncations, infos
 
-    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Draws the first environment; `render_one` draws another one."""
-        frame = self.render_one(0)
-        return None if frame is None else (frame,)
-
     def render_one(self, number: int) -> NDArray[np.uint8] | None:
         """Draws one of the environments (800, 1280, 3), as the single environment does."""
         batch, place = self._places[range(self.num_envs)[number]]
@@ -208,24 +164,6 @@ class DrivingVectorEnv(Restorable, VectorEnv[Vector, NDArray[np.generic], NDArra
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]  # see `np_random`
         """The environments' seeds."""
         return tuple(self._seeds[number] for number, _ in enumerate(self.np_random))
-
-    # --- States -------------------------------------------------------------------------------------------------------
-
-    def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the environments."""
-        return {**super().mutable_values(), "batches": [batch.mutable_values() for batch in self.batches]}
-
-    def apply_values(self, values: dict[str, object]) -> None:
-        """Applies the values of the environments; pictures begin anew."""
-        parts = values.pop("batches")
-        assert isinstance(parts, list)  # of `mutable_values`
-        for batch, part in zip(self.batches, parts, strict=True):
-            batch.apply_values(part)
-        super().apply_values(values)
-
-    def compatibility(self) -> dict[str, object]:
-        """Returns the kind of environment, the towns and the settings."""
-        return {**super().compatibility(), "the towns": self.towns, "the settings": self.config}
 
     # --- Episodes -----------------------------------------------------------------------------------------------------
 

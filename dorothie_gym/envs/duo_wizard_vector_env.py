@@ -13,17 +13,14 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import Scenario, scenario_option
 from dorothie_gym.engine.session_batch import SessionBatch
 from dorothie_gym.engine.session_engine import SessionEngine, StepOutcome
-from dorothie_gym.envs.driving_vector_env import Towns
+from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import AGENT_ROLES
-from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.spaces import ActionMapping, SpaceLimits, action_space, observation_space
 from dorothie_gym.tasks import StoryboardTemplate
@@ -41,7 +38,7 @@ BatchedActions: TypeAlias = Mapping[str, Mapping[str, Any]] | Sequence[Mapping[s
 Flags: TypeAlias = NDArray[np.bool_]
 
 
-class DuoWizardVectorEnv(Restorable):
+class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     """Many sessions of `DuoWizardEnv` in one batch, by agent as in PettingZoo and stacked as in Gymnasium.
 
     Worlds, observations and masks of all sessions lie in arrays, which compiled code steps on threads; talk stays in
@@ -67,11 +64,7 @@ class DuoWizardVectorEnv(Restorable):
         engines: engine of each environment, to be read: of the session in progress, its events, its summary.
     """
 
-    metadata: dict[str, object] = {  # noqa: RUF012
-        "name": "duo_wizard_v0",
-        "render_modes": ["rgb_array"],
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
+    metadata: dict[str, object] = {**BatchedEnv.metadata, "name": "duo_wizard_v0"}  # noqa: RUF012
 
     CHANGES: ClassVar[Sequence[str]] = ("_over",)
 
@@ -102,22 +95,9 @@ class DuoWizardVectorEnv(Restorable):
         Raises:
             ValueError: an argument is out of its range.
         """
-        if num_envs < 1:
-            raise ValueError(f"num_envs is {num_envs}; it must be at least 1")
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode is {render_mode!r}; it must be None or 'rgb_array' for several environments")
-        if threads is not None and threads < 1:
-            raise ValueError(f"threads is {threads}; it must be at least 1, or None for one per processor")
-        names = [town] if isinstance(town, str | Path | Town) else list(town)
-        if not names:
-            raise ValueError("town is an empty sequence; it must name at least one town")
-        loaded = [each if isinstance(each, Town) else load_town(each) for each in names]
-        self.towns = [loaded[number % len(loaded)] for number in range(num_envs)]
-        self.num_envs, self.render_mode, self.config = num_envs, render_mode, config or EnvConfig()
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        super().__init__(num_envs, town, config or EnvConfig(), render_mode, threads, autoreset_mode)
         rate = self.config.decision_frequency
-        self.metadata = {**self.metadata, **metadata_at(rate), "render_modes": ["rgb_array"],
-                         "autoreset_mode": self.autoreset_mode}  # fmt: skip
+        self.metadata = {**self.metadata, "render_fps": metadata_at(rate)["render_fps"]}
         self.limits = SpaceLimits.for_towns(self.towns)
         self.possible_agents = list(_AGENTS)
         self.single_observation_spaces, self.observation_spaces = self._spaces(
@@ -126,25 +106,14 @@ class DuoWizardVectorEnv(Restorable):
         self.single_action_spaces, self.action_spaces = self._spaces(
             {agent: action_space(role, self.limits) for agent, role in _AGENTS.items()}
         )
-        numbers: dict[Town, list[int]] = {}
-        for number, each in enumerate(self.towns):
-            numbers.setdefault(each, []).append(number)
-        self._batches = [
-            SessionBatch(
-                each,
-                storyboard,
-                config=self.config,
-                max_cycles=max_cycles,
-                limits=self.limits,
-                numbers=own,
-                threads=threads or available_processors(),
+        self._make_batches(
+            lambda each, numbers, threads: SessionBatch(
+                each, storyboard, config=self.config, max_cycles=max_cycles, limits=self.limits, numbers=numbers,
+                threads=threads,
             )
-            for each, own in numbers.items()
-        ]
-        places = {number: (batch, row) for batch in self._batches for row, number in enumerate(batch.numbers)}
-        self.engines: tuple[SessionEngine, ...] = tuple(
-            places[number][0].engines[places[number][1]] for number in range(num_envs)
-        )
+        )  # fmt: skip
+        places = [self._places[number] for number in range(num_envs)]
+        self.engines: tuple[SessionEngine, ...] = tuple(batch.engines[row] for batch, row in places)
         self._over = np.zeros(num_envs, dtype=np.bool_)
         views = num_envs if render_mode is not None else 0
         self._views = [SessionView(render_mode, frames_per_second=rate) for _ in range(views)]
@@ -157,11 +126,6 @@ class DuoWizardVectorEnv(Restorable):
             assert isinstance(whole, spaces.Dict)
             batched[agent] = whole
         return dict(single), batched
-
-    @property
-    def threads(self) -> int:
-        """Number of threads that step the environments."""
-        return max(batch.threads for batch in self._batches)
 
     def observation_space(self, agent: str) -> spaces.Dict:
         """Returns the observation space of an agent in all environments, always the same object."""
@@ -194,7 +158,7 @@ class DuoWizardVectorEnv(Restorable):
         seeds = seeds_of(seed, self.num_envs)
         scenario = scenario_option({name: value for name, value in (options or {}).items() if name == "scenario"})
         self._begin(mask, seeds, scenario)
-        for batch in self._batches:
+        for batch in self.batches:
             batch.observe([row for row, number in enumerate(batch.numbers) if mask[number]])
         return self._observations(), self._infos(mask, {})
 
@@ -224,7 +188,7 @@ class DuoWizardVectorEnv(Restorable):
             raise gym.error.ResetNeeded(f"environments {short_repr(waiting)} wait for a reset: call reset()")
         outcomes = self._play(rows_of(actions, self.num_envs, self.possible_agents), ~again)
         self._begin(again, [None] * self.num_envs, None)
-        for batch in self._batches:
+        for batch in self.batches:
             batch.observe()
         played = [outcomes.get(number) for number in range(self.num_envs)]
         rewards = {
@@ -242,11 +206,6 @@ class DuoWizardVectorEnv(Restorable):
             {agent: truncated.copy() for agent in _AGENTS}, infos,
         )  # fmt: skip
 
-    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Draws the first environment; `render_one` draws another one."""
-        frame = self.render_one(0)
-        return None if frame is None else (frame,)
-
     def render_one(self, number: int) -> NDArray[np.uint8] | None:
         """Draws the session of one environment (800, 1280, 3), as `DuoWizardEnv` does; None without a render mode."""
         engine = self.engines[range(self.num_envs)[number]]
@@ -254,26 +213,8 @@ class DuoWizardVectorEnv(Restorable):
 
     def close(self) -> None:
         """Ends the threads."""
-        for batch in self._batches:
+        for batch in self.batches:
             batch.close()
-
-    # --- States -------------------------------------------------------------------------------------------------------
-
-    def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the environments."""
-        return {**super().mutable_values(), "batches": [batch.mutable_values() for batch in self._batches]}
-
-    def apply_values(self, values: dict[str, object]) -> None:
-        """Applies the values of the environments."""
-        parts = values.pop("batches")
-        assert isinstance(parts, list)  # of `mutable_values`
-        for batch, part in zip(self._batches, parts, strict=True):
-            batch.apply_values(part)
-        super().apply_values(values)
-
-    def compatibility(self) -> dict[str, object]:
-        """Returns the kind of environment, the towns and the settings."""
-        return {**super().compatibility(), "the towns": self.towns, "the settings": self.config}
 
     # --- Parts of a step ----------------------------------------------------------------------------------------------
 
@@ -281,17 +222,17 @@ class DuoWizardVectorEnv(Restorable):
         """Plays a decision in some environments; returns the outcomes by number of the environment."""
         decoded = [
             batch.decode({row: actions[number] for row, number in enumerate(batch.numbers) if playing[number]})
-            for batch in self._batches
+            for batch in self.batches
         ]
         outcomes = {}
-        for batch, own in zip(self._batches, decoded, strict=True):
+        for batch, own in zip(self.batches, decoded, strict=True):
             if own:
                 outcomes.update({batch.numbers[row]: outcome for row, outcome in batch.step(own).items()})
         return outcomes
 
     def _begin(self, mask: Flags, seeds: Sequence[int | None], scenario: Scenario | None) -> None:
         """Begins sessions in the environments of a mask."""
-        for batch in self._batches:
+        for batch in self.batches:
             for row, number in enumerate(batch.numbers):
                 if mask[number]:
                     batch.begin(row, seeds[number], scenario)
@@ -306,7 +247,7 @@ class DuoWizardVectorEnv(Restorable):
         over = self._over.copy()
         ended = self._infos(over, outcomes)
         self._begin(over, [None] * self.num_envs, None)
-        for batch in self._batches:
+        for batch in self.batches:
             batch.observe([row for row, number in enumerate(batch.numbers) if over[number]])
         infos = self._infos(np.ones(self.num_envs, dtype=np.bool_), {k: v for k, v in outcomes.items() if not over[k]})
         for agent, seen in last.items():
@@ -323,10 +264,10 @@ class DuoWizardVectorEnv(Restorable):
         """Returns a copy of the observations of all environments, by agent."""
         found = {}
         for agent, role in _AGENTS.items():
-            own = found[agent] = self._gathered([batch.views.observations[role].copy() for batch in self._batches])
-            for name in self._batches[0].views.texts[role]:
+            own = found[agent] = self._gathered([batch.views.observations[role].copy() for batch in self.batches])
+            for name in self.batches[0].views.texts[role]:
                 texts = [""] * self.num_envs
-                for batch in self._batches:
+                for batch in self.batches:
                     for number, text in zip(batch.numbers, batch.views.texts[role][name], strict=True):
                         texts[number] = text
                 own[name] = tuple(texts)
@@ -336,25 +277,25 @@ class DuoWizardVectorEnv(Restorable):
         """Returns the arrays of all batches as arrays of all environments."""
         if len(parts) == 1:
             return dict(parts[0])
-        order = np.argsort(np.concatenate([batch.numbers for batch in self._batches]))
+        order = np.argsort(np.concatenate(self._members))
         return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
 
     def _infos(self, mask: Flags, outcomes: Mapping[int, StepOutcome]) -> dict[str, Infos]:
         """Returns the infos of the environments of a mask, by agent; reward terms of those that have an outcome."""
         infos: dict[str, Infos] = {}
-        (infractions,) = self._gathered([{"": batch.infractions.copy()} for batch in self._batches]).values()
+        (infractions,) = self._gathered([{"": batch.infractions.copy()} for batch in self.batches]).values()
         infractions[~mask] = 0
         stepped = np.zeros(self.num_envs, dtype=np.bool_)
         stepped[list(outcomes)] = True
         stepped &= mask
         rows, numbers = np.flatnonzero(stepped).tolist(), np.flatnonzero(mask).tolist()
         for agent, role in _AGENTS.items():
-            masks = self._gathered([batch.views.masks[role].copy() for batch in self._batches])
+            masks = self._gathered([batch.views.masks[role].copy() for batch in self.batches])
             refused = np.full(self.num_envs, None, dtype=object)
             for number in numbers:
                 refused[number] = self.engines[number].session.refused[role].copy()
             info = infos[agent] = {
-                "action_mask": {**masks, **dict.fromkeys(self._batches[0].views.unmasked[role])},
+                "action_mask": {**masks, **dict.fromkeys(self.batches[0].views.unmasked[role])},
                 "_action_mask": mask.copy(),
                 "refused": refused,
                 "_refused": mask.copy(),

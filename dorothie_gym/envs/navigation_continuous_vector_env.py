@@ -8,7 +8,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv, Towns
+from dorothie_gym.envs.batched_env import Towns
+from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.navigation_continuous_v0 import control_space, controls_of, path_space
 from dorothie_gym.tasks import StoryboardTemplate

@@ -12,8 +12,9 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from dorothie_gym.action_values import as_array
+from dorothie_gym.envs.batched_env import Towns
 from dorothie_gym.envs.driving_batch import DrivingBatch
-from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv, Towns
+from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.errors import short_repr
 from dorothie_gym.policies.navigation.actions import ACTIONS
