@@ -1,0 +1,230 @@
+"""Traffic lights, stop and yield signs at the posts of the map, and blades with street names at corners."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from dorothie_gym.camera.atlas import STREET_NAMES, Texture
+from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface, joined
+from dorothie_gym.camera.scenery.clearance import Clearance, free_of
+from dorothie_gym.camera.scenery.placing import Heights, stamped
+from dorothie_gym.maps.model import NO_STREET, Array, Lane, SignalKind
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.rendering.map_layers import MapLayers, Post
+from dorothie_gym.rendering.shapes import disc
+from dorothie_gym.sim.state.codes import Colour
+
+LENS_ON: dict[Colour, tuple[int, int, int]] = {
+    Colour.GREEN: (70, 255, 130), Colour.YELLOW: (255, 196, 40), Colour.RED: (255, 52, 40),
+}  # fmt: skip
+LENS_OFF: dict[Colour, tuple[int, int, int]] = {
+    Colour.GREEN: (10, 38, 22), Colour.YELLOW: (46, 34, 10), Colour.RED: (48, 10, 8),
+}  # fmt: skip
+"""Colours of the lenses of traffic lights that are on and off."""
+
+_HEAD = 3.4  # [m] height of the middle of a traffic light
+_LENS, _BETWEEN = 0.17, 0.46  # [m] radius of a lens, distance of two
+_SIGN = 2.4  # [m] height of the middle of a sign
+_METAL, _BACK = (100, 104, 104), (150, 152, 154)
+_BLADE = 2.2, 0.55  # [m] width and height of a street name
+_BLADE_HEIGHT = 3.3  # [m] of the lower blade
+_CORNER = (1.9, 1.2, 2.8)  # [m] from the edge of the road to the post with names; the first that has room
+_CORNERS_APART = 6.0  # [m]
+
+
+class Lenses(NamedTuple):
+    """Triangles of a mesh that show the state of traffic lights.
+
+    Attributes:
+        ranges: (n, 2) first triangle of each lens and the one after its last.
+        signals: (n,) id of the signal in the town.
+        colours: (n,) `Colour` that it shows.
+    """
+
+    ranges: NDArray[np.int32]
+    signals: NDArray[np.int32]
+    colours: NDArray[np.int32]
+
+
+def build_signals(layers: MapLayers, ground: Heights) -> tuple[Mesh, Lenses]:
+    """Returns lights and signs at all posts of a map, and the lenses among their triangles."""
+    town = layers.town
+    light, parts = _traffic_light()
+    templates = {SignalKind.TRAFFIC_LIGHT: light, SignalKind.STOP: _stop_sign(), SignalKind.YIELD: _yield_sign()}
+    meshes, ranges, signals, colours = [], [], [], []
+    first = 0
+    for kind, template in templates.items():
+        posts = [post for post in layers.posts if post.kind is kind]
+        if not posts:
+            continue
+        at = np.array([post.at for post in posts])
+        poses = [_pose(town, layers, post) for post in posts]
+        base = np.array(
+            [height if lanes else np.nan for (_, height), lanes in zip(poses, (p.lanes for p in posts), strict=True)]
+        )
+        base = np.where(np.isnan(base) | (np.abs(base) < 1.0), ground.height_at(at), base)
+        meshes.append(stamped(template, np.column_stack((at, base)), np.array([heading for heading, _ in poses])))
+        if kind is SignalKind.TRAFFIC_LIGHT:
+            for k, post in enumerate(posts):
+                start = first + k * template.size
+                for colour, (low, high) in parts.items():
+                    ranges.append((start + low, start + high))
+                    signals.append(_signal_of(town, post))
+                    colours.append(int(colour))
+        first += meshes[-1].size
+    lenses = Lenses(
+        np.array(ranges, dtype=np.int32).reshape(-1, 2),
+        np.array(signals, dtype=np.int32),
+        np.array(colours, dtype=np.int32),
+    )
+    return joined(meshes), lenses
+
+
+def _pose(town: Town, layers: MapLayers, post: Post) -> tuple[float, float]:
+    """Returns the direction of the traffic that reads a post [rad], and the height of its road [m]."""
+    lanes = [town.lanes[k] for k in post.lanes if not town.lanes[k].in_junction]
+    if not lanes:
+        signal = next(s for s in town.signals if s.kind is post.kind and s.position[:2] == post.at)
+        return signal.heading + math.pi, 0.0
+    lane = min(lanes, key=lambda row: float(np.hypot(*(row.points[-1, :2] - post.at))))
+    station = layers.stops.get(lane.id, lane.length)
+    return lane.heading_at(station), lane.height_at(station)
+
+
+def _signal_of(town: Town, post: Post) -> int:
+    """Returns the id of the signal that a post shows: the one of a programme where several have the same lanes."""
+    same = [s.id for s in town.signals if s.kind is post.kind and s.lanes == post.lanes]
+    ruled = {number for programme in town.programmes for number in programme.signals}
+    return next((number for number in same if number in ruled), same[0])
+
+
+def _traffic_light() -> tuple[Mesh, dict[Colour, tuple[int, int]]]:
+    """Returns a light that is read by somebody who looks along x, and the triangles of its lenses."""
+    builder, kind = MeshBuilder(), ObjectClass.TRAFFIC_LIGHT
+    top = _HEAD + 1.5 * _BETWEEN + 0.06
+    builder.prism(disc((0.0, 0.0), 0.075, 6), -0.1, top, colour=_METAL, kind=ObjectClass.POLE)
+    builder.box(
+        (-0.2, 0.0), 0.0, 0.24, 0.46, _HEAD - 1.5 * _BETWEEN, _HEAD + 1.5 * _BETWEEN, colour=(30, 32, 34), kind=kind,
+        closed=(True, True),
+    )  # fmt: skip
+    builder.panel((-0.12, 0.0, _HEAD), 0.0, 0.74, 3.0 * _BETWEEN + 0.3, colour=(22, 24, 26), kind=kind, two_sided=True)
+    parts = {}
+    for colour, up in ((Colour.RED, _BETWEEN), (Colour.YELLOW, 0.0), (Colour.GREEN, -_BETWEEN)):
+        start = len(builder)
+        ring = _round(-0.335, _HEAD + up, _LENS, 8, math.pi / 8.0)
+        _polygon(builder, ring, LENS_OFF[colour], kind, surface=Surface.EMISSIVE)
+        parts[colour] = start, len(builder)
+        hood = _round(-0.335, _HEAD + up, _LENS + 0.025, 8, math.pi / 8.0)
+        for k in (0, 1, 2, 3):  # the upper half: seen from below and from the side
+            a, b = hood[k], hood[k + 1]
+            out = np.array([-0.2, 0.0, 0.0])
+            builder.quad([b, b + out, a + out, a], colour=(24, 26, 28), kind=kind, two_sided=True)
+    return builder.build(), parts
+
+
+def _round(x: float, z: float, radius: float, corners: int, turn: float = 0.0) -> Array:
+    """Returns corners (n, 3) of an upright polygon, from the right side upwards, for somebody who looks along x."""
+    angles = turn + np.arange(corners) * (2.0 * math.pi / corners)
+    return np.column_stack((np.full(corners, x), radius * np.cos(angles), z + radius * np.sin(angles)))
+
+
+def _polygon(
+    builder: MeshBuilder, corners: Array, colour: tuple[int, int, int], kind: ObjectClass, *,
+    texture: Texture = Texture.PLAIN, surface: Surface = Surface.NONE, backwards: bool = False,
+) -> None:  # fmt: skip
+    """Adds a convex polygon (n, 3), anticlockwise for somebody who looks along x, with one repeat of a texture."""
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+    size = float(np.ptp(corners[:, 1:], axis=0).max())
+    places = (corners[:, 1:] - middle[1:]) / size + 0.5
+    order = (0, 1, 2) if backwards else (0, 2, 1)
+    fan = np.array([[(0, k, k + 1)[i] for i in order] for k in range(1, len(corners) - 1)])
+    builder.triangles(corners[fan], coordinates=places[fan], colour=colour, kind=kind, texture=texture, surface=surface)
+
+
+def _stop_sign() -> Mesh:
+    builder, kind = MeshBuilder(), ObjectClass.TRAFFIC_SIGN
+    builder.prism(disc((0.0, 0.0), 0.04, 5), -0.1, _SIGN + 0.35, colour=_METAL, kind=ObjectClass.POLE)
+    for x, radius, colour, texture in (
+        (-0.05, 0.47, (245, 245, 245), Texture.PLAIN),
+        (-0.06, 0.44, (255, 255, 255), Texture.STOP),
+    ):
+        _polygon(builder, _round(x, _SIGN, radius, 8, math.pi / 8.0), colour, kind, texture=texture)
+    _polygon(builder, _round(-0.04, _SIGN, 0.47, 8, math.pi / 8.0), _BACK, kind, backwards=True)
+    return builder.build()
+
+
+def _yield_sign() -> Mesh:
+    builder, kind = MeshBuilder(), ObjectClass.TRAFFIC_SIGN
+    builder.prism(disc((0.0, 0.0), 0.04, 5), -0.1, _SIGN + 0.2, colour=_METAL, kind=ObjectClass.POLE)
+    down = -math.pi / 2.0
+    _polygon(builder, _round(-0.05, _SIGN, 0.62, 3, down), (200, 26, 34), kind)
+    _polygon(builder, _round(-0.06, _SIGN, 0.42, 3, down), (252, 252, 250), kind)
+    builder.panel((-0.07, 0.0, _SIGN + 0.06), 0.0, 0.5, 0.5, colour=(255, 255, 255), kind=kind, texture=Texture.YIELD)
+    _polygon(builder, _round(-0.04, _SIGN, 0.62, 3, down), _BACK, kind, backwards=True)
+    return builder.build()
+
+
+# --- Street names -----------------------------------------------------------------------------------------------------
+
+
+class Blade(NamedTuple):
+    """Posts with the names of the streets that meet at a corner: (street, direction in which it is read [rad])."""
+
+    at: tuple[float, float]
+    height: float
+    names: tuple[tuple[int, float], ...]
+
+
+def plan_blades(layers: MapLayers, clearance: Clearance) -> list[Blade]:
+    """Returns the corners with street names: on the right of each approach to a junction, where there is room."""
+    town = layers.town
+    found: list[Blade] = []
+    for lane in town.lanes:
+        if lane.in_junction or lane.street == NO_STREET or lane.id in layers.borders.right_neighbour:
+            continue
+        exits = [e for e in town.exits(lane.id) if e.junction_id >= 0]
+        others = {town.lanes[e.lane].street: None for e in exits}
+        cross = [street for street in others if street not in (lane.street, NO_STREET)]
+        if not exits:
+            continue
+        at = _corner(lane, clearance, found)
+        if at is None:
+            continue
+        heading = lane.heading_at(lane.length)
+        names = [(lane.street, heading + math.pi / 2.0), *((street, heading) for street in cross[:2])]
+        found.append(Blade(at, lane.height_at(lane.length), tuple(names)))
+    return found
+
+
+def _corner(lane: Lane, clearance: Clearance, others: list[Blade]) -> tuple[float, float] | None:
+    for aside in _CORNER:
+        x, y = lane.position(lane.length - 0.5, lane.width_at(lane.length) / 2.0 + aside).tolist()
+        apart = all(math.hypot(x - blade.at[0], y - blade.at[1]) > _CORNERS_APART for blade in others)
+        if apart and free_of(np.array([shapely.Point(x, y).buffer(0.15)]), clearance.lanes)[0]:
+            return x, y
+    return None
+
+
+def build_blades(blades: list[Blade], ground: Heights) -> Mesh:
+    """Returns posts with street names; the textures are those of the streets, `STREET_NAMES` and following."""
+    builder = MeshBuilder()
+    feet = ground.height_at(np.array([blade.at for blade in blades]).reshape(-1, 2))
+    for blade, low in zip(blades, feet.tolist(), strict=True):
+        base = low if abs(blade.height) < 1.0 else blade.height
+        top = base + _BLADE_HEIGHT + len(blade.names) * (_BLADE[1] + 0.06)
+        builder.prism(disc(blade.at, 0.05, 5), base - 0.1, top, colour=_METAL, kind=ObjectClass.POLE)
+        for k, (street, look) in enumerate(blade.names):
+            z = base + _BLADE_HEIGHT + k * (_BLADE[1] + 0.06) + _BLADE[1] / 2.0
+            for turned in (look, look + math.pi):
+                c, s = math.cos(turned), math.sin(turned)
+                builder.panel(
+                    (blade.at[0] - 0.06 * c, blade.at[1] - 0.06 * s, z), turned, *_BLADE, colour=(255, 255, 255),
+                    kind=ObjectClass.TRAFFIC_SIGN, texture=STREET_NAMES + street,
+                )  # fmt: skip
+    return builder.build()
