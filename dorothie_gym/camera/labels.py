@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.mesh import Mesh
+from dorothie_gym.camera.ground.lookup import GroundArrays, material_at
+from dorothie_gym.camera.mesh import Mesh, Surface
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.rasterizer import SKY, VisibilityBuffer
 from dorothie_gym.compilation import compiled, inlined
@@ -15,6 +16,7 @@ from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.ontology import ObjectClass
 
 _SKY_CLASS = int(ObjectClass.SKY.value)
+_GROUND = int(Surface.GROUND)
 
 
 @by_reference
@@ -41,19 +43,22 @@ def new_labels(width: int, height: int) -> Labels:
 
 
 @compiled
-def write_labels(view: View, buffer: VisibilityBuffer, town: Mesh, overlay: Mesh, bodies: Mesh, labels: Labels) -> None:
+def write_labels(
+    view: View, buffer: VisibilityBuffer, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays, labels: Labels
+) -> None:
     """Writes the labels of the pixels of a buffer.
 
     Args:
         view: projection of the buffer.
-        buffer: numbers of the triangles: those of the town, then those of the overlay, then those of the bodies.
+        buffer: numbers of the triangles, see `mesh_of`.
         town: what stands in every session.
         overlay: what stands in this session.
         bodies: what moves.
+        ground: materials of the ground.
         labels: to be written.
     """
-    towns, others = town.corners.shape[0], town.corners.shape[0] + overlay.corners.shape[0]
-    last, offset, nx, ny, nz, kind, instance = SKY, 0.0, 0.0, 0.0, 0.0, _SKY_CLASS, 0
+    last, mesh, row, kind = SKY, town, 0, _SKY_CLASS
+    offset, nx, ny, nz = 0.0, 0.0, 0.0, 0.0
     for y in range(view.height):
         for x in range(view.width):
             number = buffer.triangles[y, x]
@@ -61,21 +66,44 @@ def write_labels(view: View, buffer: VisibilityBuffer, town: Mesh, overlay: Mesh
                 labels.depth[y, x], labels.semantic[y, x], labels.instance[y, x] = np.inf, _SKY_CLASS, 0
                 continue
             if number != last:
-                last = number
-                if number < towns:
-                    offset, nx, ny, nz = plane_of(view, town, number)
-                    kind, instance = town.classes[number], town.instances[number]
-                elif number < others:
-                    offset, nx, ny, nz = plane_of(view, overlay, number - towns)
-                    kind, instance = overlay.classes[number - towns], overlay.instances[number - towns]
-                else:
-                    offset, nx, ny, nz = plane_of(view, bodies, number - others)
-                    kind, instance = bodies.classes[number - others], bodies.instances[number - others]
-            right = (x + 0.5 - 0.5 * view.width) / view.focal
-            up = (0.5 * view.height - y - 0.5) / view.focal
-            labels.depth[y, x] = offset / (nx * right + ny * up + nz)
-            labels.semantic[y, x] = kind
-            labels.instance[y, x] = instance
+                last, mesh, row = number, mesh_of(town, overlay, bodies, number), row_in(town, overlay, number)
+                offset, nx, ny, nz = plane_of(view, mesh, row)
+                kind = -1 if mesh.surfaces[row] & _GROUND else int(mesh.classes[row])
+            right, up = (x + 0.5 - 0.5 * view.width) / view.focal, (0.5 * view.height - y - 0.5) / view.focal
+            depth = offset / (nx * right + ny * up + nz)
+            labels.depth[y, x], labels.instance[y, x] = depth, mesh.instances[row]
+            labels.semantic[y, x] = kind if kind >= 0 else _ground_class(view, mesh, row, right, up, depth, ground)
+
+
+@inlined
+def _ground_class(view: View, mesh: Mesh, row: int, right: float, up: float, depth: float, ground: GroundArrays) -> int:
+    """Returns the class of the ground at a depth [m] in a direction (right, up, 1)."""
+    axes, origin = view.axes, view.origin
+    x = origin[0] + depth * (axes[2, 0] + right * axes[0, 0] + up * axes[1, 0])
+    y = origin[1] + depth * (axes[2, 1] + right * axes[0, 1] + up * axes[1, 1])
+    return int(ground.classes[material_at(ground, int(mesh.textures[row]), x, y)])
+
+
+@inlined
+def mesh_of(town: Mesh, overlay: Mesh, bodies: Mesh, number: int) -> Mesh:
+    """Returns the mesh of a numbered triangle: first the town's, then the overlay's, then those of bodies."""
+    mesh = town
+    if number >= town.corners.shape[0]:
+        mesh = overlay
+        if number >= town.corners.shape[0] + overlay.corners.shape[0]:
+            mesh = bodies
+    return mesh
+
+
+@inlined
+def row_in(town: Mesh, overlay: Mesh, number: int) -> int:
+    """Returns the row of a numbered triangle in its mesh, see `mesh_of`."""
+    row = number
+    if number >= town.corners.shape[0]:
+        row -= town.corners.shape[0]
+        if row >= overlay.corners.shape[0]:
+            row -= overlay.corners.shape[0]
+    return row
 
 
 @inlined

@@ -166,6 +166,8 @@ def _fill(
     ax, ay = buffer.cut[0, 0], buffer.cut[0, 1]
     bx, by = buffer.cut[second, 0], buffer.cut[second, 1]
     cx, cy = buffer.cut[third, 0], buffer.cut[third, 1]
+    if (bx - ax) * (cy - ay) <= (by - ay) * (cx - ax):
+        return  # edge-on: rounded, it is seen from behind, and its neighbours cover its samples
     if ay > by:
         ax, ay, bx, by = bx, by, ax, ay
     if by > cy:

@@ -1,0 +1,80 @@
+"""Bodies that move: triangles of their models at their poses, written for every picture."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.camera.cells import is_hidden, is_in_view
+from dorothie_gym.camera.mesh import PLAIN, Mesh
+from dorothie_gym.camera.models.model_bank import PlacementRecord
+from dorothie_gym.camera.pose import View
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.records import RecordArray
+from dorothie_gym.maps.model import Array
+
+
+@compiled
+def copy_bodies(
+    view: View, tiles: NDArray[np.float32], bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32],
+    bodies: RecordArray[PlacementRecord], box: Array, target: Mesh,
+) -> int:  # fmt: skip
+    """Writes the triangles of the bodies that may be seen; returns their number, larger than there is room if need be.
+
+    Args:
+        view: projection.
+        tiles: smallest nearness in tiles of samples, see `cells.find_tiles`.
+        bank: triangles of all models.
+        ranges: of `ModelBank`.
+        boxes: of `ModelBank`.
+        bodies: models and places.
+        box: (2, 3) scratch space.
+        target: to be written.
+    """
+    count, room = 0, target.corners.shape[0]
+    for k in range(len(bodies)):
+        body = bodies[k]
+        _surround(body, boxes[body.model], box)
+        if is_in_view(view, box[0], box[1]) and not is_hidden(view, tiles, box[0], box[1]):
+            first, last = ranges[body.model, 0], ranges[body.model, 1]
+            if count + last - first <= room:
+                for row in range(first, last):
+                    _copy(bank, row, body, target, count + row - first)
+            count += last - first
+    return count
+
+
+@inlined
+def _surround(body: PlacementRecord, model: NDArray[np.float32], box: Array) -> None:
+    """Writes a box around a body in every direction."""
+    x, y = max(abs(model[0, 0]), abs(model[1, 0])), max(abs(model[0, 1]), abs(model[1, 1]))
+    radius = math.sqrt(x * x + y * y)
+    box[0, 0], box[1, 0] = body.x - radius, body.x + radius
+    box[0, 1], box[1, 1] = body.y - radius, body.y + radius
+    box[0, 2], box[1, 2] = body.z + model[0, 2], body.z + model[1, 2]
+
+
+@inlined
+def _copy(bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) -> None:
+    c, s = body.cos, body.sin
+    for j in range(3):
+        x, y = bank.corners[row, j, 0], bank.corners[row, j, 1]
+        target.corners[at, j, 0] = body.x + x * c - y * s
+        target.corners[at, j, 1] = body.y + x * s + y * c
+        target.corners[at, j, 2] = body.z + bank.corners[row, j, 2]
+    _turn(bank.normals[row], c, s, target.normals[at])
+    if bank.textures[row] != PLAIN:
+        _turn(bank.u_axes[row], c, s, target.u_axes[at])
+        _turn(bank.v_axes[row], c, s, target.v_axes[at])
+        target.u_axes[at, 3], target.v_axes[at, 3] = bank.u_axes[row, 3], bank.v_axes[row, 3]
+    for j in range(3):
+        target.colours[at, j] = bank.colours[row, j]
+    target.textures[at], target.surfaces[at] = bank.textures[row], bank.surfaces[row]
+    target.classes[at], target.instances[at] = bank.classes[row], body.key
+
+
+@inlined
+def _turn(vector: NDArray[np.float32], c: float, s: float, out: NDArray[np.float32]) -> None:
+    out[0], out[1], out[2] = vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c, vector[2]

@@ -1,0 +1,239 @@
+"""First-person camera: RGB, depth, semantic classes, instances and boxes of a town, on one processor core."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.camera.atlas import AtlasArrays
+from dorothie_gym.camera.bodies import copy_bodies
+from dorothie_gym.camera.cells import CellOrder, CellTable, draw_cells, new_order, sorted_by_cell
+from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.camera.daylight import Daylight, daylight_of
+from dorothie_gym.camera.faces import new_face
+from dorothie_gym.camera.ground.lookup import GroundArrays
+from dorothie_gym.camera.labels import find_boxes, new_labels, write_labels
+from dorothie_gym.camera.lighting import LampMap, add_rain
+from dorothie_gym.camera.mesh import Mesh, empty_mesh
+from dorothie_gym.camera.models.model_bank import ModelBank, PlacementRecord
+from dorothie_gym.camera.pose import CameraPose, View, view_from
+from dorothie_gym.camera.rasterizer import VisibilityBuffer, clear, draw_triangles, new_buffer
+from dorothie_gym.camera.sensor_faults import apply_faults
+from dorothie_gym.camera.shading import new_canvas, shade
+from dorothie_gym.camera.shadows import draw_body_shadows, draw_town_shadows, new_shadow_maps, turn_sun
+from dorothie_gym.camera.sky import sky_noise
+from dorothie_gym.compilation.records import RecordArray, argument, empty_records, plain
+from dorothie_gym.copying import shared
+from dorothie_gym.ontology import Sensor
+from dorothie_gym.sim.weather import Weather
+
+_ROOM = 4096  # triangles of bodies, at first
+_NO_BODIES = empty_records(PlacementRecord, 0)
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
+class CameraScene:
+    """What all cameras of a town share.
+
+    Attributes:
+        town: what stands in every session, sorted by cell.
+        cells: of the town.
+        ground: materials and colours of the ground.
+        atlas: textures.
+        lamps: light of street lamps.
+        bank: models of bodies.
+    """
+
+    town: Mesh
+    cells: CellTable
+    ground: GroundArrays
+    atlas: AtlasArrays
+    lamps: LampMap
+    bank: ModelBank
+
+
+@dataclass(frozen=True)
+class CameraFrame:
+    """One picture. Parts that the configuration does not name are None.
+
+    Attributes:
+        view: projection.
+        rgb: (h, w, 3) uint8.
+        depth: (h, w) float32 distance along the axis [m], infinite for the sky.
+        semantic: (h, w) uint8 `ObjectClass`.
+        instance: (h, w) int32 key of the body, 0 for none.
+        boxes: boxes of the visible bodies.
+    """
+
+    view: View
+    rgb: NDArray[np.uint8] | None = None
+    depth: NDArray[np.float32] | None = None
+    semantic: NDArray[np.uint8] | None = None
+    instance: NDArray[np.int32] | None = None
+    boxes: Boxes | None = None
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """Boxes around the visible pixels of bodies, by ascending key.
+
+    Attributes:
+        keys: (n,) int32 key of each body.
+        limits: (n, 4) int32 left, top, right and bottom, behind the last pixel [pixels].
+        pixels: (n,) int32 number of visible pixels.
+    """
+
+    keys: NDArray[np.int32]
+    limits: NDArray[np.int32]
+    pixels: NDArray[np.int32]
+
+
+class FirstPersonCamera:
+    """Camera that draws a town, what stands in a session, and bodies.
+
+    Its buffers are allocated once. A picture depends on the arguments of `render` alone, not on earlier pictures.
+    """
+
+    def __init__(self, scene: CameraScene, config: CameraConfig, overlay: Mesh | None = None) -> None:
+        """Allocates the buffers.
+
+        Args:
+            scene: what all cameras of the town share.
+            config: settings.
+            overlay: what stands in the session, such as landmarks.
+        """
+        self.scene, self.config = scene, config
+        self._overlay, self._overlay_cells, order = sorted_by_cell(empty_mesh() if overlay is None else overlay)
+        self._rows = np.argsort(order)  # of the overlay as given
+        width, height, samples = config.width, config.height, config.samples
+        self._draws_rgb = CameraOutput.RGB in config.outputs
+        self._labelled = any(output != CameraOutput.RGB for output in config.outputs)
+        self._bodies = empty_mesh(_ROOM)
+        self._box = np.zeros((2, 3))
+        self._keys = np.unique(self._overlay.instances[self._overlay.instances > 0])
+        if self._draws_rgb:
+            self._buffer = new_buffer(width * samples, height * samples)
+            self._orders = self._new_orders(width * samples, height * samples)
+            self._canvas, self._face = new_canvas(width, samples), new_face()
+            self._shadows = new_shadow_maps(enabled=config.shadows)
+            self._scratch = np.zeros(max(width, height), np.uint8)
+        if self._labelled:
+            self._label_buffer = new_buffer(width, height)
+            self._label_orders = self._new_orders(width, height)
+            self._labels = new_labels(width, height)
+
+    def _new_orders(self, width: int, height: int) -> tuple[CellOrder, CellOrder]:
+        return new_order(self.scene.cells, width, height), new_order(self._overlay_cells, width, height)
+
+    def paint(self, rows: NDArray[np.int64], colours: NDArray[np.uint8]) -> None:
+        """Gives triangles of the overlay other colours, such as those of the lamps of signals.
+
+        Args:
+            rows: (n,) of the overlay as it was given.
+            colours: (n, 3) RGB.
+        """
+        self._overlay.colours[self._rows[rows]] = colours
+
+    def render(
+        self,
+        pose: CameraPose,
+        weather: Weather,
+        *,
+        bodies: RecordArray[PlacementRecord] = _NO_BODIES,
+        time: float = 0.0,
+        head_lights: bool = False,
+        faults: Collection[Sensor] = (),
+    ) -> CameraFrame:
+        """Draws a picture.
+
+        Args:
+            pose: of the camera.
+            weather: weather and sun.
+            bodies: what moves, as `model_bank.place_bodies` lists it.
+            time: simulated seconds, which move the rain.
+            head_lights: whether the car's head lights are on.
+            faults: faulty sensors, which act on RGB.
+        """
+        config = self.config
+        view = view_from(pose, config.width, config.height, config.field_of_view)
+        bodies = argument(bodies)
+        frame: dict[str, NDArray[np.generic] | Boxes] = {}
+        placed = -1
+        if self._draws_rgb:
+            light = daylight_of(weather, head_lights=head_lights)
+            placed = self._draw(view.scaled(config.samples), self._buffer, self._orders, bodies, placed)
+            self._cast_shadows(pose, light, bodies)
+            picture = np.empty((config.height, config.width, 3), np.uint8)
+            shade(
+                view, self._buffer, config.samples, self.scene.town, self._overlay, self._bodies, self.scene.ground,
+                self.scene.atlas, light, sky_noise(), self.scene.lamps, self._shadows, self._canvas, self._face,
+                picture,
+            )  # fmt: skip
+            if light.rainfall > 0.02:
+                add_rain(picture, light.rainfall, round(time * 30.0))
+            apply_faults(picture, faults, self._scratch)
+            frame["rgb"] = picture
+        if self._labelled:
+            self._draw(view, self._label_buffer, self._label_orders, bodies, placed)
+            frame.update(self._write_labels(view, bodies))
+        return CameraFrame(view, **frame)  # type: ignore[arg-type]  # by the names of the outputs
+
+    def _draw(
+        self,
+        view: View,
+        buffer: VisibilityBuffer,
+        orders: tuple[CellOrder, CellOrder],
+        bodies: RecordArray[PlacementRecord],
+        placed: int,
+    ) -> int:
+        """Draws all triangles; copies those of bodies first if `placed` is negative, and returns their number."""
+        scene, first = self.scene, self.scene.town.size
+        clear(buffer)
+        draw_cells(view, buffer, scene.town, scene.cells, orders[0], 0)
+        if self._overlay.size:
+            draw_cells(view, buffer, self._overlay, self._overlay_cells, orders[1], first)
+        if placed < 0 and len(bodies):
+            bank, tiles = scene.bank, orders[0].tiles
+            placed = copy_bodies(view, tiles, bank.mesh, bank.ranges, bank.boxes, bodies, self._box, self._bodies)
+            if placed > self._bodies.size:
+                self._bodies = empty_mesh(2 * placed)
+                copy_bodies(view, tiles, bank.mesh, bank.ranges, bank.boxes, bodies, self._box, self._bodies)
+        draw_triangles(view, buffer, self._bodies, 0, max(placed, 0), first + self._overlay.size)
+        return placed
+
+    def _cast_shadows(self, pose: CameraPose, light: Daylight, bodies: RecordArray[PlacementRecord]) -> None:
+        """Draws the maps of shadows."""
+        scene, maps = self.scene, self._shadows
+        if turn_sun(maps, light.sun, float(light.sunshine.max())):
+            draw_town_shadows(maps, scene.town, scene.cells, self._overlay, self._overlay_cells, pose.x, pose.y, pose.z)
+            draw_body_shadows(maps, scene.bank.mesh, scene.bank.ranges, bodies)
+
+    def _write_labels(self, view: View, bodies: RecordArray[PlacementRecord]) -> dict[str, NDArray[np.generic] | Boxes]:
+        labels, outputs = self._labels, self.config.outputs
+        write_labels(view, self._label_buffer, self.scene.town, self._overlay, self._bodies, self.scene.ground, labels)
+        found: dict[str, NDArray[np.generic] | Boxes] = {
+            output.value: getattr(labels, output.value).copy()
+            for output in (CameraOutput.DEPTH, CameraOutput.SEMANTIC, CameraOutput.INSTANCE)
+            if output in outputs
+        }
+        if CameraOutput.BOXES in outputs:
+            keys = np.unique(np.concatenate((self._keys, plain(bodies)["key"])))
+            table = np.zeros((len(keys), 5), np.int32)
+            find_boxes(labels.instance, keys, table)
+            seen = table[:, 4] > 0
+            found["boxes"] = Boxes(keys[seen], table[seen, :4], table[seen, 4])
+        return found
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the buffers [bytes]."""
+        parts: list[tuple[object, ...]] = [self._bodies, self._overlay]
+        if self._draws_rgb:
+            parts += [self._buffer, *self._orders, self._canvas, self._shadows]
+        if self._labelled:
+            parts += [self._label_buffer, *self._label_orders, self._labels]
+        return sum(array.nbytes for part in parts for array in part if isinstance(array, np.ndarray))

@@ -1,0 +1,242 @@
+"""Shadows of the sun, from maps of what stands in its light.
+
+Points are moved along the sun's rays to height 0. A map holds, for each square of that plane, how high the highest
+surface is whose light falls there; a point lies in shadow if a surface with the same place on the plane is higher. The
+map of the town consists of tiles around the camera that are kept as long as the sun stands still; the map of bodies is
+drawn for every picture. Both depend on the pose alone, not on earlier pictures.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.camera.cells import CellTable
+from dorothie_gym.camera.mesh import Mesh, Surface
+from dorothie_gym.camera.models.model_bank import PlacementRecord
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation.by_reference import by_reference
+from dorothie_gym.compilation.records import RecordArray
+from dorothie_gym.maps.model import Array
+
+TEXEL = 0.2
+"""Width of a square of the plane [m]."""
+
+REACH = 70.0
+"""Distance from the camera up to which shadows are drawn [m]; the last quarter fades."""
+
+LOWEST_SUN = 4.0
+"""Altitude of the sun below which nothing casts shadows [degrees]."""
+
+_TILE = 128  # width of a tile [squares]
+_TILES = 8  # tiles along each side of the map; a power of two
+_SIDE = _TILE * _TILES
+_BODIES = 512  # width of the map of bodies [squares]
+_STEPS = 50.0  # heights per metre
+_NOTHING = -32768
+_GROUND = int(Surface.GROUND)
+
+
+@by_reference
+class ShadowMaps(NamedTuple):
+    """Heights of what stands in the sun.
+
+    Attributes:
+        town: (n, n) int16 heights [1/50 m], tiles side by side, each at its place modulo their number.
+        held: (t, t, 2) int32 place of the tile that is held.
+        bodies: (m, m) int16 heights.
+        slope: (2,) shift towards the sun per metre of height [1].
+        window: (4,) int64: first tile in x and y, first square of the map of bodies in x and y.
+        strength: (1,) 1 with shadows, 0 without.
+        corners: (3, 3) scratch: corners of a triangle in squares, and their heights.
+    """
+
+    town: NDArray[np.int16]
+    held: NDArray[np.int32]
+    bodies: NDArray[np.int16]
+    slope: Array
+    window: NDArray[np.int64]
+    strength: Array
+    corners: Array
+
+
+def new_shadow_maps(*, enabled: bool = True) -> ShadowMaps:
+    """Returns empty maps; without `enabled` they are of one square."""
+    side, bodies = (_SIDE, _BODIES) if enabled else (1, 1)
+    return ShadowMaps(
+        np.full((side, side), _NOTHING, np.int16), np.full((_TILES, _TILES, 2), np.iinfo(np.int32).min, np.int32),
+        np.full((bodies, bodies), _NOTHING, np.int16), np.zeros(2), np.zeros(4, np.int64), np.zeros(1),
+        np.zeros((3, 3)),
+    )  # fmt: skip
+
+
+def turn_sun(maps: ShadowMaps, sun: Array, strength: float) -> bool:
+    """Prepares maps for a direction (3,) towards the sun; returns whether it casts shadows."""
+    casts = maps.town.shape[0] > 1 and strength > 0.03 and sun[2] >= math.sin(math.radians(LOWEST_SUN))
+    maps.strength[0] = 1.0 if casts else 0.0
+    if casts:
+        slope = sun[:2] / sun[2]
+        if (slope != maps.slope).any():
+            maps.slope[:] = slope
+            maps.held[:] = np.iinfo(np.int32).min
+    return bool(casts)
+
+
+@compiled
+def draw_town_shadows(
+    maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable, x: float, y: float,
+    z: float,
+) -> None:  # fmt: skip
+    """Draws the tiles around a position [m] that the map does not hold.
+
+    Args:
+        maps: to be drawn to.
+        town: what stands in every session, sorted by cell.
+        town_cells: its cells.
+        overlay: what stands only in this session, sorted by cell.
+        overlay_cells: its cells.
+        x: [m].
+        y: [m].
+        z: [m].
+    """
+    width = _TILE * TEXEL
+    for axis in range(2):
+        centre = (x if axis == 0 else y) - maps.slope[axis] * z
+        maps.window[axis] = math.floor(centre / width + 0.5) - _TILES // 2
+        maps.window[2 + axis] = math.floor(centre / TEXEL) - _BODIES // 2
+    for row in range(maps.window[1], maps.window[1] + _TILES):
+        for column in range(maps.window[0], maps.window[0] + _TILES):
+            held = maps.held[row % _TILES, column % _TILES]
+            if held[0] != column or held[1] != row:
+                held[0], held[1] = column, row
+                left, top = (column % _TILES) * _TILE, (row % _TILES) * _TILE
+                tile = maps.town[top : top + _TILE, left : left + _TILE]
+                for j in range(_TILE):
+                    for i in range(_TILE):
+                        tile[j, i] = _NOTHING
+                _draw_tile(maps, tile, town, town_cells, column, row)
+                _draw_tile(maps, tile, overlay, overlay_cells, column, row)
+
+
+@compiled
+def _draw_tile(maps: ShadowMaps, tile: NDArray[np.int16], mesh: Mesh, cells: CellTable, column: int, row: int) -> None:
+    for cell in range(len(cells.ranges)):
+        if _shades(maps, cells.low[cell], cells.high[cell], column, row):
+            for k in range(cells.ranges[cell, 0], cells.ranges[cell, 1]):
+                _cast(maps, tile, mesh, k, column * _TILE, row * _TILE, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+@inlined
+def _shades(maps: ShadowMaps, low: Array, high: Array, column: int, row: int) -> bool:
+    """Returns whether the shadow of a box may touch a tile."""
+    for axis in range(2):
+        first = (column if axis == 0 else row) * _TILE * TEXEL
+        shift_low, shift_high = maps.slope[axis] * low[2], maps.slope[axis] * high[2]
+        if high[axis] - min(shift_low, shift_high) < first:
+            return False
+        if low[axis] - max(shift_low, shift_high) > first + _TILE * TEXEL:
+            return False
+    return True
+
+
+@compiled
+def draw_body_shadows(
+    maps: ShadowMaps, bank: Mesh, ranges: NDArray[np.int32], bodies: RecordArray[PlacementRecord]
+) -> None:
+    """Draws the map of bodies, those near its middle.
+
+    Args:
+        maps: to be drawn to, after `draw_town_shadows`.
+        bank: triangles of all models.
+        ranges: of `ModelBank`.
+        bodies: models and places.
+    """
+    squares, first, reach = maps.bodies, maps.window, 0.5 * _BODIES * TEXEL
+    for y in range(_BODIES):
+        for x in range(_BODIES):
+            squares[y, x] = _NOTHING
+    for k in range(len(bodies)):
+        body = bodies[k]
+        across = abs(body.x - maps.slope[0] * body.z - first[2] * TEXEL - reach)
+        down = abs(body.y - maps.slope[1] * body.z - first[3] * TEXEL - reach)
+        if max(across, down) < reach:
+            for j in range(ranges[body.model, 0], ranges[body.model, 1]):
+                _cast(maps, squares, bank, j, first[2], first[3], body.x, body.y, body.z, body.cos, body.sin)
+
+
+@inlined
+def _cast(
+    maps: ShadowMaps, target: NDArray[np.int16], mesh: Mesh, k: int, left: int, top: int, x: float, y: float, z: float,
+    c: float, s: float,
+) -> None:  # fmt: skip
+    """Draws a triangle that is turned and moved, if it faces the sun, to a part of a map from a square on."""
+    slope, corners = maps.slope, maps.corners
+    nx, ny = mesh.normals[k, 0] * c - mesh.normals[k, 1] * s, mesh.normals[k, 0] * s + mesh.normals[k, 1] * c
+    rise = nx * slope[0] + ny * slope[1] + mesh.normals[k, 2]  # of the height, seen from the sun
+    if rise < 1e-3 or (mesh.surfaces[k] & _GROUND and mesh.textures[k] == 0):
+        return  # seen from behind, or the ground itself; bridges cast shadows
+    for j in range(3):
+        px, py = mesh.corners[k, j, 0], mesh.corners[k, j, 1]
+        height = z + mesh.corners[k, j, 2]
+        corners[j, 0] = (x + px * c - py * s - slope[0] * height) / TEXEL - left
+        corners[j, 1] = (y + px * s + py * c - slope[1] * height) / TEXEL - top
+        corners[j, 2] = height * _STEPS
+    _fill_heights(target, corners, -nx / rise * TEXEL * _STEPS, -ny / rise * TEXEL * _STEPS)
+
+
+@inlined
+def _fill_heights(target: NDArray[np.int16], corners: Array, right: float, down: float) -> None:
+    """Raises the squares whose centres lie in a triangle to its height there, which is affine."""
+    size = float(target.shape[0])
+    low = min(corners[0, 1], corners[1, 1], corners[2, 1])
+    high = max(corners[0, 1], corners[1, 1], corners[2, 1])
+    base = corners[0, 2] - right * corners[0, 0] - down * corners[0, 1]
+    for y in range(math.ceil(min(max(low - 0.5, 0.0), size)), math.ceil(min(max(high - 0.5, 0.0), size))):
+        middle, left, end = y + 0.5, np.inf, -np.inf
+        for j in range(3):
+            i = j + 1 if j < 2 else 0
+            if (corners[j, 1] > middle) != (corners[i, 1] > middle):
+                share = (middle - corners[j, 1]) / (corners[i, 1] - corners[j, 1])
+                at = corners[j, 0] + share * (corners[i, 0] - corners[j, 0])
+                left, end = min(left, at), max(end, at)
+        for x in range(math.ceil(min(max(left - 0.5, 0.0), size)), math.ceil(min(max(end - 0.5, 0.0), size))):
+            value = min(max(base + right * (x + 0.5) + down * middle, -32767.0), 32767.0)
+            target[y, x] = max(target[y, x], np.int16(value))
+
+
+@compiled
+def sunlit(maps: ShadowMaps, x: float, y: float, z: float, bias: float) -> float:
+    """Returns the share of the sun's light at a position [m], 0 to 1, with soft edges.
+
+    Args:
+        maps: drawn for the picture.
+        x: [m].
+        y: [m].
+        z: [m].
+        bias: height by which what casts the shadow must be higher [m].
+    """
+    u, v = (x - maps.slope[0] * z) / TEXEL - 0.5, (y - maps.slope[1] * z) / TEXEL - 0.5
+    column, row = math.floor(u), math.floor(v)
+    a, b = u - column, v - row
+    level, lit = (z + bias) * _STEPS, 0.0
+    for k in range(4):
+        i, j = column + (k & 1), row + (k >> 1)
+        weight = (a if k & 1 else 1.0 - a) * (b if k >> 1 else 1.0 - b)
+        if _height(maps, i, j) <= level:
+            lit += weight
+    return lit
+
+
+@inlined
+def _height(maps: ShadowMaps, column: int, row: int) -> int:
+    height = _NOTHING
+    across, down = column // _TILE - maps.window[0], row // _TILE - maps.window[1]
+    if 0 <= across < _TILES and 0 <= down < _TILES:
+        height = int(maps.town[row & (_SIDE - 1), column & (_SIDE - 1)])
+    i, j = column - maps.window[2], row - maps.window[3]
+    if 0 <= i < _BODIES and 0 <= j < _BODIES:
+        height = max(height, int(maps.bodies[j, i]))
+    return height
