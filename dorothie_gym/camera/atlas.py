@@ -65,6 +65,10 @@ class Texture(enum.IntEnum):
     QDOBA = 25
     SEVEN_ELEVEN = 26
     SHELL = 27
+    HOUSE_SIGN = 28
+    """Pictogram of a house."""
+    PERSON_SIGN = 29
+    """Pictogram of a person."""
 
 
 STREET_NAMES = len(Texture)
@@ -169,6 +173,8 @@ def town_atlas() -> AtlasArrays:
         Texture.WORKS: lettered("ROAD\nWORK", (64, 64), ink=(20, 20, 20), ground=(245, 132, 20), margin=0.22),
         Texture.STRIPES: patterns.stripes(),
         Texture.DOOR: patterns.door(),
+        Texture.HOUSE_SIGN: patterns.house_sign(),
+        Texture.PERSON_SIGN: patterns.person_sign(),
     }
     for texture, words, ink, ground in BRAND_SIGNS.values():
         pictures[texture] = lettered(words, SIGN_SIZE, ink=ink, ground=ground, margin=0.14, light=0.75)

@@ -164,6 +164,41 @@ def stripes() -> Picture:
     return base
 
 
+def house_sign() -> Picture:
+    """Returns a white house with a door on blue, lit at night."""
+    across, up = _square()
+    roof = (up > 0.50) & (up < 0.88) & (np.abs(across - 0.5) < (0.88 - up) * 1.05)
+    walls = (np.abs(across - 0.5) < 0.27) & (up > 0.14) & (up <= 0.50)
+    door = (np.abs(across - 0.5) < 0.08) & (up > 0.14) & (up < 0.36)
+    return _sign((roof | walls) & ~door, (24, 74, 168))
+
+
+def person_sign() -> Picture:
+    """Returns a white person with a raised arm on magenta, lit at night."""
+    across, up = _square()
+    head = np.hypot(across - 0.5, up - 0.80) < 0.10
+    body = (np.abs(across - 0.5) < 0.12) & (up > 0.38) & (up < 0.68)
+    legs = (np.abs(np.abs(across - 0.5) - 0.065) < 0.05) & (up > 0.08) & (up <= 0.40)
+    arm = (np.abs(across - 0.345) < 0.04) & (up > 0.36) & (up < 0.66)
+    raised = (np.abs((across - 0.62) - 0.55 * (up - 0.62)) < 0.045) & (up > 0.58) & (up < 0.92)
+    return _sign(head | body | legs | arm | raised, (176, 28, 120))
+
+
+def _square() -> tuple[Array, Array]:
+    share = (np.arange(64) + 0.5) / 64.0
+    return np.broadcast_to(share[None], (64, 64)), np.broadcast_to(share[:, None], (64, 64))
+
+
+def _sign(figure: NDArray[np.bool_], ground: Ink) -> Picture:
+    """Returns a white figure on a ground with a white rim."""
+    across, up = _square()
+    rim = np.maximum(np.abs(across - 0.5), np.abs(up - 0.5)) > 0.46
+    picture = np.zeros((64, 64, 4), dtype=np.float32)
+    picture[..., :3] = np.where((figure | rim)[..., None], 255, ground)
+    picture[..., 3] = _LIGHT
+    return picture
+
+
 def _bricks(size: int, *, rows: int, columns: int) -> Picture:
     row, column = np.mgrid[0:size, 0:size]
     course = (row * rows) // size

@@ -33,6 +33,9 @@ _PAINT = (
     palette.LANE_LINE, palette.EDGE_LINE, palette.CENTRE_LINE, palette.HATCHING, palette.STOP_LINE, palette.ARROW,
     palette.ONE_WAY,
 )  # fmt: skip
+BESIDE_LOT = 1.2
+"""Room at both sides of a lot, for a sign [m]."""
+
 _UNIT = np.array([[0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]])
 _LOTS = ((20.0, 15.0), (16.0, 12.0), (13.0, 10.0), (10.0, 8.0), (8.0, 7.0), (6.0, 5.0), (4.0, 4.0))
 _BEHIND = (0.4, 1.2, 2.4, 4.0, 6.0, 9.0)  # [m] from the place of a landmark to its front, at first as close as can be
@@ -121,7 +124,8 @@ class Clearance:
         length, depth, behind = options.T
         fronts = place + behind[:, None] * towards
         count = len(options)
-        ground = rectangles(fronts + 0.5 * depth[:, None] * towards, np.full(count, heading), depth, length)
+        middles = fronts + 0.5 * depth[:, None] * towards
+        ground = rectangles(middles, np.full(count, heading), depth, length + 2.0 * BESIDE_LOT)
         free = _free(ground, self.ways) & _free(ground, self.trees)
         if taken:
             free &= ~shapely.intersects(ground, shapely.MultiPolygon(taken).buffer(1.0))
