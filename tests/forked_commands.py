@@ -14,8 +14,8 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 IMPORTED = (
-    "dorothie_gym.cli.app", "dorothie_gym.baselines.rl", "dorothie_gym.envs.navigation_vector_env", "matplotlib.figure",
-    "sb3_contrib", "torch._dynamo",
+    "dorothie_gym.cli.app", "dorothie_gym.baselines.rl", "dorothie_gym.envs.navigation_vector_env",
+    "dorothie_gym.cli.generate", "matplotlib.figure", "sb3_contrib", "torch._dynamo",
 )  # fmt: skip
 """Modules that the server imports, if they are installed."""
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="Windows does not delete open files")
+from tests.forked_commands import start_command
 
-ROOT = Path(__file__).parents[1]
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="Windows does not delete open files")
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "generate": ("generate", "--sessions", "12", "--max-seconds", "8", "--workers", "1"),
@@ -27,18 +25,15 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 @pytest.mark.parametrize("again", [False, True], ids=["deleted", "replaced by an empty folder"])
 def test_deleted_output_folder_is_named_and_not_made_again(name: str, again: bool, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    process = subprocess.Popen(
-        [sys.executable, "-m", "dorothie_gym", *COMMANDS[name], "--out", str(out)],
-        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
-    while process.poll() is None and not list(out.glob("**/session.json")):
+    process = start_command([*COMMANDS[name], "--out", str(out)], tmp_path, tmp_path / "errors")
+    while process.is_alive() and not list(out.glob("**/session.json")):
         time.sleep(0.01)
     out.rename(tmp_path / "gone")
     shutil.rmtree(tmp_path / "gone", ignore_errors=True)
     if again:
         out.mkdir()
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 1, errors
+    process.join(60)
+    errors = (tmp_path / "errors").read_text()
+    assert process.exitcode == 1, errors
     assert errors.startswith(f"Error: {out}: the folder was deleted") and errors.count("\n") == 1
     assert out.exists() == again and not list(out.glob("**/session.json"))

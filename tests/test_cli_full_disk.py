@@ -21,20 +21,32 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 ROOT = Path(__file__).parents[1]
 
-SCRIPT = """
-mount -t tmpfs -o size="$1" tmpfs "$2" && folder="$2" && shift 2
-"$@" > "$folder.first" 2>&1; echo $? > "$folder.code"
-find "$folder" -name '*.part' > "$folder.parts"
-mount -o remount,size=300m tmpfs "$folder"
-"$@"
+PROGRAM = """
+import subprocess, sys
+from pathlib import Path
+from tests.forked_commands import start_command
+
+def run(errors):
+    process = start_command(words, Path.cwd(), errors)
+    process.join()
+    return process.exitcode
+
+size, folder, *words = sys.argv[1:]
+folder = Path(folder)
+subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", folder], check=True)
+folder.with_suffix(".code").write_text(str(run(folder.with_suffix(".first"))))
+folder.with_suffix(".parts").write_text(" ".join(map(str, folder.rglob("*.part"))))
+subprocess.run(["mount", "-o", "remount,size=300m", "tmpfs", folder], check=True)
+sys.exit(run(folder.with_suffix(".second")))
 """
+"""Runs a command on a disk of a size, and again with more space."""
 
 SHORT = ("--episodes", "1", "--set", "max_seconds=10", "--set", "traffic=none", "--workers", "0")
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "train": ("train", "toto", "--corpus", "CORPUS", "--seeds", "1", "--encoder", "hashing", "--workers", "1"),
     "train-rl": (
-        "train-rl", "ppo", "--steps", "512", "--environments", "2", "--evaluate-every", "256", *SHORT
+        "train-rl", "a2c", "--steps", "512", "--environments", "2", "--evaluate-every", "256", *SHORT
     ),
     "two trainings": ("train", "toto", "--corpus", "CORPUS", "--seeds", "2", "--encoder", "hashing", "--workers", "2"),
     "table": ("table", "--corpus", "CORPUS", "--models", "tfidf", "--seeds", "1"),
@@ -65,8 +77,8 @@ def check_command_on_full_disk(name: str, size: str, corpus: Path, disk: Path) -
     """Runs a command on a disk of a size, and again with more space; returns whether the disk was full."""
     words = [str(corpus) if word == "CORPUS" else word for word in COMMANDS[name]]
     again = subprocess.run(
-        ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", SCRIPT, "sh", size, str(disk),
-         sys.executable, "-m", "dorothie_gym", *words, "--out", str(disk / "run")],
+        ["unshare", "--user", "--map-root-user", "--mount", sys.executable, "-c", PROGRAM, size, str(disk), *words,
+         "--out", str(disk / "run")],
         env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False, timeout=240,
     )  # fmt: skip
     first, code = disk.with_suffix(".first").read_text(), int(disk.with_suffix(".code").read_text())
@@ -76,7 +88,7 @@ def check_command_on_full_disk(name: str, size: str, corpus: Path, disk: Path) -
         assert re.fullmatch(rf"Error: {disk}/run/\S+: No space left on device; make space and run.*", last), first
         assert code == 1 and first.count("Error") == 1 and "Traceback" not in first
         assert disk.with_suffix(".parts").read_text() == ""
-    assert again.returncode == 0, again.stderr
+    assert again.returncode == 0, again.stderr + disk.with_suffix(".second").read_text()
     return full
 
 
