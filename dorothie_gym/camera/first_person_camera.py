@@ -17,7 +17,7 @@ from dorothie_gym.camera.faces import new_face
 from dorothie_gym.camera.ground.lookup import GroundArrays
 from dorothie_gym.camera.labels import find_boxes, new_labels, write_labels
 from dorothie_gym.camera.lighting import LampMap, add_rain
-from dorothie_gym.camera.mesh import Mesh, empty_mesh
+from dorothie_gym.camera.mesh import TOWN, Mesh, empty_mesh
 from dorothie_gym.camera.models.model_bank import ModelBank, PlacementRecord
 from dorothie_gym.camera.pose import CameraPose, View, view_from
 from dorothie_gym.camera.rasterizer import VisibilityBuffer, clear, draw_triangles, new_buffer
@@ -114,7 +114,7 @@ class FirstPersonCamera:
         self._labelled = any(output != CameraOutput.RGB for output in config.outputs)
         self._bodies = empty_mesh(_ROOM)
         self._box = np.zeros((2, 3))
-        self._keys = np.unique(self._overlay.instances[self._overlay.instances > 0])
+        self._keys = np.unique(self._overlay.instances[self._overlay.instances != TOWN])
         if self._draws_rgb:
             self._buffer = new_buffer(width * samples, height * samples)
             self._orders = self._new_orders(width * samples, height * samples)

@@ -297,3 +297,13 @@ def test_an_empty_town_is_sky_over_nothing() -> None:
     town = replace(scene(MeshBuilder()), town=empty_mesh(), cells=sorted_by_cell(empty_mesh())[1])
     frame = FirstPersonCamera(town, CONFIG).render(EYE, weather())
     assert frame.depth is not None and np.isinf(frame.depth).all()
+
+
+def test_landmarks_have_boxes_by_their_negative_keys() -> None:
+    overlay = MeshBuilder()
+    overlay.box((20.0, 0.0), 0.0, 4.0, 6.0, 0.0, 4.0, colour=GREY, kind=ObjectClass.BUILDING, instance=-3)
+    frame = FirstPersonCamera(scene(MeshBuilder()), CONFIG, overlay.build()).render(EYE, weather())
+    assert frame.boxes is not None
+    assert frame.instance is not None
+    assert frame.boxes.keys.tolist() == [-3]
+    assert frame.boxes.pixels.tolist() == [int((frame.instance == -3).sum())]

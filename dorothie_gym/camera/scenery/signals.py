@@ -36,6 +36,10 @@ _BLADE = 2.2, 0.55  # [m] width and height of a street name
 _BLADE_HEIGHT = 3.3  # [m] of the lower blade
 _CORNER = (1.9, 1.2, 2.8)  # [m] from the edge of the road to the post with names; the first that has room
 _CORNERS_APART = 6.0  # [m]
+_ON_GROUND = 1.0  # [m] height of roads whose signals stand on the ground
+_STRAIGHT = 45  # [degrees] largest turn of a way straight on
+_FAR, _FAR_ASIDE = 1.5, 1.3  # [m] from the beginning and from the edge of the exit to a repeated light
+_HEADS_APART = 1.5  # [m] between lights
 
 
 class Lenses(NamedTuple):
@@ -52,31 +56,40 @@ class Lenses(NamedTuple):
     colours: NDArray[np.int32]
 
 
-def build_signals(layers: MapLayers, ground: Heights) -> tuple[Mesh, Lenses]:
-    """Returns lights and signs at all posts of a map, and the lenses among their triangles."""
-    town = layers.town
+class _Head(NamedTuple):
+    """A light or sign at a place: its kind, direction in which it is read [rad], height of its foot, and signal."""
+
+    kind: SignalKind
+    at: tuple[float, float]
+    look: float
+    foot: float
+    signal: int
+
+
+def build_signals(layers: MapLayers, clearance: Clearance, ground: Heights) -> tuple[Mesh, Lenses]:
+    """Returns lights and signs at all posts of a map, and the lenses among their triangles.
+
+    Each light is repeated on the far side of its junction where there is room, so that the first car in a queue, which
+    stands beside the post, sees it as well.
+    """
     light, parts = _traffic_light()
     templates = {SignalKind.TRAFFIC_LIGHT: light, SignalKind.STOP: _stop_sign(), SignalKind.YIELD: _yield_sign()}
-    meshes, ranges, signals, colours = [], [], [], []
+    heads = [_head(layers, post, ground) for post in layers.posts]
+    heads += _repeaters(layers, clearance, ground, heads)
+    meshes: list[Mesh] = []
+    ranges, signals, colours = [], [], []
     first = 0
     for kind, template in templates.items():
-        posts = [post for post in layers.posts if post.kind is kind]
-        if not posts:
+        chosen = [head for head in heads if head.kind is kind]
+        if not chosen:
             continue
-        at = np.array([post.at for post in posts])
-        poses = [_pose(town, layers, post) for post in posts]
-        base = np.array(
-            [height if lanes else np.nan for (_, height), lanes in zip(poses, (p.lanes for p in posts), strict=True)]
-        )
-        base = np.where(np.isnan(base) | (np.abs(base) < 1.0), ground.height_at(at), base)
-        meshes.append(stamped(template, np.column_stack((at, base)), np.array([heading for heading, _ in poses])))
-        if kind is SignalKind.TRAFFIC_LIGHT:
-            for k, post in enumerate(posts):
-                start = first + k * template.size
-                for colour, (low, high) in parts.items():
-                    ranges.append((start + low, start + high))
-                    signals.append(_signal_of(town, post))
-                    colours.append(int(colour))
+        feet = np.array([(*head.at, head.foot) for head in chosen])
+        meshes.append(stamped(template, feet, np.array([head.look for head in chosen])))
+        for k, head in enumerate(chosen if kind is SignalKind.TRAFFIC_LIGHT else ()):
+            start = first + k * template.size
+            ranges += [(start + low, start + high) for low, high in parts.values()]
+            signals += [head.signal] * len(parts)
+            colours += [int(colour) for colour in parts]
         first += meshes[-1].size
     lenses = Lenses(
         np.array(ranges, dtype=np.int32).reshape(-1, 2),
@@ -84,6 +97,34 @@ def build_signals(layers: MapLayers, ground: Heights) -> tuple[Mesh, Lenses]:
         np.array(colours, dtype=np.int32),
     )
     return joined(meshes), lenses
+
+
+def _head(layers: MapLayers, post: Post, ground: Heights) -> _Head:
+    look, height = _pose(layers.town, layers, post)
+    if abs(height) < _ON_GROUND:
+        height = float(ground.height_at(np.array([post.at]))[0])
+    return _Head(post.kind, post.at, look, height, _signal_of(layers.town, post))
+
+
+def _repeaters(layers: MapLayers, clearance: Clearance, ground: Heights, heads: list[_Head]) -> list[_Head]:
+    """Returns the lights on the far sides of junctions: on the right of the exit that leads straight on."""
+    town = layers.town
+    found: list[_Head] = []
+    for post, head in zip(layers.posts, heads, strict=True):
+        if post.kind is not SignalKind.TRAFFIC_LIGHT:
+            continue
+        exits = [e for lane in post.lanes for e in town.exits(lane) if e.junction_id >= 0 and abs(e.angle) < _STRAIGHT]
+        if not exits:
+            continue
+        target = town.lanes[layers.borders.rightmost(min(exits, key=lambda e: abs(e.angle)).lane)]
+        x, y = target.position(_FAR, target.width_at(0.0) / 2.0 + _FAR_ASIDE).tolist()
+        others = [row.at for row in (*heads, *found)]
+        room = free_of(np.array([shapely.Point(x, y).buffer(0.3)]), clearance.lanes)[0]
+        if room and all(math.dist((x, y), other) > _HEADS_APART for other in others):
+            height = target.height_at(0.0)
+            foot = float(ground.height_at(np.array([[x, y]]))[0]) if abs(height) < _ON_GROUND else height
+            found.append(_Head(post.kind, (x, y), head.look, foot, head.signal))
+    return found
 
 
 def _pose(town: Town, layers: MapLayers, post: Post) -> tuple[float, float]:

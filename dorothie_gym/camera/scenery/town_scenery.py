@@ -22,13 +22,15 @@ class Scenery:
     """Scenery of a town.
 
     Attributes:
-        mesh: its triangles.
-        lenses: triangles that show the state of traffic lights.
+        mesh: triangles that look the same in every session.
+        signals: lights and signs; the lenses show another state in each session.
+        lenses: triangles of `signals` that show the state of traffic lights.
         lights: positions of the lights of street lamps (n, 3) float32 [m].
         lots: ground reserved for the landmarks of the sites.
     """
 
     mesh: Mesh
+    signals: Mesh
     lenses: Lenses
     lights: NDArray[np.float32]
     lots: tuple[Lot, ...]
@@ -42,13 +44,12 @@ def build_scenery(layers: MapLayers, ground: Heights) -> Scenery:
         ground: heights of the ground.
     """
     clearance = Clearance(layers)
-    signals, lenses = build_signals(layers, ground)
+    signals, lenses = build_signals(layers, clearance, ground)
     lamps, lights = build_lamps(lamp_places(layers, clearance), ground)
     parts = [
-        signals,  # first: the lenses are numbered from there
         lamps,
         build_blades(plan_blades(layers, clearance), ground),
         build_trees(layers, ground),
         build_buildings(plan_buildings(layers, clearance), ground),
     ]
-    return Scenery(joined(parts), lenses, lights.astype(np.float32), clearance.lots)
+    return Scenery(joined(parts), signals, lenses, lights.astype(np.float32), clearance.lots)
