@@ -54,8 +54,11 @@ def masked_infos(values: Mapping[str, NDArray[np.generic] | Infos], mask: NDArra
     infos: Infos = {}
     if not mask.any():
         return infos
+    all_have = mask.all()
     for name, value in values.items():
-        if isinstance(value, np.ndarray):
+        if isinstance(value, np.ndarray) and all_have:
+            infos[name] = value.copy()
+        elif isinstance(value, np.ndarray):
             masked = np.full_like(value, None) if value.dtype == np.object_ else np.zeros_like(value)
             masked[mask] = value[mask]
             infos[name] = masked

@@ -176,7 +176,9 @@ class DrivingVectorEnv(
         for batch, members in zip(self.batches, self._members, strict=True):
             if playing[members].any():
                 batch.play(actions[members], playing[members])
-                self._note(batch, members, playing[members])
+                self._note(batch, members)  # the others begin anew in the same step
+                for number in members[playing[members]].tolist() if self._views else ():
+                    self._views[number].note(*self._places[number])
 
     def _start(self, seeds: Mapping[int, int], scenario: Scenario | None) -> None:
         """Begins sessions of environments by their seeds, and notes observations and outcomes."""
@@ -184,32 +186,31 @@ class DrivingVectorEnv(
             own = {place: seeds[number] for place, number in enumerate(members.tolist()) if number in seeds}
             if own:
                 batch.begin(own, scenario)
-                begun = np.zeros(len(members), dtype=np.bool_)
-                begun[list(own)] = True
-                self._note(batch, members, begun)
+                self._note(batch, members, list(own))
+                for number in members[list(own)].tolist() if self._views else ():
+                    self._views[number].note(*self._places[number])
 
-    def _note(self, batch: DrivingBatch, members: NDArray[np.int64], changed: NDArray[np.bool_]) -> None:
-        """Copies the outcomes of some environments of a batch."""
-        numbers, outcomes = members[changed], batch.outcomes[changed]
-        self._observations[numbers] = batch.observations[changed]
+    def _note(self, batch: DrivingBatch, members: NDArray[np.int64], rows: slice | list[int] = slice(None)) -> None:
+        """Copies the outcomes of some rows of a batch, by default of all."""
+        outcomes, changed = batch.outcomes[rows], members[rows]
+        numbers = slice(None) if len(changed) == self.num_envs else changed
+        self._observations[numbers] = batch.observations[rows]
         self._rewards[numbers], self._terms[numbers] = outcomes["reward"], outcomes["terms"]
-        self._infractions[numbers] = batch.infractions[changed]
-        truncated = outcomes["ending"] == Ending.OUT_OF_TIME
-        self._truncations[numbers], self._terminations[numbers] = truncated, (outcomes["ending"] > 0) & ~truncated
-        reasons: list[list[str]] = [[] for _ in range(len(numbers))]
-        for row in np.flatnonzero(batch.any_refused[changed]).tolist():
-            reasons[row] = batch.refused(int(np.flatnonzero(changed)[row]))
-        self._refused[numbers] = np.fromiter(reasons, dtype=object, count=len(numbers))
-        for number in numbers.tolist() if self._views else ():
-            self._views[number].note(*self._places[number])
-        over = numbers[outcomes["ending"] > 0]
-        if over.size:
-            self._success[numbers] = batch.successes[changed]
-            self._subgoals[numbers, 0] = batch.live_subgoals[changed]
+        self._infractions[numbers] = batch.infractions[rows]
+        endings = outcomes["ending"]
+        over, truncated = endings > 0, endings == Ending.OUT_OF_TIME
+        self._truncations[numbers], self._terminations[numbers] = truncated, over & ~truncated
+        reasons: list[list[str]] = [[] for _ in range(len(changed))]
+        for row in np.flatnonzero(batch.any_refused[rows]).tolist():
+            reasons[row] = batch.refused(row if isinstance(rows, slice) else rows[row])
+        self._refused[numbers] = np.fromiter(reasons, dtype=object, count=len(reasons))
+        if over.any():
+            self._success[numbers] = batch.successes[rows]
+            self._subgoals[numbers, 0] = batch.live_subgoals[rows]
             self._subgoals[numbers, 1] = outcomes["reached"]
             self._reasons[numbers] = None
-            for number, ending in zip(over.tolist(), outcomes["ending"][outcomes["ending"] > 0].tolist(), strict=True):
-                self._reasons[number] = Ending(ending).label
+            for row in np.flatnonzero(over).tolist():
+                self._reasons[changed[row]] = Ending(endings[row]).label
 
     def _begin(self, seeds: Mapping[int, int | None], scenario: Scenario | None) -> None:
         """Begins episodes of environments; a seed of None continues the environment's own series."""

@@ -91,9 +91,9 @@ class NavigationVectorEnv(DrivingVectorEnv):
             raise ValueError(f"actions is {short_repr(found)}; the numbers must be in 0..{len(ACTIONS) - 1}")
         return found.astype(np.int64)
 
-    def _note(self, batch: DrivingBatch, members: NDArray[np.int64], changed: NDArray[np.bool_]) -> None:
-        super()._note(batch, members, changed)
-        self._masks[members[changed]] = batch.masks[changed]
+    def _note(self, batch: DrivingBatch, members: NDArray[np.int64], rows: slice | list[int] = slice(None)) -> None:
+        super()._note(batch, members, rows)
+        self._masks[members[rows]] = batch.masks[rows]
 
     def _infos(self, mask: NDArray[np.bool_]) -> Infos:
         return {**masked_infos({"action_mask": self._masks}, mask), **super()._infos(mask)}
