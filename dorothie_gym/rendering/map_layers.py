@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -138,8 +138,8 @@ class MapLayers:
 
         Roads on bridges are left out; the place of a bridge shows the floor of a tunnel where nothing else is.
         """
-        parts = [replace(part, level=-1) for part in self.stretches]
-        ground = streets(self.town, self._samples, self.borders.lines, parts, self.pockets)
+        bridges = [part for part in self.stretches if part.level > 0]
+        ground = streets(self.town, self._samples, self.borders.lines, self.stretches, self.pockets, bridges)
         left_out = LevelLookup(self._samples, self.stretches)
         paint = self._held(list(self._paint()), left_out, wanted=False)
         return [*landscape(self.town, self._border), *ground, *paint]

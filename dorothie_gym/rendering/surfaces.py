@@ -259,6 +259,7 @@ def streets(
     lines: Sequence[Border],
     parts: Sequence[LevelStretch],
     turn_lanes: Sequence[Pocket],
+    left_out: Sequence[LevelStretch] = (),
 ) -> Iterator[Shape]:
     """Yields everything on the ground, from the pavements to the medians; surfaces in tunnels come first.
 
@@ -268,10 +269,12 @@ def streets(
         lines: borders of its lanes.
         parts: bridges and tunnels.
         turn_lanes: beginnings of turn lanes.
+        left_out: bridges that are left out, as if seen from below; their place looks like the floor of a tunnel.
     """
-    tunnels = [part for part in parts if part.level < 0]
+    mouths = [part for part in parts if part.level < 0]
+    tunnels = [*mouths, *left_out]
     covered = LevelLookup(samples, tunnels)
-    yield from walls(lines, LevelLookup(samples, cuttings(town, tunnels)), covered)
+    yield from walls(lines, LevelLookup(samples, cuttings(town, mouths)), covered)
     yield from tunnel_floors(town, tunnels, lines, covered)
     pieces = list(_open_pieces(town, tunnels))
     areas = junction_areas(town)
@@ -295,7 +298,7 @@ def streets(
     # grass continues below the ends of bridges, which differ between adjacent lanes
     shorter = [_longer(part, -BEYOND_BRIDGE) for part in parts if part.level > 0]
     yield from medians(lines, LevelLookup(samples, [*shorter, *(_longer(part, _BEFORE_PORTAL) for part in tunnels)]))
-    yield from portals(town, tunnels)
+    yield from portals(town, mouths)
 
 
 def _longer(part: LevelStretch, more: float) -> LevelStretch:

@@ -51,6 +51,8 @@ class Material(enum.IntEnum):
     TUNNEL_FLOOR = 15
     PARAPET = 16
     BRIDGE_EDGE = 17
+    GRAVEL = 18
+    """Below bridges."""
 
 
 class Look(NamedTuple):
@@ -88,6 +90,7 @@ LOOKS: dict[Material, Look] = {
     Material.TUNNEL_FLOOR: Look((84, 84, 84), ObjectClass.ROAD, Relief.FLAT, 0.12),
     Material.PARAPET: Look((168, 166, 160), ObjectClass.WALL, Relief.RAISED, 0.08),
     Material.BRIDGE_EDGE: Look((140, 138, 132), ObjectClass.WALL, Relief.RAISED, 0.08),
+    Material.GRAVEL: Look((126, 121, 108), ObjectClass.TERRAIN, Relief.FLAT, 0.20),
 }
 """Properties of all materials."""
 

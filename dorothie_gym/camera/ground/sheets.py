@@ -58,14 +58,16 @@ def town_sheets(town: Town) -> tuple[Sheet, ...]:
     """Returns the sheets of a town: the ground, the bridges level by level, and the tunnels if there are any."""
     layers = MapLayers(town, scale=MAP_SCALE, border=BORDER)
     x0, y0, x1, y1 = town_bounds(town, BORDER)
-    shapes = layers.ground_shapes() if layers.bridge_levels else layers.shapes
-    sheets = [Sheet(painted(shapes), Material.COUNTRY, np.array([x0, y0]), np.array([x1, y1]), 0, ())]
+    ground = painted(layers.ground_shapes() if layers.bridge_levels else layers.shapes)
+    if layers.bridge_levels:
+        below = {Material.TUNNEL_FLOOR: Material.GRAVEL}
+        ground = tuple(Painted(part.points, below.get(part.material, part.material)) for part in ground)
+    sheets = [Sheet(ground, Material.COUNTRY, np.array([x0, y0]), np.array([x1, y1]), 0, ())]
     for level in [*layers.bridge_levels, -1]:
         above = painted(layers.bridge_shapes(level) if level > 0 else layers.tunnel_shapes())
         if above:
             points = np.concatenate([polygon.points for polygon in above])
             parts = tuple(part for part in layers.stretches if part.level == level)
-            sheets.append(
-                Sheet(above, Material.NOTHING, points.min(axis=0) - 1.0, points.max(axis=0) + 1.0, level, parts)
-            )
+            outside = Material.NOTHING if level > 0 else Material.TUNNEL_FLOOR
+            sheets.append(Sheet(above, outside, points.min(axis=0) - 1.0, points.max(axis=0) + 1.0, level, parts))
     return tuple(sheets)

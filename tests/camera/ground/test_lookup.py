@@ -7,6 +7,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from dorothie_gym.camera.ground.arrays import ground_arrays
 from dorothie_gym.camera.ground.cells import Painted
@@ -28,13 +29,13 @@ def sheet_of(polygons: list[Painted], low: float = -1.0, high: float = 9.0) -> S
     return Sheet(tuple(polygons), Material.COUNTRY, np.full(2, low), np.full(2, high), 0, ())
 
 
-def found(ground: GroundArrays, points: Array, sheet: int = 0) -> Array:
+def found(ground: GroundArrays, points: Array, sheet: int = 0) -> NDArray[np.uint8]:
     out = np.empty(len(points), dtype=np.uint8)
     materials_at(ground, sheet, np.ascontiguousarray(points), out)
     return out
 
 
-def top_most(polygons: list[Painted], points: Array, outside: Material = Material.COUNTRY) -> Array:
+def top_most(polygons: list[Painted], points: Array, outside: Material = Material.COUNTRY) -> NDArray[np.uint8]:
     """Brute force: the even-odd rule, polygon by polygon."""
     out = np.full(len(points), outside, dtype=np.uint8)
     for polygon in polygons:

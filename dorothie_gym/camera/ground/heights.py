@@ -1,0 +1,159 @@
+"""Height of the ground: at the lanes' heights on roads, with banks and slopes down or up to the land between them."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.town import Town
+from dorothie_gym.rendering.levels import LevelStretch
+from dorothie_gym.rendering.shapes import SAMPLE_STEP, TownSamples
+
+_FLAT = 1e-3  # [m] difference of height in a town without hills
+_STEEPEST = 0.12  # slope of the land: steeper roads are on banks
+_BANK = 1.0  # slope of banks below a road that is higher than the land
+_CUTTING = 1.8  # slope of the sides of a cutting, as the map draws them
+_SHOULDER = 0.3  # [m] of level ground beside the lanes of a road on a bank or in a cutting
+_LEVEL = 4.5  # [m] of level ground beside other roads: their pavements
+_BESIDE = 0.5  # [m] further from the edge of a lane than from the nearest one; its height counts as well
+_ALIKE = 1.0  # [m] between road and land at which the level ground is narrow
+_NEAREST = 24  # samples of lanes that are considered at a point
+_AROUND = 12  # samples of the land that are considered at a point
+_THIN = 4  # one of so many samples gives the height of the land
+_AHEAD = 6.0  # [m] along a lane over which a sample's slope is followed
+
+
+class Zone(enum.IntEnum):
+    """Lanes that give the height."""
+
+    OPEN = 0
+    """All but those on bridges and in tunnels."""
+    COVER = 1
+    """Above tunnels: those on the land."""
+
+
+class HeightField:
+    """Heights of the ground of a town.
+
+    Attributes:
+        flat: whether all lanes are equally high.
+    """
+
+    def __init__(self, town: Town, stretches: Iterable[LevelStretch]) -> None:
+        """Collects the lanes of all zones.
+
+        Args:
+            town: the town.
+            stretches: its bridges and tunnels.
+        """
+        samples = TownSamples.of(town)
+        z = samples.centre[:, 2]
+        self.flat = bool(np.ptp(z) < _FLAT)
+        self._base = float(np.median(z))
+        if self.flat:
+            return
+        level = np.zeros(len(z), dtype=np.int64)
+        for part in stretches:
+            a, b = samples.bounds[part.lane]
+            inside = (samples.station[a:b] >= part.start) & (samples.station[a:b] <= part.end)
+            level[a:b][inside] = part.level
+        sunken = (z < -0.05) if (level < 0).any() else np.zeros(len(z), dtype=bool)
+        self._lanes = {
+            Zone.OPEN: _Lanes(samples, level == 0),
+            Zone.COVER: _Lanes(samples, (level == 0) & ~sunken),
+        }
+        self._apart = {k: _Lanes(samples, level == k) for k in np.unique(level[level != 0]).tolist()}
+        # the land below raised roads rises no more steeply than roads do
+        land = np.flatnonzero(~sunken)[::_THIN]
+        place, height = samples.centre[land, :2], z[land].copy()
+        reach = float(np.ptp(height)) / _STEEPEST
+        tree = cKDTree(place)
+        for start in range(0, len(land), 512):
+            near = tree.query_ball_point(place[start : start + 512], reach, return_sorted=True)
+            for k, rows in enumerate(near, start):
+                away = np.hypot(*(place[rows] - place[k]).T)
+                height[k] = min(height[k], float((z[land[rows]] + _STEEPEST * away).min()))
+        self._land, self._land_height = tree, height
+
+    def land(self, points: ArrayLike) -> Array:
+        """Returns the height of the land (n,) at positions (n, 2) [m], without roads on banks or in cuttings."""
+        places = np.asarray(points, dtype=np.float64)
+        if self.flat:
+            return np.full(len(places), self._base)
+        count = min(_AROUND, len(self._land_height))
+        away, index = (np.reshape(row, (len(places), count)) for row in self._land.query(places, k=count))
+        # weights fall to zero at the farthest one, so that the height has no steps
+        weight = np.maximum(away[:, -1:] - away, 1e-9) ** 2 / (away + 1.0) ** 3
+        return np.asarray((weight * self._land_height[index]).sum(axis=1) / weight.sum(axis=1))
+
+    def road(self, points: ArrayLike, level: int) -> Array:
+        """Returns the height (n,) of bridges of a level, or of tunnels (-1), at positions (n, 2) on them [m]."""
+        places = np.asarray(points, dtype=np.float64)
+        if self.flat:
+            return np.full(len(places), self._base)
+        return _nearest(*self._apart[level].near(places))
+
+    def ground(self, points: ArrayLike, zone: Zone = Zone.OPEN, built: NDArray[np.bool_] | bool = False) -> Array:
+        """Returns the height (n,) of the ground at positions (n, 2) [m], kerbs left out.
+
+        Args:
+            points: positions.
+            zone: lanes that count.
+            built: whether the places belong to a road (n,): asphalt and medians have no banks.
+        """
+        places = np.asarray(points, dtype=np.float64)
+        land = self.land(places)
+        if self.flat or not self._lanes[zone].count:
+            return land
+        edge, height, away = self._lanes[zone].near(places)
+        beside = height - land[:, None]
+        level = _SHOULDER + (_LEVEL - _SHOULDER) * (1.0 - np.clip(np.abs(beside) / _ALIKE, 0.0, 1.0))
+        room = np.maximum(0.0, edge - level)
+        low = height - np.where(beside > 0.0, _BANK, _CUTTING) * room
+        high = height + np.where(beside > 0.0, _BANK, _CUTTING) * room
+        rows = np.arange(len(places))
+        lowest, highest = high.argmin(axis=1), low.argmax(axis=1)
+        upper, lower = high[rows, lowest], low[rows, highest]
+        free = np.clip(land, lower, np.maximum(lower, upper))
+        # between a low and a high road that are close to each other
+        a, b = edge[rows, lowest], edge[rows, highest]
+        share = np.where(a + b > 1e-9, a / np.maximum(a + b, 1e-9), 0.5)
+        banks = np.where(lower <= upper, free, upper + share * (lower - upper))
+        return np.asarray(np.where(built, _nearest(edge, height, away), banks))
+
+
+def _nearest(edge: Array, height: Array, away: Array) -> Array:
+    """Returns the height (n,) of the nearest lane; arguments as from `_Lanes.near`."""
+    weight = (edge <= edge.min(axis=1, keepdims=True) + _BESIDE) / (away + 0.05) ** 4
+    return np.asarray((weight * height).sum(axis=1) / weight.sum(axis=1))
+
+
+class _Lanes:
+    """Samples of some lanes with their slopes."""
+
+    def __init__(self, samples: TownSamples, keep: NDArray[np.bool_]) -> None:
+        slope = np.zeros(len(keep))
+        for a, b in samples.bounds.tolist():
+            if b - a > 1:
+                slope[a:b] = np.gradient(samples.centre[a:b, 2], samples.station[a:b])
+        self.count = int(keep.sum())
+        self._centre, self._half = samples.centre[keep], samples.half_width[keep]
+        self._slope, self._heading = slope[keep], samples.heading[keep]
+        self._tree = cKDTree(self._centre[:, :2]) if self.count else None
+
+    def near(self, places: Array) -> tuple[Array, Array, Array]:
+        """Returns of the nearest samples (n, k): distance from the lane's edge, height at the places, distance [m]."""
+        assert self._tree is not None
+        count = min(_NEAREST, self.count)
+        away, index = (np.reshape(row, (len(places), count)) for row in self._tree.query(places, k=count))
+        offset = places[:, None] - self._centre[index, :2]
+        c, s = np.cos(self._heading[index]), np.sin(self._heading[index])
+        along, aside = offset[..., 0] * c + offset[..., 1] * s, offset[..., 1] * c - offset[..., 0] * s
+        height = self._centre[index, 2] + self._slope[index] * np.clip(along, -_AHEAD, _AHEAD)
+        beside = np.maximum(0.0, np.abs(aside) - self._half[index])
+        return np.hypot(beside, np.maximum(0.0, np.abs(along) - SAMPLE_STEP)), height, away

@@ -1,0 +1,196 @@
+"""Bridges and tunnels: decks with sides, parapets and pillars; floors with walls and ceilings; parapets on portals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from dorothie_gym.camera.ground.heights import HeightField, Zone
+from dorothie_gym.camera.ground.lookup import GroundArrays, material_at
+from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material
+from dorothie_gym.camera.ground.partition import Area, cut_area
+from dorothie_gym.camera.ground.regions import GRID, footprint, only_areas, polygons_of, tidy
+from dorothie_gym.camera.ground.sheets import GROUND_SHEET, Sheet
+from dorothie_gym.camera.ground.surface import PORTAL_HEIGHT, ROOF, Edges, GroundTriangles, add_sheet, find_edges
+from dorothie_gym.camera.mesh import MeshBuilder
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.rendering.levels import LevelStretch
+
+COVER = 3.2
+"""Width of covered ground on both sides of the lanes in a tunnel [m]: beyond the slopes of a cutting."""
+
+_CELL = 8.0  # [m]
+_OVERLAP = 0.05  # [m] by which the floor of a tunnel continues in the open
+_SUNK = 0.005  # [m] of the floor there below the road
+_MOUTH = 16.0  # [m] of floor beyond the covered lanes, at most: up to the wall over the mouth
+_JOINT = 0.35  # [m] of floor beyond the lanes: the walls stand behind the edges of the mouth
+_GAP = 5.0  # [m] between two lanes in one tunnel, at most
+_DECK_MARGIN = 1.05  # [m] beyond the lanes, as the map draws it
+_DECK_OVERLAP = 0.3  # [m] of a deck beyond the ends of a bridge
+_DECK_THICKNESS = 0.9  # [m]
+_PARAPET = 0.85  # [m] height
+_PARAPET_WIDTH = 0.3  # [m]
+_LOWER = 1.0  # [m] by which the ground lies lower beside a parapet
+_PILLARS = 18.0  # [m] apart
+_PILLAR_WIDTH = 1.2  # [m]
+_TALLEST_WITHOUT = 2.5  # [m] of a bridge without pillars
+_CONCRETE = (164, 162, 156)
+_SHADED = (138, 136, 131)
+_TILES = (178, 178, 172)
+
+
+def covered_ground(town: Town, stretches: Sequence[LevelStretch], ground: Sheet) -> BaseGeometry:
+    """Returns the area above tunnels, with the walls that the map draws over their mouths.
+
+    Args:
+        town: the town.
+        stretches: bridges and tunnels.
+        ground: sheet of the ground.
+    """
+    tunnels = footprint(town, [part for part in stretches if part.level < 0], COVER)
+    if tunnels.is_empty:
+        return tunnels
+    kinds = (Material.PARAPET, Material.BRIDGE_EDGE, Material.TUNNEL_FLOOR)
+    walls = [part.points for part in ground.polygons if part.material in kinds]
+    return tidy(only_areas(shapely.union_all([tunnels, *polygons_of(walls)])))
+
+
+def add_portals(builder: MeshBuilder, edges: Edges) -> None:
+    """Adds parapets along the edges of the ground above tunnels."""
+    above = edges.areas & Area.COVERED != 0
+    places = np.concatenate((edges.ends * GRID, np.zeros((len(edges.ends), 2, 1))), axis=2)
+    for which in (0, 1):
+        drop = edges.heights[:, which] - edges.heights[:, 1 - which]
+        rows = above[:, which] & ~above[:, 1 - which] & (drop.min(axis=1) > _LOWER)
+        line = places[rows]
+        line[..., 2] = edges.heights[rows, which]
+        _add_parapets(builder, line if which == 0 else line[:, ::-1])
+
+
+def add_tunnel(
+    builder: MeshBuilder, sheet: Sheet, number: int, field: HeightField, town: Town, cover: BaseGeometry
+) -> None:  # fmt: skip
+    """Adds floor, walls and ceiling of the tunnels."""
+    lanes = footprint(town, [_longer(town, part, _MOUTH) for part in sheet.stretches], _JOINT)
+    closed = shapely.buffer(shapely.buffer(lanes, _GAP / 2.0, join_style="mitre"), -_GAP / 2.0, join_style="mitre")
+    flat = [part.points for part in sheet.polygons if part.material is Material.TUNNEL_FLOOR]
+    within = shapely.buffer(cover, _OVERLAP, join_style="mitre")
+    area = tidy(only_areas(shapely.intersection(shapely.union_all([closed, *polygons_of(flat)]), within)))
+    floor = _at_height(cut_area(area, _CELL), field, sheet.level)
+    floor.corners[..., 2] -= _SUNK
+    add_sheet(builder, floor.corners, number)
+    ceiling = floor.corners.copy()
+    ceiling[..., 2] += _headroom(field, ceiling)
+    builder.triangles(ceiling[:, ::-1], colour=_SHADED, kind=ObjectClass.WALL)
+    sides = find_edges(floor).alone
+    inside = shapely.buffer(cover, -2.0 * _OVERLAP)
+    shapely.prepare(inside)
+    middle = sides[..., :2].mean(axis=1)
+    sides = sides[shapely.contains_xy(inside, middle[:, 0], middle[:, 1])]
+    high = sides.copy()
+    high[..., 2] += _headroom(field, high)
+    _add_quads(builder, sides[:, ::-1], high[:, ::-1], _TILES, ObjectClass.WALL)
+
+
+def _headroom(field: HeightField, points: Array) -> Array:
+    """Returns the height of a tunnel above its floor at positions (..., 3) [m]."""
+    above = field.ground(points[..., :2].reshape(-1, 2), Zone.COVER).reshape(points.shape[:-1]) + KERB_HEIGHT
+    return np.asarray(np.clip(above - ROOF - points[..., 2], 0.0, PORTAL_HEIGHT))
+
+
+def add_bridge(
+    builder: MeshBuilder, sheet: Sheet, number: int, field: HeightField, town: Town, ground: GroundArrays
+) -> None:  # fmt: skip
+    """Adds the decks of one level of bridges, with sides, undersides, parapets and pillars."""
+    deck = _at_height(cut_area(deck_area(town, sheet, _DECK_OVERLAP), _CELL), field, sheet.level)
+    add_sheet(builder, deck.corners, number)
+    below = np.array([0.0, 0.0, _DECK_THICKNESS])
+    builder.triangles(deck.corners[:, ::-1] - below, colour=_SHADED, kind=ObjectClass.BRIDGE)
+    sides = find_edges(deck).alone
+    _add_quads(builder, sides - below, sides, _CONCRETE, ObjectClass.BRIDGE)
+    outside = sides.mean(axis=1)
+    outside[:, :2] -= 0.6 * _inward(sides)
+    lower = field.ground(outside[:, :2]) < outside[:, 2] - _LOWER
+    _add_parapets(builder, sides[lower])
+    _add_pillars(builder, sheet, field, town, ground)
+
+
+def deck_area(town: Town, sheet: Sheet, further: float = 0.0) -> BaseGeometry:
+    """Returns the area of the bridges of one level, longer at both ends [m]."""
+    return footprint(town, [_longer(town, part, further) for part in sheet.stretches], _DECK_MARGIN)
+
+
+def _longer(town: Town, part: LevelStretch, more: float) -> LevelStretch:
+    length = town.lanes[part.lane].length
+    return replace(part, start=max(0.0, part.start - more), end=min(length, part.end + more))
+
+
+def _add_pillars(
+    builder: MeshBuilder, sheet: Sheet, field: HeightField, town: Town, ground: GroundArrays
+) -> None:  # fmt: skip
+    """Adds pillars below the middles of lanes, except on roads."""
+    stood: list[Array] = []
+    reach = _PILLAR_WIDTH * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    for part in sheet.stretches:
+        lane = town.lanes[part.lane]
+        for station in np.arange(part.start + _PILLARS / 2.0, part.end, _PILLARS).tolist():
+            at = lane.position(station)
+            foot, head = float(field.ground(at[None])[0]), lane.height_at(station) - _DECK_THICKNESS
+            if head - foot < _TALLEST_WITHOUT or (stood and np.hypot(*(np.array(stood) - at).T).min() < _PILLARS / 4.0):
+                continue
+            kinds = [LOOKS[Material(material_at(ground, GROUND_SHEET, x, y))].kind for x, y in (at + reach).tolist()]
+            if ObjectClass.ROAD in kinds or ObjectClass.ROAD_LINE in kinds:
+                continue
+            stood.append(at)
+            builder.box(
+                at.tolist(), lane.heading_at(station), _PILLAR_WIDTH, _PILLAR_WIDTH, foot - 1.0, head,
+                colour=_CONCRETE, kind=ObjectClass.BRIDGE, closed=(False, False),
+            )  # fmt: skip
+
+
+# --- Parts ------------------------------------------------------------------------------------------------------------
+
+
+def _at_height(points: NDArray[np.int64], field: HeightField, level: int) -> GroundTriangles:
+    """Returns triangles of a bridge or tunnel (n, 3, 2) [grid steps] with their heights."""
+    places, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
+    heights = np.round(field.road(places * GRID, level) / GRID) * GRID
+    corners = np.concatenate((points * GRID, heights[index.reshape(-1)].reshape(-1, 3)[..., None]), axis=2)
+    return GroundTriangles(corners, np.zeros(len(points), dtype=np.int64))
+
+
+def _inward(lines: Array) -> Array:
+    """Returns unit vectors (n, 2) to the right of lines (n, 2, 3), on the map."""
+    way = lines[:, 1, :2] - lines[:, 0, :2]
+    across = np.stack((-way[:, 1], way[:, 0]), axis=-1)
+    return np.asarray(across / np.maximum(np.hypot(*across.T), 1e-9)[:, None])
+
+
+def _add_quads(
+    builder: MeshBuilder, low: Array, high: Array, colour: tuple[int, int, int], kind: ObjectClass
+) -> None:  # fmt: skip
+    """Adds faces between lines (n, 2, 3) [m], seen from the left of their way, on the map."""
+    builder.triangles(np.stack((low[:, 0], low[:, 1], high[:, 1]), axis=1), colour=colour, kind=kind)
+    builder.triangles(np.stack((low[:, 0], high[:, 1], high[:, 0]), axis=1), colour=colour, kind=kind)
+
+
+def _add_parapets(builder: MeshBuilder, lines: Array) -> None:
+    """Adds low walls on the right of lines (n, 2, 3) [m], on the map."""
+    if not len(lines):
+        return
+    up = np.array([0.0, 0.0, _PARAPET])
+    aside = np.concatenate((_PARAPET_WIDTH * _inward(lines), np.zeros((len(lines), 1))), axis=1)[:, None]
+    inner = lines + aside
+    _add_quads(builder, lines, lines + up, _CONCRETE, ObjectClass.BRIDGE)
+    _add_quads(builder, inner[:, ::-1], inner[:, ::-1] + up, _CONCRETE, ObjectClass.BRIDGE)
+    _add_quads(builder, lines + up, inner + up, _CONCRETE, ObjectClass.BRIDGE)
+    for first, second in ((lines[:, :1], inner[:, :1]), (inner[:, 1:], lines[:, 1:])):
+        end = np.concatenate((second, first), axis=1)
+        _add_quads(builder, end, end + up, _CONCRETE, ObjectClass.BRIDGE)

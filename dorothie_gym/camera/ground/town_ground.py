@@ -1,0 +1,109 @@
+"""Ground of a town: mesh, lookup of materials and colours, and the height at a place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+from shapely.geometry.base import BaseGeometry
+
+from dorothie_gym.camera.ground.arrays import ground_arrays
+from dorothie_gym.camera.ground.heights import HeightField
+from dorothie_gym.camera.ground.lookup import GroundArrays
+from dorothie_gym.camera.ground.partition import Area, Cut, cut_ground
+from dorothie_gym.camera.ground.regions import GRID, Regions, find_regions, only_areas
+from dorothie_gym.camera.ground.sheets import GROUND_SHEET, town_sheets
+from dorothie_gym.camera.ground.structures import add_bridge, add_portals, add_tunnel, covered_ground, deck_area
+from dorothie_gym.camera.ground.surface import add_faces, add_sheet, find_edges, lifted
+from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface
+from dorothie_gym.maps.model import Array
+from dorothie_gym.maps.town import Town
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Ground of a town.
+
+    Attributes:
+        mesh: surfaces of all sheets (`Surface.GROUND`, the texture is the sheet), kerbs, walls, bridges and tunnels.
+        arrays: lookup of materials and colours.
+    """
+
+    mesh: Mesh
+    arrays: GroundArrays
+
+    def height_at(self, points: ArrayLike, sheet: int = GROUND_SHEET) -> Array:
+        """Returns the height of a sheet (n,) at positions (n, 2) [m]; on pavements that of their kerbs.
+
+        NaN where the sheet has no surface: beyond the horizon, or beside a bridge.
+        """
+        places = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+        tree, corners = self._surfaces.get(sheet, (None, np.zeros((0, 3, 3))))
+        heights = np.full(len(places), -np.inf)
+        if tree is not None:
+            at, found = tree.query(shapely.points(places), predicate="intersects")
+            a, b, c = (corners[found, k] for k in range(3))
+            ab, ac, ap = b[:, :2] - a[:, :2], c[:, :2] - a[:, :2], places[at] - a[:, :2]
+            area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+            u = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / area
+            v = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / area
+            np.maximum.at(heights, at, a[:, 2] + u * (b[:, 2] - a[:, 2]) + v * (c[:, 2] - a[:, 2]))
+        return np.where(np.isfinite(heights), heights, np.nan)
+
+    @cached_property
+    def _surfaces(self) -> dict[int, tuple[shapely.STRtree, Array]]:
+        """Triangles of each sheet, by place."""
+        found = {}
+        ground = self.mesh.surfaces & int(Surface.GROUND) != 0
+        for sheet in np.unique(self.mesh.textures[ground]).tolist():
+            corners = self.mesh.corners[ground & (self.mesh.textures == sheet)].astype(np.float64)
+            found[sheet] = shapely.STRtree(shapely.polygons(corners[..., :2])), corners
+        return found
+
+
+def build_ground(town: Town) -> Ground:
+    """Returns the ground of a town, out to the horizon."""
+    sheets = town_sheets(town)
+    arrays = ground_arrays(sheets)
+    stretches = [part for sheet in sheets for part in sheet.stretches]
+    field = HeightField(town, stretches)
+    ground = sheets[GROUND_SHEET]
+    cover = covered_ground(town, stretches, ground)
+    decks = [(sheet.level, deck_area(town, sheet)) for sheet in sheets if sheet.level > 0]
+    regions = find_regions(ground.polygons)
+    areas = _faces(regions, cover, only_areas(shapely.union_all([deck for _, deck in decks])))
+    points, kinds = cut_ground(areas, ground.low, ground.high, None if field.flat else field.ground)
+    triangles = lifted(points, kinds, field, decks, regions.median)
+    edges = find_edges(triangles)
+    builder = MeshBuilder()
+    add_sheet(builder, triangles.corners, GROUND_SHEET)
+    add_faces(builder, edges)
+    add_portals(builder, edges)
+    for number, sheet in enumerate(sheets):
+        if sheet.level > 0:
+            add_bridge(builder, sheet, number, field, town, arrays)
+        elif sheet.level < 0:
+            add_tunnel(builder, sheet, number, field, town, cover)
+    return Ground(builder.build(), arrays)
+
+
+def _faces(regions: Regions, cover: BaseGeometry, decks: BaseGeometry) -> list[Cut]:
+    """Returns the areas of the ground that are not simply raised; neighbours share the corners on their edges."""
+    shapes = {Area.FLAT: regions.flat, Area.SLOPE: regions.slope, Area.COVERED: cover, Area.BELOW: decks}
+    lines = shapely.union_all([shapely.boundary(shape) for shape in shapes.values()], grid_size=GRID)
+    faces = shapely.get_parts(shapely.polygonize(shapely.get_parts([lines])))
+    inside = shapely.point_on_surface(faces)
+    for shape in shapes.values():
+        shapely.prepare(shape)
+    flags = np.where(shapely.contains(regions.slope, inside), int(Area.SLOPE), int(Area.RAISED))
+    flags[shapely.contains(regions.flat, inside)] = int(Area.FLAT)
+    for flag in (Area.COVERED, Area.BELOW):
+        flags[shapely.contains(shapes[flag], inside)] |= int(flag)
+    return [
+        (flag, only_areas(shapely.union_all(faces[flags == flag])))
+        for flag in np.unique(flags).tolist()
+        if flag != Area.RAISED
+    ]
