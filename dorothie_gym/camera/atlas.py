@@ -177,7 +177,7 @@ def town_atlas() -> AtlasArrays:
         Texture.PERSON_SIGN: patterns.person_sign(),
     }
     for texture, words, ink, ground in BRAND_SIGNS.values():
-        pictures[texture] = lettered(words, SIGN_SIZE, ink=ink, ground=ground, margin=0.14, light=0.75)
+        pictures[texture] = lettered(words, SIGN_SIZE, ink=ink, ground=ground, margin=0.14)
     return TextureAtlas(pictures[texture] for texture in Texture if texture != Texture.PLAIN).arrays()
 
 

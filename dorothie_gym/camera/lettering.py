@@ -29,7 +29,6 @@ def lettered(
     ground: Ink,
     rim: Ink | None = None,
     margin: float = 0.12,
-    light: float = 0.0,
 ) -> Picture:
     """Returns a panel (height, width, 4) with centred words, as large as fits.
 
@@ -40,7 +39,6 @@ def lettered(
         ground: colour of the panel.
         rim: colour of a thin frame, if there is one.
         margin: free border, relative to the height.
-        light: share of own light at night.
     """
     from PIL import Image, ImageDraw
 
@@ -61,14 +59,8 @@ def lettered(
         # capitals stand in the middle of the panel, whatever hangs below the line
         cap_top, cap_bottom = font.getbbox("H")[1::2]
         pen.text((width / 2.0 - (left + right) / 2.0, middle - (cap_top + cap_bottom) / 2.0), row, font=font, fill=ink)
-    return picture_of(image.resize(size, Image.Resampling.BOX), light)
-
-
-def picture_of(image: object, light: float = 0.0) -> Picture:
-    """Returns the picture (height, width, 4) of a Pillow image in RGB, turned so that row 0 is at the bottom."""
-    pixels = np.asarray(image, dtype=np.float32)[::-1]
-    share = np.full((*pixels.shape[:2], 1), 255.0 * light, dtype=np.float32)
-    return np.concatenate((pixels, share), axis=-1)
+    pixels = np.asarray(image.resize(size, Image.Resampling.BOX), dtype=np.float32)[::-1]
+    return np.concatenate((pixels, np.zeros((size[1], size[0], 1), dtype=np.float32)), axis=-1)
 
 
 def _largest(rows: list[str], width: float, height: float) -> int:

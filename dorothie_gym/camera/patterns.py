@@ -165,7 +165,7 @@ def stripes() -> Picture:
 
 
 def house_sign() -> Picture:
-    """Returns a white house with a door on blue, lit at night."""
+    """Returns a white house with a door on blue."""
     across, up = _square()
     roof = (up > 0.50) & (up < 0.88) & (np.abs(across - 0.5) < (0.88 - up) * 1.05)
     walls = (np.abs(across - 0.5) < 0.27) & (up > 0.14) & (up <= 0.50)
@@ -174,7 +174,7 @@ def house_sign() -> Picture:
 
 
 def person_sign() -> Picture:
-    """Returns a white person with a raised arm on magenta, lit at night."""
+    """Returns a white person with a raised arm on magenta."""
     across, up = _square()
     head = np.hypot(across - 0.5, up - 0.80) < 0.10
     body = (np.abs(across - 0.5) < 0.12) & (up > 0.38) & (up < 0.68)
@@ -195,7 +195,6 @@ def _sign(figure: NDArray[np.bool_], ground: Ink) -> Picture:
     rim = np.maximum(np.abs(across - 0.5), np.abs(up - 0.5)) > 0.46
     picture = np.zeros((64, 64, 4), dtype=np.float32)
     picture[..., :3] = np.where((figure | rim)[..., None], 255, ground)
-    picture[..., 3] = _LIGHT
     return picture
 
 

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from dorothie_gym.camera.atlas import BRAND_SIGNS, Texture
-from dorothie_gym.camera.mesh import Mesh
+from dorothie_gym.camera.mesh import Mesh, Surface
 from dorothie_gym.camera.scenery.clearance import Clearance, Lot
 from dorothie_gym.camera.scenery.landmarks import build_landmarks, landmark_form, landmark_key
 from dorothie_gym.camera.scenery.placing import FlatGround
@@ -104,6 +104,7 @@ def test_signs_are_not_mirrored(name: LandmarkName) -> None:
         look = math.atan2(-normal[1], -normal[0])
         assert u_axis[:3] @ (-math.sin(look), math.cos(look), 0.0) > 0.0
         assert v_axis[2] > 0.0
+    assert (mesh.surfaces[shown] == Surface.EMISSIVE.value).all()  # names are lit at night
     assert shown.sum() >= 6
 
 

@@ -182,7 +182,7 @@ def test_blades_name_the_street_of_the_approach_and_are_read_from_it(name: str) 
     layers = layers_of(name)
     blades = plan_blades(layers, clearance_of(name))
     assert len(blades) >= 8
-    mesh = build_blades(blades, FlatGround())
+    mesh = build_blades(layers, blades, FlatGround())
     shown = mesh.textures[mesh.classes == ObjectClass.TRAFFIC_SIGN.value] - STREET_NAMES
     assert set(shown.tolist()) == {street for blade in blades for street, _ in blade.names}
     assert set(shown.tolist()) <= {street.id for street in layers.town.streets}
@@ -217,6 +217,16 @@ def test_buildings_stand_on_slopes_without_gaps() -> None:
     assert mesh.corners[..., 2].max() > Hill().height_at(house.outline).max() + 2 * 3.2
 
 
+def test_ground_that_ends_leaves_no_gaps_in_positions() -> None:
+    class Island:
+        def height_at(self, points: Array) -> Array:
+            return np.where(np.hypot(*points.T) < 100.0, 3.0, np.nan)
+
+    scenery = build_scenery(layers_of("brookside"), Island())
+    for mesh in (scenery.mesh, scenery.signals):
+        assert np.isfinite(mesh.corners).all()
+
+
 def test_stamps_turn_and_scale_a_mesh_with_its_texture() -> None:
     builder = MeshBuilder()
     builder.panel((1.0, 0.0, 1.0), 0.0, 2.0, 1.0, colour=(100, 100, 100), kind=ObjectClass.TRAFFIC_SIGN, texture=3)
@@ -235,7 +245,7 @@ def test_stamps_turn_and_scale_a_mesh_with_its_texture() -> None:
 
 def test_a_town_has_few_triangles_and_the_same_bytes_in_another_process() -> None:
     mesh = scenery_of("midtown").mesh
-    assert 20_000 < mesh.size < 60_000
+    assert 15_000 < mesh.size < 40_000
     digest = hashlib.sha256(b"".join(column.tobytes() for column in mesh)).hexdigest()
     program = (
         "import hashlib; from dorothie_gym.camera.scenery.placing import FlatGround;"

@@ -16,12 +16,13 @@ from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, oriented
 from dorothie_gym.camera.patterns import BAYS
 from dorothie_gym.camera.scenery.clearance import Clearance, free_of, rectangles
-from dorothie_gym.camera.scenery.placing import Heights
+from dorothie_gym.camera.scenery.placing import Heights, feet_on
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.rendering.borders import BorderKind
 from dorothie_gym.rendering.map_layers import MapLayers
+from dorothie_gym.rendering.medians import held
 from dorothie_gym.rendering.shapes import polyline_stations, sample, side_line, widths_at
 
 STOREY = 3.2
@@ -34,7 +35,6 @@ _SMALLER = np.array([1.0, 0.75, 0.55])  # sizes that are tried, relative to the 
 _TRY_AGAIN = 4.0  # [m] along the street
 _CENTRE, _RIM = 0.45, 0.9  # radii of the centre and of the suburbs, relative to that of the town
 _UNDER = 0.4  # [m] by which walls go into the ground
-_ON_GROUND = 1.0  # [m] height of roads that have buildings, at most
 _SHORTEST = 8.0  # [m] length of an edge of a junction
 _EVEN = 0.05  # [m] difference of height below which a building needs no plinth
 
@@ -148,10 +148,11 @@ class _Frontage(NamedTuple):
 def _frontages(layers: MapLayers) -> Iterator[_Frontage]:
     """Yields the edges of the roads, and then those of junctions: opposite to the mouth of a street, for instance."""
     for line in layers.borders.lines:
-        if line.kind is BorderKind.EDGE and abs(line.points[:, 2]).max() < _ON_GROUND:
-            yield _Frontage(line.points[:, :2], line.heading + line.sign * np.pi / 2.0)
+        if line.kind is BorderKind.EDGE:
+            for run in held(line, layers.raised, wanted=False):
+                yield _Frontage(line.points[run, :2], line.heading[run] + line.sign * np.pi / 2.0)
     for lane in layers.town.lanes:
-        if lane.in_junction and lane.length > _SHORTEST and abs(lane.points[:, 2]).max() < _ON_GROUND:
+        if lane.in_junction and lane.length > _SHORTEST and not layers.raised.hold(lane.points).any():
             stations = sample(lane, 0.0, lane.length, 2.0)
             points = side_line(lane, stations, widths_at(lane, stations) / 2.0)
             yield _Frontage(points, np.interp(stations, lane.stations, lane.headings) + np.pi / 2.0)
@@ -254,7 +255,7 @@ def build_buildings(buildings: list[Building], ground: Heights) -> Mesh:
     builder = MeshBuilder()
     if buildings:
         outlines = np.stack([building.outline for building in buildings])
-        heights = ground.height_at(outlines.reshape(-1, 2)).reshape(-1, 4)
+        heights = feet_on(ground, outlines.reshape(-1, 2)).reshape(-1, 4)
         for building, outline, feet in zip(buildings, outlines, heights, strict=True):
             add_building(builder, building, outline, float(feet.min()), float(feet.max()))
     return builder.build()

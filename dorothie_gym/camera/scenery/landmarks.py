@@ -17,7 +17,7 @@ from dorothie_gym.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface, joined, 
 from dorothie_gym.camera.models.people import STANDING, Look, Outfit, person_form
 from dorothie_gym.camera.models.solids import ModelBuilder, Rgb, Slot, dressed
 from dorothie_gym.camera.scenery.clearance import Lot
-from dorothie_gym.camera.scenery.placing import Heights, stamped
+from dorothie_gym.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import LandmarkName, ObjectClass
 from dorothie_gym.rendering.shapes import disc
@@ -32,6 +32,9 @@ PICTOGRAM = 3.2
 _WALL = 3.4  # [m] height of the glazed storey of a store
 _METAL: Rgb = (178, 180, 182)
 _ROOF: Rgb = (128, 126, 124)
+
+
+_LIT_SIGNS = {*(texture for texture, *_ in BRAND_SIGNS.values()), Texture.HOUSE_SIGN, Texture.PERSON_SIGN}
 
 
 def landmark_key(index: int) -> int:
@@ -119,7 +122,8 @@ class _Works:
         self.lot = lot
         self.builder = MeshBuilder()
         x, y = lot.depth, lot.length / 2.0
-        heights = ground.height_at(oriented([(0.0, -y), (0.0, y), (x, y), (x, -y)], lot.front, lot.heading))
+        corners = oriented([(0.0, -y), (0.0, y), (x, y), (x, -y)], lot.front, lot.heading)
+        heights = feet_on(ground, corners)
         self.low, self.base = float(heights.min()), float(heights.max())
 
     def rectangle(self, deep: tuple[float, float], right: tuple[float, float]) -> Array:
@@ -153,7 +157,12 @@ class _Works:
         colour: Rgb = (255, 255, 255), turned: float = 0.0, kind: ObjectClass = ObjectClass.BUILDING,
         surface: Surface = Surface.NONE,
     ) -> None:  # fmt: skip
-        """Adds an upright panel around a place, read from the street, or by somebody turned from there [rad]."""
+        """Adds an upright panel around a place, read from the street, or by somebody turned from there [rad].
+
+        Panels with names and pictograms are lit signs.
+        """
+        if texture in _LIT_SIGNS:
+            surface = Surface.EMISSIVE
         x, y = self.lot.at(deep, right)
         self.builder.panel(
             (x, y, self.base + up), self.lot.heading + turned, width, height, colour=colour, kind=kind,
@@ -328,5 +337,5 @@ def _waiting_person(lot: Lot, ground: Heights) -> Mesh:
     arm.limb((0.08, 0.42, 1.68), (0.06, 0.40, 2.0), (0.048, 0.04), Slot.SKIN, closed=True)
     body = joined([dressed(part, _PERSON.palette) for part in (person_form(_PERSON.outfit, STANDING), arm.build())])
     place = np.array([lot.place])
-    foot = np.column_stack((place, ground.height_at(place)))
+    foot = np.column_stack((place, feet_on(ground, place)))
     return stamped(body, foot, np.array([lot.heading + math.pi]))

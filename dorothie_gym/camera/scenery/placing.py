@@ -15,7 +15,7 @@ class Heights(Protocol):
     """Ground with heights."""
 
     def height_at(self, points: Array) -> Array:
-        """Returns the heights (n,) [m] of the ground at points (n, 2) [m]."""
+        """Returns the heights (n,) [m] of the ground at points (n, 2) [m], NaN where there is none."""
         ...
 
 
@@ -25,6 +25,13 @@ class FlatGround:
     def height_at(self, points: Array) -> Array:
         """Returns zeros (n,)."""
         return np.zeros(len(points))
+
+
+def feet_on(ground: Heights, points: Array) -> Array:
+    """Returns the heights (n,) [m] of the ground at points (n, 2) [m]; beyond its end the mean of the others."""
+    heights = np.asarray(ground.height_at(points), dtype=np.float64)
+    known = np.isfinite(heights)
+    return np.where(known, heights, heights[known].mean() if known.any() else 0.0)
 
 
 def stamped(

@@ -33,10 +33,10 @@ _LENS, _BETWEEN = 0.17, 0.46  # [m] radius of a lens, distance of two
 _SIGN = 2.4  # [m] height of the middle of a sign
 _METAL, _BACK = (100, 104, 104), (150, 152, 154)
 _BLADE = 2.2, 0.55  # [m] width and height of a street name
-_BLADE_HEIGHT = 3.3  # [m] of the lower blade
-_CORNER = (1.9, 1.2, 2.8)  # [m] from the edge of the road to the post with names; the first that has room
+_BLADE_HEIGHT = 4.3  # [m] of the lower blade: above the lights at the same corner
+_CORNER = (3.0, 1.9, 1.2)  # [m] from the edge of the road to the post with names; the first that has room
 _CORNERS_APART = 6.0  # [m]
-_ON_GROUND = 1.0  # [m] height of roads whose signals stand on the ground
+_OTHER_LEVEL = 2.5  # [m] between a road and the ground above or below it
 _STRAIGHT = 45  # [degrees] largest turn of a way straight on
 _FAR, _FAR_ASIDE = 1.5, 1.3  # [m] from the beginning and from the edge of the exit to a repeated light
 _HEADS_APART = 1.5  # [m] between lights
@@ -101,9 +101,14 @@ def build_signals(layers: MapLayers, clearance: Clearance, ground: Heights) -> t
 
 def _head(layers: MapLayers, post: Post, ground: Heights) -> _Head:
     look, height = _pose(layers.town, layers, post)
-    if abs(height) < _ON_GROUND:
-        height = float(ground.height_at(np.array([post.at]))[0])
-    return _Head(post.kind, post.at, look, height, _signal_of(layers.town, post))
+    return _Head(post.kind, post.at, look, _foot(layers, ground, post.at, height), _signal_of(layers.town, post))
+
+
+def _foot(layers: MapLayers, ground: Heights, at: tuple[float, float], road: float) -> float:
+    """Returns the height of the ground, or on bridges and in tunnels that of the road beside [m]."""
+    height = float(ground.height_at(np.array([at]))[0])
+    raised = layers.raised.hold(np.array([(*at, road)]))[0]
+    return road if raised or not math.isfinite(height) or abs(height - road) > _OTHER_LEVEL else height
 
 
 def _repeaters(layers: MapLayers, clearance: Clearance, ground: Heights, heads: list[_Head]) -> list[_Head]:
@@ -121,8 +126,7 @@ def _repeaters(layers: MapLayers, clearance: Clearance, ground: Heights, heads: 
         others = [row.at for row in (*heads, *found)]
         room = free_of(np.array([shapely.Point(x, y).buffer(0.3)]), clearance.lanes)[0]
         if room and all(math.dist((x, y), other) > _HEADS_APART for other in others):
-            height = target.height_at(0.0)
-            foot = float(ground.height_at(np.array([[x, y]]))[0]) if abs(height) < _ON_GROUND else height
+            foot = _foot(layers, ground, (x, y), target.height_at(0.0))
             found.append(_Head(post.kind, (x, y), head.look, foot, head.signal))
     return found
 
@@ -132,10 +136,16 @@ def _pose(town: Town, layers: MapLayers, post: Post) -> tuple[float, float]:
     lanes = [town.lanes[k] for k in post.lanes if not town.lanes[k].in_junction]
     if not lanes:
         signal = next(s for s in town.signals if s.kind is post.kind and s.position[:2] == post.at)
-        return signal.heading + math.pi, 0.0
+        return signal.heading + math.pi, _nearest_height(town, post.at)
     lane = min(lanes, key=lambda row: float(np.hypot(*(row.points[-1, :2] - post.at))))
     station = layers.stops.get(lane.id, lane.length)
     return lane.heading_at(station), lane.height_at(station)
+
+
+def _nearest_height(town: Town, at: tuple[float, float]) -> float:
+    """Returns the height of the closest point of all lanes [m]."""
+    points = np.concatenate([lane.points for lane in town.lanes])
+    return float(points[int(np.argmin(np.hypot(*(points[:, :2] - at).T))), 2])
 
 
 def _signal_of(town: Town, post: Post) -> int:
@@ -252,12 +262,11 @@ def _corner(lane: Lane, clearance: Clearance, others: list[Blade]) -> tuple[floa
     return None
 
 
-def build_blades(blades: list[Blade], ground: Heights) -> Mesh:
-    """Returns posts with street names; the textures are those of the streets, `STREET_NAMES` and following."""
+def build_blades(layers: MapLayers, blades: list[Blade], ground: Heights) -> Mesh:
+    """Returns posts with lit street names; the textures are those of the streets, `STREET_NAMES` and following."""
     builder = MeshBuilder()
-    feet = ground.height_at(np.array([blade.at for blade in blades]).reshape(-1, 2))
-    for blade, low in zip(blades, feet.tolist(), strict=True):
-        base = low if abs(blade.height) < 1.0 else blade.height
+    for blade in blades:
+        base = _foot(layers, ground, blade.at, blade.height)
         top = base + _BLADE_HEIGHT + len(blade.names) * (_BLADE[1] + 0.06)
         builder.prism(disc(blade.at, 0.05, 5), base - 0.1, top, colour=_METAL, kind=ObjectClass.POLE)
         for k, (street, look) in enumerate(blade.names):
@@ -265,7 +274,7 @@ def build_blades(blades: list[Blade], ground: Heights) -> Mesh:
             for turned in (look, look + math.pi):
                 c, s = math.cos(turned), math.sin(turned)
                 builder.panel(
-                    (blade.at[0] - 0.06 * c, blade.at[1] - 0.06 * s, z), turned, *_BLADE, colour=(255, 255, 255),
-                    kind=ObjectClass.TRAFFIC_SIGN, texture=STREET_NAMES + street,
+                    (blade.at[0] - 0.06 * c, blade.at[1] - 0.06 * s, z), turned, *_BLADE, colour=(235, 235, 235),
+                    kind=ObjectClass.TRAFFIC_SIGN, texture=STREET_NAMES + street, surface=Surface.EMISSIVE,
                 )  # fmt: skip
     return builder.build()

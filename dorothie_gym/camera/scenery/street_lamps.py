@@ -9,7 +9,7 @@ import shapely
 
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface
 from dorothie_gym.camera.scenery.clearance import Clearance, free_of
-from dorothie_gym.camera.scenery.placing import Heights, stamped
+from dorothie_gym.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.rendering.borders import BorderKind
@@ -44,7 +44,7 @@ def lamp_places(layers: MapLayers, clearance: Clearance) -> Array:
         out = line.sign * np.stack((-np.sin(heading), np.cos(heading)), axis=-1)
         feet = np.stack((x, y), axis=-1) + _ASIDE * out
         free = free_of(np.asarray(shapely.buffer(shapely.points(feet), 0.2), dtype=np.object_), clearance.lanes)
-        free &= ~layers.raised.hold(np.column_stack((x, y, z))) & (np.abs(z) < 1.0)
+        free &= ~layers.raised.hold(np.column_stack((x, y, z)))
         for foot, way in zip(feet[free], (-out)[free], strict=True):
             others = np.concatenate((posts, kept))
             if not len(others) or np.hypot(*(others - foot).T).min() > _APART:
@@ -55,7 +55,7 @@ def lamp_places(layers: MapLayers, clearance: Clearance) -> Array:
 
 def build_lamps(places: Array, ground: Heights) -> tuple[Mesh, Array]:
     """Returns street lamps, and the positions of their lights (n, 3) [m]."""
-    heights = ground.height_at(places[:, :2])
+    heights = feet_on(ground, places[:, :2])
     mesh = stamped(_lamp(), np.column_stack((places[:, :2], heights)), places[:, 2])
     over = _ARM * np.stack((np.cos(places[:, 2]), np.sin(places[:, 2])), axis=-1)
     return mesh, np.column_stack((places[:, :2] + over, heights + LIGHT_HEIGHT))

@@ -48,7 +48,7 @@ def build_scenery(layers: MapLayers, ground: Heights) -> Scenery:
     lamps, lights = build_lamps(lamp_places(layers, clearance), ground)
     parts = [
         lamps,
-        build_blades(plan_blades(layers, clearance), ground),
+        build_blades(layers, plan_blades(layers, clearance), ground),
         build_trees(layers, ground),
         build_buildings(plan_buildings(layers, clearance), ground),
     ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface, joined
-from dorothie_gym.camera.scenery.placing import Heights, stamped
+from dorothie_gym.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.rendering import palette
@@ -18,6 +18,7 @@ from dorothie_gym.rendering.shapes import disc
 
 _KINDS = (palette.TREE, palette.COUNTRY_TREE, palette.MEDIAN_TREE)
 _FORMS = 4
+_WIDEST = 1  # ring of a crown that reaches its radius
 _GREENS = ((76, 106, 46), (90, 114, 52), (64, 98, 48), (100, 118, 58))
 _BARK = (104, 86, 68)
 
@@ -38,7 +39,7 @@ def build_trees(layers: MapLayers, ground: Heights) -> Mesh:
     rng = np.random.default_rng(zlib.crc32(b"trees of " + layers.town.name.encode()))
     headings, tones = rng.uniform(0.0, 2.0 * np.pi, len(places)), rng.uniform(0.88, 1.12, len(places))
     forms = rng.integers(0, _FORMS, len(places))
-    heights = ground.height_at(places[:, :2])
+    heights = feet_on(ground, places[:, :2])
     parts = []
     for form in range(_FORMS):
         chosen = forms == form
@@ -54,14 +55,14 @@ def tree_form(form: int) -> Mesh:
     builder = MeshBuilder()
     colour = np.array(_GREENS[form], dtype=np.float64)
     builder.prism(
-        disc((0.0, 0.0), 0.085, 5), -0.1, 1.3, top=disc((0.0, 0.0), 0.05, 5), colour=_BARK, kind=ObjectClass.VEGETATION,
+        disc((0.0, 0.0), 0.085, 4), -0.1, 1.3, top=disc((0.0, 0.0), 0.05, 4), colour=_BARK, kind=ObjectClass.VEGETATION,
         texture=Texture.BARK, closed=(False, False),
     )  # fmt: skip
-    _clump(builder, (0.0, 0.0, 1.75), (1.0, 0.85), colour, rng, sides=8)
+    _clump(builder, (0.0, 0.0, 1.75), (1.0, 0.85), colour, rng, sides=7)
     for k in range(2):
         heading = 2.6 * k + form
         at = (0.42 * np.cos(heading), 0.42 * np.sin(heading), 2.25 + 0.2 * k)
-        _clump(builder, at, (0.56, 0.52), colour * (1.06 + 0.06 * k), rng, sides=6)
+        _clump(builder, at, (0.56, 0.52), colour * (1.06 + 0.06 * k), rng, sides=5)
     return builder.build()
 
 
@@ -71,12 +72,12 @@ def _clump(
 ) -> None:  # fmt: skip
     """Adds an uneven ball of leaves, darker below."""
     wide, high = radii
-    levels = (0.0, 0.27, 0.56, 0.8, 1.0)
+    levels = (0.0, 0.36, 0.68, 1.0)
     turns = np.arange(sides) * (2.0 * np.pi / sides)
     rings = []
     for k, level in enumerate(levels):
         out = np.sin(np.pi * level) * wide * (1.0 - 0.18 * rng.random(sides))
-        if k == 2:
+        if k == _WIDEST:
             out[0] = wide
         up = np.full(sides, np.cos(np.pi * level) * high)
         rings.append(np.column_stack((out * np.cos(turns + 0.3 * k), out * np.sin(turns + 0.3 * k), up)) + centre)
@@ -84,7 +85,7 @@ def _clump(
     after = (corner + 1) % sides
     steps = corner / sides * 4.0
     for k, (upper, lower) in enumerate(pairwise(rings)):
-        shade = colour * (1.08, 1.0, 0.84, 0.68)[k]
+        shade = colour * (1.08, 0.95, 0.72)[k]
         corners = np.concatenate(
             (np.stack((lower, lower[after], upper[after]), axis=1), np.stack((lower, upper[after], upper), axis=1))
         )
