@@ -29,7 +29,7 @@ def test_speeds_and_shares_of_a_training_on_a_batch() -> None:
 
 
 def test_other_environments_are_only_trained_on() -> None:
-    figures = measure("dorothie_gym/CoWizard-v0", environments=2, workers=0, steps=256)
+    figures = measure("dorothie_gym/CoWizard-v0", algorithm="a2c", environments=2, workers=0, steps=256)
     assert figures["batch_steps_per_second"] is None and figures["end_to_end_steps_per_second"] > 0.0
     assert len(rl_report(figures).rows) == 1
 
