@@ -102,9 +102,9 @@ def draw_cells(
     _sort_cells(view, cells, scratch)
     drawn, ring, due = 0, 0, 1
     while ring < _RINGS:
-        if ring == due:  # twice as far as the last time
+        if ring == due:  # three times as far as the last time
             find_tiles(view, buffer, scratch)
-            due *= 2
+            due *= 3
         for k in range(scratch.rings[ring], scratch.rings[ring + 1]):
             cell = scratch.order[k]
             if ring == 0 or not is_hidden(view, scratch.tiles, cells.low[cell], cells.high[cell]):

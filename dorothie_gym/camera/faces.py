@@ -8,20 +8,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.atlas import AtlasArrays
-from dorothie_gym.camera.daylight import Daylight
 from dorothie_gym.camera.labels import plane_of
-from dorothie_gym.camera.lighting import WARM, LampMap, air_colour, head_light, lamp_light
+from dorothie_gym.camera.lighting import WARM, LampMap, clearness, head_light, lamp_light
 from dorothie_gym.camera.mesh import PLAIN, Mesh, Surface
+from dorothie_gym.camera.optics import Optics, ray
 from dorothie_gym.camera.pose import View
-from dorothie_gym.camera.shadows import REACH, TEXEL, ShadowMaps, sunlit
-from dorothie_gym.camera.texturing import sample_texture
+from dorothie_gym.camera.shadows import REACH, TEXEL, ShadowMaps, faded, sunlit
+from dorothie_gym.camera.texturing import Textures, sample_texture
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
 
 _EMISSIVE, _GLASS, _LEAF = int(Surface.EMISSIVE), int(Surface.GLASS), int(Surface.LEAF)
 _GLOW = (1.0, 0.86, 0.62)  # colour of lit windows
+_WINDOW = 0.8  # brightness of lit windows
 
 
 @by_reference
@@ -35,8 +35,8 @@ class Face(NamedTuple):
         u: (4,) texture coordinate: first + depth * (second right + third up + fourth).
         v: (4,) the other one.
         along: (3,) change of u and v per metre along the longer side of footprints, texels per metre along the shorter.
-        sun: (2,) cosine to the sun, height by which casters must be higher [m].
-        kind: (2,) texture, surface.
+        sun: (2,) share of direct light, height by which casters must be higher [m].
+        kind: (3,) texture, surface, whether the texture is that of a lit sign.
     """
 
     plane: Array
@@ -52,27 +52,28 @@ class Face(NamedTuple):
 def new_face() -> Face:
     """Returns scratch space."""
     return Face(
-        np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(4), np.zeros(4), np.zeros(3), np.zeros(2), np.zeros(2, np.int64)
+        np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(4), np.zeros(4), np.zeros(3), np.zeros(2), np.zeros(3, np.int64)
     )
 
 
 @compiled
-def read_face(view: View, mesh: Mesh, row: int, atlas: AtlasArrays, light: Daylight, face: Face) -> None:
+def read_face(view: View, optics: Optics, mesh: Mesh, row: int, textures: Textures, face: Face) -> None:
     """Reads a triangle."""
     plane, normal = face.plane, face.normal
     plane[0], plane[1], plane[2], plane[3] = plane_of(view, mesh, row)
     for k in range(3):
         normal[k], face.colour[k] = mesh.normals[row, k], mesh.colours[row, k]
     face.kind[0], face.kind[1] = mesh.textures[row], mesh.surfaces[row]
-    cosine = normal[0] * light.sun[0] + normal[1] * light.sun[1] + normal[2] * light.sun[2]
-    face.sun[0] = cosine
+    face.kind[2] = textures.signs[face.kind[0]]
+    cosine = normal[0] * optics.sun_x + normal[1] * optics.sun_y + normal[2] * optics.sun_z
+    face.sun[0] = 0.35 + 0.5 * cosine if face.kind[1] & _LEAF else cosine
     # the surface itself rises from square to square of the map
-    rise = math.sqrt(normal[0] * normal[0] + normal[1] * normal[1]) * light.sun[2]
+    rise = math.sqrt(normal[0] * normal[0] + normal[1] * normal[1]) * optics.sun_z
     face.sun[1] = 0.06 + min(1.2 * TEXEL * rise / max(cosine, 0.05), 1.5)
     if face.kind[0] != PLAIN:
         _read_axis(view, mesh.u_axes[row], mesh.corners[row, 0], face.u)
         _read_axis(view, mesh.v_axes[row], mesh.corners[row, 0], face.v)
-        _read_footprint(view, mesh, row, atlas, face)
+        _read_footprint(view, mesh, row, textures, face)
 
 
 @inlined
@@ -88,7 +89,7 @@ def _read_axis(view: View, axis: NDArray[np.float32], corner: NDArray[np.float32
 
 
 @inlined
-def _read_footprint(view: View, mesh: Mesh, row: int, atlas: AtlasArrays, face: Face) -> None:
+def _read_footprint(view: View, mesh: Mesh, row: int, textures: Textures, face: Face) -> None:
     """Writes the directions of the longer and the shorter side of footprints: away from the camera and across."""
     forward, normal = view.axes[2], face.normal
     inward = forward[0] * normal[0] + forward[1] * normal[1] + forward[2] * normal[2]
@@ -99,81 +100,94 @@ def _read_footprint(view: View, mesh: Mesh, row: int, atlas: AtlasArrays, face: 
     u, v = mesh.u_axes[row], mesh.v_axes[row]
     face.along[0] = u[0] * ax + u[1] * ay + u[2] * az
     face.along[1] = v[0] * ax + v[1] * ay + v[2] * az
-    width, height = atlas.table[face.kind[0], 1], atlas.table[face.kind[0], 2]
+    width, height = textures.table[face.kind[0], 1], textures.table[face.kind[0], 2]
     across, down = (u[0] * bx + u[1] * by + u[2] * bz) * width, (v[0] * bx + v[1] * by + v[2] * bz) * height
     face.along[2] = math.sqrt(across * across + down * down)
 
 
 @inlined
 def solid_colour(
-    view: View, face: Face, right: float, up: float, atlas: AtlasArrays, light: Daylight, lamps: LampMap,
-    shadows: ShadowMaps, colour: Array,
-) -> None:  # fmt: skip
-    """Writes the colour (4,) of the present triangle in a direction (right, up, 1)."""
+    optics: Optics, face: Face, right: float, up: float, textures: Textures, lamps: LampMap, shadows: ShadowMaps
+) -> tuple[float, float, float]:
+    """Returns the colour of the present triangle in a direction (right, up, 1)."""
     plane = face.plane
-    toward = plane[1] * right + plane[2] * up + plane[3]
-    depth = plane[0] / min(toward, -1e-9)
-    length = math.sqrt(1.0 + right * right + up * up)
-    slant = -toward / length
-    colour[3] = 0.0
-    if face.kind[0] == PLAIN:
-        colour[0], colour[1], colour[2] = face.colour[0], face.colour[1], face.colour[2]
-    else:
-        _textured(view, face, right, up, depth, max(slant, 0.02), atlas, colour)
+    toward = min(plane[1] * right + plane[2] * up + plane[3], -1e-9)
+    depth = plane[0] / toward
+    red, green, blue, own = face.colour[0], face.colour[1], face.colour[2], 0.0
+    if face.kind[0] != PLAIN:
+        r, g, b, own = _textured(face, right, up, depth, max(-toward, 0.02), optics.pixel * depth, textures)
+        red, green, blue = red * r * (1.0 / 255.0), green * g * (1.0 / 255.0), blue * b * (1.0 / 255.0)
     if not face.kind[1] & _EMISSIVE:
-        _lit(view, face, right, up, depth, slant, light, lamps, shadows, colour)
-    air_colour(light, depth * length, colour)
+        red, green, blue = _lit(optics, face, right, up, depth, toward, lamps, shadows, red, green, blue, own)
+    clear = clearness(optics, depth, right, up)
+    return (
+        optics.air_r + (red - optics.air_r) * clear,
+        optics.air_g + (green - optics.air_g) * clear,
+        optics.air_b + (blue - optics.air_b) * clear,
+    )
 
 
 @inlined
 def _textured(
-    view: View, face: Face, right: float, up: float, depth: float, slant: float, atlas: AtlasArrays, colour: Array
-) -> None:
-    u, v, pixel = face.u, face.v, depth / view.focal
-    sample_texture(
-        atlas, face.kind[0], u[0] + depth * (u[1] * right + u[2] * up + u[3]),
-        v[0] + depth * (v[1] * right + v[2] * up + v[3]), face.along[0] * pixel / slant, face.along[1] * pixel / slant,
-        face.along[2] * pixel, colour,
+    face: Face, right: float, up: float, depth: float, slant: float, pixel: float, textures: Textures
+) -> tuple[float, float, float, float]:
+    u, v, long = face.u, face.v, pixel / slant
+    return sample_texture(
+        textures, face.kind[0], u[0] + depth * (u[1] * right + u[2] * up + u[3]),
+        v[0] + depth * (v[1] * right + v[2] * up + v[3]), face.along[0] * long, face.along[1] * long,
+        face.along[2] * pixel,
     )  # fmt: skip
-    for k in range(3):
-        colour[k] *= face.colour[k] * (1.0 / 255.0)
 
 
 @inlined
 def _lit(
-    view: View, face: Face, right: float, up: float, depth: float, slant: float, light: Daylight, lamps: LampMap,
-    shadows: ShadowMaps, colour: Array,
-) -> None:  # fmt: skip
-    """Multiplies the colour with the light that falls on the present triangle."""
-    axes, origin, normal = view.axes, view.origin, face.normal
-    dx = depth * (axes[2, 0] + right * axes[0, 0] + up * axes[1, 0])
-    dy = depth * (axes[2, 1] + right * axes[0, 1] + up * axes[1, 1])
-    dz = depth * (axes[2, 2] + right * axes[0, 2] + up * axes[1, 2])
+    optics: Optics, face: Face, right: float, up: float, depth: float, toward: float, lamps: LampMap,
+    shadows: ShadowMaps, red: float, green: float, blue: float, own: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Returns a colour in the light that falls on the present triangle, with its own light."""
+    dx, dy, dz = ray(optics, right, up)
+    dx, dy, dz = depth * dx, depth * dy, depth * dz
     lit = face.sun[0]
-    if face.kind[1] & _LEAF:
-        lit = 0.35 + 0.5 * lit
-    lit = max(lit, 0.0)
-    if lit > 0.0 and shadows.strength[0] > 0.0 and depth < REACH:
-        shade = sunlit(shadows, origin[0] + dx, origin[1] + dy, origin[2] + dz, face.sun[1])
-        lit *= shade + (1.0 - shade) * min(1.0, max(0.0, (depth / REACH - 0.75) * 4.0))
-    lamp = 0.0
-    if light.lamps > 0.0:
-        lamp = lamp_light(lamps, origin[0] + dx, origin[1] + dy) * light.lamps * 0.6
-    lamp += head_light(view, light, dx, dy, dz, slant)
-    own = colour[3] * light.lamps
-    for k in range(3):
-        factor = light.ambient[k] * (0.78 + 0.22 * normal[2]) + light.sunshine[k] * lit + lamp * WARM[k]
-        colour[k] = colour[k] * factor + own * _GLOW[k] * 0.8
+    if lit > 0.0 and optics.shadows and depth < REACH:
+        z = optics.z + dz
+        u, v = optics.x + dx - optics.slope_x * z, optics.y + dy - optics.slope_y * z
+        shade = sunlit(
+            shadows.town, shadows.bodies, optics.town_x, optics.town_y, optics.bodies_x, optics.bodies_y, u, v,
+            z + face.sun[1],
+        )  # fmt: skip
+        lit *= faded(shade, depth)
+    lit, lamp = max(lit, 0.0), 0.0
+    if optics.head_lights > 0.0:
+        lamp = head_light(optics, dx, dy, dz, -toward / math.sqrt(1.0 + right * right + up * up))
+    if optics.lamps > 0.0:
+        lamp += lamp_light(lamps, optics.x + dx, optics.y + dy) * optics.lamps * 0.6
+    ambient = 0.78 + 0.22 * face.normal[2]
+    glow, is_sign = own * optics.lamps, face.kind[2] != 0
+    r = red * (optics.sky_r * ambient + optics.sun_r * lit + lamp * WARM[0]) + _own_light(red, glow, _GLOW[0], is_sign)
+    g = green * (optics.sky_g * ambient + optics.sun_g * lit + lamp * WARM[1]) + _own_light(
+        green, glow, _GLOW[1], is_sign
+    )
+    b = blue * (optics.sky_b * ambient + optics.sun_b * lit + lamp * WARM[2]) + _own_light(
+        blue, glow, _GLOW[2], is_sign
+    )
     if face.kind[1] & _GLASS:
-        _mirror(light, normal, dz, slant, depth, colour)
+        slant = -toward / math.sqrt(1.0 + right * right + up * up)
+        share, sky, street = _mirror(face.normal[2], dz, slant, depth)
+        r += (optics.horizon_r * sky + optics.sky_r * street - r) * share
+        g += (optics.horizon_g * sky + optics.sky_g * street - g) * share
+        b += (optics.horizon_b * sky + optics.sky_b * street - b) * share
+    return r, g, b
 
 
 @inlined
-def _mirror(light: Daylight, normal: Array, dz: float, slant: float, depth: float, colour: Array) -> None:
-    """Mixes what glass mirrors into its colour: the sky above, dark streets below."""
+def _own_light(colour: float, glow: float, warm: float, is_sign: bool) -> float:
+    """Returns the own light of a lit sign, which keeps its colour, or of a lit window, which is dark by day."""
+    return colour * (1.0 / 255.0) * glow if is_sign else warm * _WINDOW * glow
+
+
+@inlined
+def _mirror(rise: float, dz: float, slant: float, depth: float) -> tuple[float, float, float]:
+    """Returns the share of what glass mirrors, and how much of it is the sky, and the street in 0..255."""
     rest = 1.0 - slant
-    share = 0.12 + 0.6 * rest * rest * rest
-    upward = min(1.0, max(0.0, 0.5 + 2.0 * (dz / max(depth, 1e-6) + 2.0 * slant * normal[2])))
-    for k in range(3):
-        mirrored = light.horizon[k] * upward + 70.0 * light.ambient[k] * (1.0 - upward)
-        colour[k] += (mirrored - colour[k]) * share
+    upward = min(1.0, max(0.0, 0.5 + 2.0 * (dz / max(depth, 1e-6) + 2.0 * slant * rise)))
+    return 0.12 + 0.6 * rest * rest * rest, upward, 70.0 * (1.0 - upward)

@@ -19,12 +19,14 @@ from dorothie_gym.camera.labels import find_boxes, new_labels, write_labels
 from dorothie_gym.camera.lighting import LampMap, add_rain
 from dorothie_gym.camera.mesh import TOWN, Mesh, empty_mesh
 from dorothie_gym.camera.models.model_bank import ModelBank, PlacementRecord
+from dorothie_gym.camera.optics import optics_of
 from dorothie_gym.camera.pose import CameraPose, View, view_from
 from dorothie_gym.camera.rasterizer import VisibilityBuffer, clear, draw_triangles, new_buffer
 from dorothie_gym.camera.sensor_faults import apply_faults
 from dorothie_gym.camera.shading import new_canvas, shade
 from dorothie_gym.camera.shadows import draw_body_shadows, draw_town_shadows, new_shadow_maps, turn_sun
 from dorothie_gym.camera.sky import sky_noise
+from dorothie_gym.camera.texturing import textures_of
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records, plain
 from dorothie_gym.copying import shared
 from dorothie_gym.ontology import Sensor
@@ -118,6 +120,7 @@ class FirstPersonCamera:
         if self._draws_rgb:
             self._buffer = new_buffer(width * samples, height * samples)
             self._orders = self._new_orders(width * samples, height * samples)
+            self._textures = textures_of(scene.atlas)
             self._canvas, self._face = new_canvas(width, samples), new_face()
             self._shadows = new_shadow_maps(enabled=config.shadows)
             self._scratch = np.zeros(max(width, height), np.uint8)
@@ -169,9 +172,9 @@ class FirstPersonCamera:
             self._cast_shadows(pose, light, bodies)
             picture = np.empty((config.height, config.width, 3), np.uint8)
             shade(
-                view, self._buffer, config.samples, self.scene.town, self._overlay, self._bodies, self.scene.ground,
-                self.scene.atlas, light, sky_noise(), self.scene.lamps, self._shadows, self._canvas, self._face,
-                picture,
+                view, optics_of(view, light, self._shadows), self._buffer, config.samples, self.scene.town,
+                self._overlay, self._bodies, self.scene.ground, self._textures, light, sky_noise(), self.scene.lamps,
+                self._shadows, self._canvas, self._face, picture,
             )  # fmt: skip
             if light.rainfall > 0.02:
                 add_rain(picture, light.rainfall, round(time * 30.0))

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.daylight import Daylight
-from dorothie_gym.camera.pose import View
+from dorothie_gym.camera.optics import Optics
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
@@ -23,7 +22,7 @@ WARM = (1.05, 0.95, 0.78)
 """Colour of lamps."""
 
 HAZE_START = 100.0
-"""Distance from which even clear air veils [m]; nearer, the simulator's perception has none."""
+"""Depth from which even clear air veils [m]; nearer, the simulator's perception has none."""
 
 _HAZE = 1.2e-3  # extinction beyond [1/m]
 _SQUARE = 1.0  # [m] width of a square of a map of lamps
@@ -83,45 +82,42 @@ def lamp_light(lamps: LampMap, x: float, y: float) -> float:
 
 
 @inlined
-def head_light(view: View, light: Daylight, x: float, y: float, z: float, slant: float) -> float:
+def head_light(optics: Optics, x: float, y: float, z: float, slant: float) -> float:
     """Returns the factor of the light of the car's head lights.
 
     Args:
-        view: of a camera on the car.
-        light: strength of the head lights.
+        optics: strength of the head lights, and the camera on the car.
         x: of the surface relative to the camera [m].
         y: of the surface relative to the camera [m].
         z: of the surface relative to the camera [m].
         slant: cosine between the surface's normal and the way to the camera.
     """
-    if light.head_lights <= 0.0:
-        return 0.0
-    ahead = x * view.axes[0, 1] - y * view.axes[0, 0]
-    aside = abs(x * view.axes[0, 0] + y * view.axes[0, 1])
+    ahead = x * optics.right_y - y * optics.right_x
+    aside = abs(x * optics.right_x + y * optics.right_y)
     if ahead < 1.0:
         return 0.0
     cone = max(0.0, 1.0 - aside / (1.6 + 0.38 * ahead))
     above = min(1.0, max(0.0, 1.0 - (z - 0.15) / (0.6 + 0.03 * ahead)))  # low beam
-    return float(light.head_lights * cone * above * _BEAM * 260.0 / (ahead * ahead + 260.0) * (0.35 + 0.65 * slant))
+    return float(optics.head_lights * cone * above * _BEAM * 260.0 / (ahead * ahead + 260.0) * (0.35 + 0.65 * slant))
 
 
 @inlined
-def wet_colour(light: Daylight, slant: float, colour: Array) -> None:
-    """Darkens a wet surface, and mirrors the sky in it (Schlick's approximation)."""
+def mirrored_share(wetness: float, slant: float) -> float:
+    """Returns the share of the sky in the colour of a wet surface (Schlick's approximation)."""
     rest = 1.0 - slant
-    mirror = min(0.85, (0.03 + 0.75 * rest * rest * rest * rest * rest) * light.wetness)
-    for k in range(3):
-        colour[k] = colour[k] * (1.0 - 0.42 * light.wetness) * (1.0 - mirror) + light.horizon[k] * mirror
+    return min(0.85, (0.03 + 0.75 * rest * rest * rest * rest * rest) * wetness)
 
 
 @inlined
-def air_colour(light: Daylight, distance: float, colour: Array) -> None:
-    """Mixes the colour of the air into that of a surface at a distance [m]."""
-    clear = float(transmission(light.fog, light.fog_start, light.rain, distance))
-    if distance > HAZE_START:
-        clear *= math.exp(-_HAZE * (distance - HAZE_START))
-    for k in range(3):
-        colour[k] = light.air[k] + (colour[k] - light.air[k]) * clear
+def clearness(optics: Optics, depth: float, right: float, up: float) -> float:
+    """Returns the share of a surface's colour that the air leaves at a depth [m] in a direction (right, up, 1)."""
+    clear = 1.0
+    if optics.fog > 0.0 or optics.rain > 0.0:
+        distance = depth * math.sqrt(1.0 + right * right + up * up)
+        clear = transmission(optics.fog, optics.fog_start, optics.rain, distance)
+    if depth > HAZE_START:
+        clear *= math.exp(-_HAZE * (depth - HAZE_START))
+    return clear
 
 
 @compiled

@@ -12,18 +12,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.atlas import AtlasArrays
 from dorothie_gym.camera.daylight import Daylight
 from dorothie_gym.camera.faces import Face, read_face, solid_colour
 from dorothie_gym.camera.ground.colours import colour_at
 from dorothie_gym.camera.ground.lookup import GroundArrays
 from dorothie_gym.camera.labels import mesh_of, row_in
-from dorothie_gym.camera.lighting import WARM, LampMap, air_colour, head_light, lamp_light, wet_colour
+from dorothie_gym.camera.lighting import WARM, LampMap, clearness, head_light, lamp_light, mirrored_share
 from dorothie_gym.camera.mesh import PLAIN, Mesh, Surface
+from dorothie_gym.camera.optics import Optics, ray
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.rasterizer import SKY, VisibilityBuffer
-from dorothie_gym.camera.shadows import REACH, ShadowMaps, sunlit
+from dorothie_gym.camera.shadows import REACH, ShadowMaps, faded, sunlit
 from dorothie_gym.camera.sky import sky_colour
+from dorothie_gym.camera.texturing import Textures
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
@@ -67,21 +68,22 @@ def new_canvas(width: int, samples: int) -> Canvas:
 
 @compiled
 def shade(
-    view: View, buffer: VisibilityBuffer, samples: int, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays,
-    atlas: AtlasArrays, light: Daylight, noise: NDArray[np.float32], lamps: LampMap, shadows: ShadowMaps,
-    canvas: Canvas, face: Face, picture: NDArray[np.uint8],
+    view: View, optics: Optics, buffer: VisibilityBuffer, samples: int, town: Mesh, overlay: Mesh, bodies: Mesh,
+    ground: GroundArrays, textures: Textures, light: Daylight, noise: NDArray[np.float32], lamps: LampMap,
+    shadows: ShadowMaps, canvas: Canvas, face: Face, picture: NDArray[np.uint8],
 ) -> None:  # fmt: skip
     """Writes the colours of a picture.
 
     Args:
         view: projection of the picture.
+        optics: numbers of the picture.
         buffer: triangles, with `samples` x `samples` samples in a pixel.
         samples: 1 or 2.
         town: what stands in every session.
         overlay: what stands in this session.
         bodies: what moves.
         ground: materials and colours of the ground.
-        atlas: textures.
+        textures: of the walls.
         light: light and air.
         noise: of the sky.
         lamps: light of street lamps on the ground.
@@ -92,10 +94,10 @@ def shade(
     """
     for top in range(0, view.height, BAND):
         rows = min(BAND, view.height - top)
-        _gather(view, buffer, samples, town, overlay, bodies, top, rows, canvas)
-        _shade_skies(view, light, noise, canvas)
-        _shade_grounds(view, town, overlay, bodies, ground, light, lamps, shadows, canvas)
-        _shade_solids(view, town, overlay, bodies, atlas, light, lamps, shadows, canvas, face)
+        _gather(view, optics.pixel, buffer, samples, town, overlay, bodies, top, rows, canvas)
+        _shade_skies(optics, light, noise, canvas)
+        _shade_grounds(optics, town, overlay, bodies, ground, lamps, shadows, canvas)
+        _shade_solids(view, optics, town, overlay, bodies, textures, lamps, shadows, canvas, face)
         for y in range(rows):
             for x in range(view.width):
                 for k in range(3):
@@ -107,39 +109,46 @@ def shade(
 
 @compiled
 def _gather(
-    view: View, buffer: VisibilityBuffer, samples: int, town: Mesh, overlay: Mesh, bodies: Mesh, top: int, rows: int,
-    canvas: Canvas,
+    view: View, size: float, buffer: VisibilityBuffer, samples: int, town: Mesh, overlay: Mesh, bodies: Mesh, top: int,
+    rows: int, canvas: Canvas,
 ) -> None:  # fmt: skip
-    """Sorts the samples of a band."""
-    triangles = buffer.triangles
+    """Sorts the samples of a band; `size` is the width of a pixel at a depth of 1 m [m]."""
+    triangles, last, kind = buffer.triangles, SKY, _SKIES
     for k in range(3):
         canvas.counts[k] = 0
     for y in range(rows):
+        upper = triangles[(top + y) * samples]
+        lower = triangles[(top + y) * samples + samples - 1]
         for x in range(view.width):
-            pixel = y * view.width + x
+            pixel, column = y * view.width + x, x * samples
             canvas.sums[pixel, 0] = canvas.sums[pixel, 1] = canvas.sums[pixel, 2] = 0.0
-            row, column = (top + y) * samples, x * samples
-            number = triangles[row, column]
-            if samples == 1 or _is_uniform(triangles, row, column, town, overlay, bodies):
-                _add_sample(view, town, overlay, bodies, canvas, pixel, number, x + 0.5, top + y + 0.5, 1.0)
+            number = upper[column]
+            if samples == 1 or _is_uniform(upper, lower, column, town, overlay, bodies):
+                if number != last:
+                    last, kind = number, _kind_of(town, overlay, bodies, number)
+                _add_sample(view, size, canvas, kind, pixel, number, x + 0.5, top + y + 0.5, 1.0)
             else:
                 for k in range(4):
-                    i, j = column + (k & 1), row + (k >> 1)
-                    _add_sample(
-                        view, town, overlay, bodies, canvas, pixel, triangles[j, i], (i + 0.5) * 0.5, (j + 0.5) * 0.5,
-                        0.25,
-                    )  # fmt: skip
+                    number = lower[column + (k & 1)] if k >> 1 else upper[column + (k & 1)]
+                    if number != last:
+                        last, kind = number, _kind_of(town, overlay, bodies, number)
+                    across, down = x + 0.25 + 0.5 * (k & 1), top + y + 0.25 + 0.5 * (k >> 1)
+                    _add_sample(view, size, canvas, kind, pixel, number, across, down, 0.25)
 
 
 @inlined
-def _is_uniform(triangles: NDArray[np.int32], row: int, column: int, town: Mesh, overlay: Mesh, bodies: Mesh) -> bool:
-    """Returns whether the four samples of a pixel see one surface."""
-    first = triangles[row, column]
-    for k in range(1, 4):
-        other = triangles[row + (k >> 1), column + (k & 1)]
-        if other != first and not _is_same_surface(town, overlay, bodies, first, other):
-            return False
-    return True
+def _is_uniform(
+    upper: NDArray[np.int32], lower: NDArray[np.int32], column: int, town: Mesh, overlay: Mesh, bodies: Mesh
+) -> bool:
+    """Returns whether the four samples of a pixel in two rows see one surface."""
+    one, two, three, four = upper[column], upper[column + 1], lower[column], lower[column + 1]
+    if (one == two) & (one == three) & (one == four):
+        return True
+    return (
+        (one == two or _is_same_surface(town, overlay, bodies, one, two))
+        and (one == three or _is_same_surface(town, overlay, bodies, one, three))
+        and (one == four or _is_same_surface(town, overlay, bodies, one, four))
+    )
 
 
 @compiled
@@ -172,111 +181,138 @@ def _are_textured_alike(one: Mesh, i: int, two: Mesh, j: int) -> bool:
 
 
 @inlined
+def _kind_of(town: Mesh, overlay: Mesh, bodies: Mesh, number: int) -> int:
+    if number == SKY:
+        return _SKIES
+    surface = mesh_of(town, overlay, bodies, number).surfaces[row_in(town, overlay, number)]
+    return _GROUNDS if surface & _GROUND else _SOLIDS
+
+
+@inlined
 def _add_sample(
-    view: View, town: Mesh, overlay: Mesh, bodies: Mesh, canvas: Canvas, pixel: int, number: int, x: float, y: float,
-    weight: float,
-) -> None:  # fmt: skip
-    kind = _SKIES
-    if number != SKY:
-        mesh = mesh_of(town, overlay, bodies, number)
-        kind = _GROUNDS if mesh.surfaces[row_in(town, overlay, number)] & _GROUND else _SOLIDS
+    view: View, size: float, canvas: Canvas, kind: int, pixel: int, number: int, x: float, y: float, weight: float
+) -> None:
     at = canvas.counts[kind]
     canvas.counts[kind] = at + 1
     canvas.pixels[kind, at], canvas.numbers[kind, at] = pixel, number
-    canvas.places[kind, at, 0] = (x - 0.5 * view.width) / view.focal
-    canvas.places[kind, at, 1] = (0.5 * view.height - y) / view.focal
+    canvas.places[kind, at, 0] = (x - 0.5 * view.width) * size
+    canvas.places[kind, at, 1] = (0.5 * view.height - y) * size
     canvas.places[kind, at, 2] = weight
 
 
 @inlined
-def _add_colour(canvas: Canvas, kind: int, k: int) -> None:
-    """Adds the present colour to the pixel of a sample."""
+def _add_colour(canvas: Canvas, kind: int, k: int, red: float, green: float, blue: float) -> None:
+    """Adds a colour to the pixel of a sample."""
     pixel, weight = canvas.pixels[kind, k], canvas.places[kind, k, 2]
-    for j in range(3):
-        canvas.sums[pixel, j] += weight * min(canvas.colour[j], 255.0)
+    canvas.sums[pixel, 0] += weight * min(red, 255.0)
+    canvas.sums[pixel, 1] += weight * min(green, 255.0)
+    canvas.sums[pixel, 2] += weight * min(blue, 255.0)
 
 
 # --- Kinds ------------------------------------------------------------------------------------------------------------
 
 
 @compiled
-def _shade_skies(view: View, light: Daylight, noise: NDArray[np.float32], canvas: Canvas) -> None:
-    axes = view.axes
+def _shade_skies(optics: Optics, light: Daylight, noise: NDArray[np.float32], canvas: Canvas) -> None:
+    colour = canvas.colour
     for k in range(canvas.counts[_SKIES]):
         right, up = canvas.places[_SKIES, k, 0], canvas.places[_SKIES, k, 1]
+        x, y, z = ray(optics, right, up)
         scale = 1.0 / math.sqrt(1.0 + right * right + up * up)
-        sky_colour(
-            light, noise, (axes[2, 0] + right * axes[0, 0] + up * axes[1, 0]) * scale,
-            (axes[2, 1] + right * axes[0, 1] + up * axes[1, 1]) * scale,
-            (axes[2, 2] + right * axes[0, 2] + up * axes[1, 2]) * scale, canvas.colour,
-        )  # fmt: skip
-        _add_colour(canvas, _SKIES, k)
+        sky_colour(light, noise, x * scale, y * scale, z * scale, colour)
+        _add_colour(canvas, _SKIES, k, colour[0], colour[1], colour[2])
 
 
 @compiled
 def _shade_grounds(
-    view: View, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays, light: Daylight, lamps: LampMap,
-    shadows: ShadowMaps, canvas: Canvas,
+    optics: Optics, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays, lamps: LampMap, shadows: ShadowMaps,
+    canvas: Canvas,
 ) -> None:  # fmt: skip
-    colour, last, mesh, row = canvas.colour, SKY, town, 0
+    last, sheet, nx, ny, nz, offset, facing = SKY, 0, 0.0, 0.0, 1.0, 0.0, 0.0
     for k in range(canvas.counts[_GROUNDS]):
         if canvas.numbers[_GROUNDS, k] != last:
             last = canvas.numbers[_GROUNDS, k]
             mesh, row = mesh_of(town, overlay, bodies, last), row_in(town, overlay, last)
-        right, up = canvas.places[_GROUNDS, k, 0], canvas.places[_GROUNDS, k, 1]
-        _shade_ground(view, mesh, row, right, up, ground, light, lamps, shadows, colour)
-        _add_colour(canvas, _GROUNDS, k)
+            sheet, corner, normal = int(mesh.textures[row]), mesh.corners[row, 0], mesh.normals[row]
+            nx, ny, nz = float(normal[0]), float(normal[1]), float(normal[2])
+            offset = nx * (corner[0] - optics.x) + ny * (corner[1] - optics.y) + nz * (corner[2] - optics.z)
+            facing = max(nx * optics.sun_x + ny * optics.sun_y + nz * optics.sun_z, 0.0)
+        right, up = float(canvas.places[_GROUNDS, k, 0]), float(canvas.places[_GROUNDS, k, 1])
+        dx, dy, dz = ray(optics, right, up)
+        toward = min(nx * dx + ny * dy + nz * dz, -1e-6)
+        red, green, blue = _ground_colour(
+            optics, sheet, offset / toward, right, up, toward, facing, nz, ground, lamps, shadows, canvas.colour
+        )
+        _add_colour(canvas, _GROUNDS, k, red, green, blue)
 
 
 @inlined
-def _shade_ground(
-    view: View, mesh: Mesh, row: int, right: float, up: float, ground: GroundArrays, light: Daylight, lamps: LampMap,
-    shadows: ShadowMaps, colour: Array,
-) -> None:  # fmt: skip
-    """Writes the colour of the ground in a direction."""
-    axes, origin, normal = view.axes, view.origin, mesh.normals[row]
-    dx = axes[2, 0] + right * axes[0, 0] + up * axes[1, 0]
-    dy = axes[2, 1] + right * axes[0, 1] + up * axes[1, 1]
-    dz = axes[2, 2] + right * axes[0, 2] + up * axes[1, 2]
-    toward = normal[0] * dx + normal[1] * dy + normal[2] * dz
-    corner = mesh.corners[row, 0]
-    depth = (
-        normal[0] * (corner[0] - origin[0]) + normal[1] * (corner[1] - origin[1]) + normal[2] * (corner[2] - origin[2])
-    ) / min(toward, -1e-6)
-    x, y, z = origin[0] + depth * dx, origin[1] + depth * dy, origin[2] + depth * dz
-    length = math.sqrt(dx * dx + dy * dy + dz * dz)
-    distance, slant = depth * length, -toward / length
-    across = depth / view.focal
-    colour_at(ground, int(mesh.textures[row]), x, y, across / math.sqrt(max(slant, 0.02)), colour)
-    facing = normal[0] * light.sun[0] + normal[1] * light.sun[1] + normal[2] * light.sun[2]
-    lit = max(facing, 0.0)
-    if lit > 0.0 and shadows.strength[0] > 0.0 and distance < REACH:
-        lit *= _faded(sunlit(shadows, x, y, z, 0.05), distance)
-    glow = lamp_light(lamps, x, y) * light.lamps
-    beam = head_light(view, light, x - origin[0], y - origin[1], z - origin[2], slant)
-    for k in range(3):
-        colour[k] *= light.ambient[k] * (0.8 + 0.2 * normal[2]) + light.sunshine[k] * lit + (glow + beam) * WARM[k]
-    if light.wetness > 0.0:
-        wet_colour(light, slant, colour)
-    air_colour(light, distance, colour)
+def _ground_colour(
+    optics: Optics, sheet: int, depth: float, right: float, up: float, toward: float, facing: float, level: float,
+    ground: GroundArrays, lamps: LampMap, shadows: ShadowMaps, colour: Array,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Returns the colour of the ground at a depth in a direction (right, up, 1).
 
-
-@inlined
-def _faded(lit: float, distance: float) -> float:
-    """Returns the share of light in the shadow with the fading of distant shadows."""
-    return lit + (1.0 - lit) * min(1.0, max(0.0, (distance / REACH - 0.75) * 4.0))
+    Args:
+        optics: numbers of the picture.
+        sheet: of the ground.
+        depth: [m].
+        right: of the direction.
+        up: of the direction.
+        toward: scalar product of direction and normal.
+        facing: cosine to the sun.
+        level: vertical part of the normal.
+        ground: materials and colours.
+        lamps: light of street lamps.
+        shadows: maps.
+        colour: scratch space.
+    """
+    dx, dy, dz = ray(optics, right, up)
+    x, y, z = depth * dx, depth * dy, optics.z + depth * dz
+    colour_at(ground, sheet, optics.x + x, optics.y + y, depth * optics.pixel / math.sqrt(max(-toward, 0.02)), colour)
+    lit = facing
+    if lit > 0.0 and optics.shadows and depth < REACH:
+        u, v = optics.x + x - optics.slope_x * z, optics.y + y - optics.slope_y * z
+        shade = sunlit(
+            shadows.town, shadows.bodies, optics.town_x, optics.town_y, optics.bodies_x, optics.bodies_y, u, v, z + 0.05
+        )
+        lit *= faded(shade, depth)
+    lamp, slant = 0.0, 0.0
+    if optics.head_lights > 0.0 or optics.wetness > 0.0:
+        slant = -toward / math.sqrt(1.0 + right * right + up * up)
+    if optics.head_lights > 0.0:
+        lamp = head_light(optics, x, y, z - optics.z, slant)
+    if optics.lamps > 0.0:
+        lamp += lamp_light(lamps, optics.x + x, optics.y + y) * optics.lamps
+    ambient = 0.8 + 0.2 * level
+    red = colour[0] * (optics.sky_r * ambient + optics.sun_r * lit + lamp * WARM[0])
+    green = colour[1] * (optics.sky_g * ambient + optics.sun_g * lit + lamp * WARM[1])
+    blue = colour[2] * (optics.sky_b * ambient + optics.sun_b * lit + lamp * WARM[2])
+    if optics.wetness > 0.0:
+        share = mirrored_share(optics.wetness, slant)
+        dark = (1.0 - 0.42 * optics.wetness) * (1.0 - share)
+        red, green, blue = (
+            red * dark + optics.horizon_r * share, green * dark + optics.horizon_g * share,
+            blue * dark + optics.horizon_b * share,
+        )  # fmt: skip
+    clear = clearness(optics, depth, right, up)
+    return (
+        optics.air_r + (red - optics.air_r) * clear,
+        optics.air_g + (green - optics.air_g) * clear,
+        optics.air_b + (blue - optics.air_b) * clear,
+    )
 
 
 @compiled
 def _shade_solids(
-    view: View, town: Mesh, overlay: Mesh, bodies: Mesh, atlas: AtlasArrays, light: Daylight, lamps: LampMap,
+    view: View, optics: Optics, town: Mesh, overlay: Mesh, bodies: Mesh, textures: Textures, lamps: LampMap,
     shadows: ShadowMaps, canvas: Canvas, face: Face,
 ) -> None:  # fmt: skip
     last = SKY
     for k in range(canvas.counts[_SOLIDS]):
         if canvas.numbers[_SOLIDS, k] != last:
             last = canvas.numbers[_SOLIDS, k]
-            read_face(view, mesh_of(town, overlay, bodies, last), row_in(town, overlay, last), atlas, light, face)
-        right, up = canvas.places[_SOLIDS, k, 0], canvas.places[_SOLIDS, k, 1]
-        solid_colour(view, face, right, up, atlas, light, lamps, shadows, canvas.colour)
-        _add_colour(canvas, _SOLIDS, k)
+            read_face(view, optics, mesh_of(town, overlay, bodies, last), row_in(town, overlay, last), textures, face)
+        right, up = float(canvas.places[_SOLIDS, k, 0]), float(canvas.places[_SOLIDS, k, 1])
+        red, green, blue = solid_colour(optics, face, right, up, textures, lamps, shadows)
+        _add_colour(canvas, _SOLIDS, k, red, green, blue)

@@ -49,7 +49,7 @@ class ShadowMaps(NamedTuple):
         held: (t, t, 2) int32 place of the tile that is held.
         bodies: (m, m) int16 heights.
         slope: (2,) shift towards the sun per metre of height [1].
-        window: (4,) int64: first tile in x and y, first square of the map of bodies in x and y.
+        window: (4,) int64: first square in x and y of the map of the town, and of that of bodies.
         strength: (1,) 1 with shadows, 0 without.
         corners: (3, 3) scratch: corners of a triangle in squares, and their heights.
     """
@@ -105,10 +105,10 @@ def draw_town_shadows(
     width = _TILE * TEXEL
     for axis in range(2):
         centre = (x if axis == 0 else y) - maps.slope[axis] * z
-        maps.window[axis] = math.floor(centre / width + 0.5) - _TILES // 2
+        maps.window[axis] = (math.floor(centre / width + 0.5) - _TILES // 2) * _TILE
         maps.window[2 + axis] = math.floor(centre / TEXEL) - _BODIES // 2
-    for row in range(maps.window[1], maps.window[1] + _TILES):
-        for column in range(maps.window[0], maps.window[0] + _TILES):
+    for row in range(maps.window[1] // _TILE, maps.window[1] // _TILE + _TILES):
+        for column in range(maps.window[0] // _TILE, maps.window[0] // _TILE + _TILES):
             held = maps.held[row % _TILES, column % _TILES]
             if held[0] != column or held[1] != row:
                 held[0], held[1] = column, row
@@ -207,36 +207,51 @@ def _fill_heights(target: NDArray[np.int16], corners: Array, right: float, down:
             target[y, x] = max(target[y, x], np.int16(value))
 
 
-@compiled
-def sunlit(maps: ShadowMaps, x: float, y: float, z: float, bias: float) -> float:
-    """Returns the share of the sun's light at a position [m], 0 to 1, with soft edges.
+@inlined
+def sunlit(
+    town: NDArray[np.int16], bodies: NDArray[np.int16], town_x: int, town_y: int, bodies_x: int, bodies_y: int,
+    u: float, v: float, z: float,
+) -> float:  # fmt: skip
+    """Returns the share of the sun's light at a place on the plane, 0 to 1, with soft edges.
 
     Args:
-        maps: drawn for the picture.
-        x: [m].
-        y: [m].
-        z: [m].
-        bias: height by which what casts the shadow must be higher [m].
+        town: map of the town.
+        bodies: map of bodies.
+        town_x: first column of the map of the town [squares].
+        town_y: first row.
+        bodies_x: first column of the map of bodies.
+        bodies_y: first row.
+        u: place on the plane [m].
+        v: place on the plane [m].
+        z: height above which surfaces cast a shadow on the place [m].
     """
-    u, v = (x - maps.slope[0] * z) / TEXEL - 0.5, (y - maps.slope[1] * z) / TEXEL - 0.5
-    column, row = math.floor(u), math.floor(v)
-    a, b = u - column, v - row
-    level, lit = (z + bias) * _STEPS, 0.0
-    for k in range(4):
-        i, j = column + (k & 1), row + (k >> 1)
-        weight = (a if k & 1 else 1.0 - a) * (b if k >> 1 else 1.0 - b)
-        if _height(maps, i, j) <= level:
-            lit += weight
+    across, down = u * (1.0 / TEXEL) - 0.5, v * (1.0 / TEXEL) - 0.5
+    column, row = math.floor(across), math.floor(down)
+    a, b, level, lit = across - column, down - row, z * _STEPS, 1.0
+    i, j = column - town_x, row - town_y
+    if 0 <= i < _SIDE - 1 and 0 <= j < _SIDE - 1:
+        left, right, top, below = (
+            column & (_SIDE - 1),
+            (column + 1) & (_SIDE - 1),
+            row & (_SIDE - 1),
+            (row + 1) & (_SIDE - 1),
+        )
+        lit = _mixed(town[top, left], town[top, right], town[below, left], town[below, right], level, a, b)
+    i, j = column - bodies_x, row - bodies_y
+    if 0 <= i < _BODIES - 1 and 0 <= j < _BODIES - 1 and lit > 0.0:
+        lit = min(lit, _mixed(bodies[j, i], bodies[j, i + 1], bodies[j + 1, i], bodies[j + 1, i + 1], level, a, b))
     return lit
 
 
 @inlined
-def _height(maps: ShadowMaps, column: int, row: int) -> int:
-    height = _NOTHING
-    across, down = column // _TILE - maps.window[0], row // _TILE - maps.window[1]
-    if 0 <= across < _TILES and 0 <= down < _TILES:
-        height = int(maps.town[row & (_SIDE - 1), column & (_SIDE - 1)])
-    i, j = column - maps.window[2], row - maps.window[3]
-    if 0 <= i < _BODIES and 0 <= j < _BODIES:
-        height = max(height, int(maps.bodies[j, i]))
-    return height
+def _mixed(one: int, two: int, three: int, four: int, level: float, a: float, b: float) -> float:
+    """Returns the share of the light that four squares let through."""
+    upper = (1.0 - a if one <= level else 0.0) + (a if two <= level else 0.0)
+    lower = (1.0 - a if three <= level else 0.0) + (a if four <= level else 0.0)
+    return upper * (1.0 - b) + lower * b
+
+
+@inlined
+def faded(lit: float, distance: float) -> float:
+    """Returns the share of light at a distance from the camera [m]: distant shadows fade."""
+    return lit + (1.0 - lit) * min(1.0, max(0.0, distance * (4.0 / REACH) - 3.0))

@@ -61,8 +61,11 @@ def _smooth(noise: NDArray[np.float32], u: float, v: float) -> float:
 def _add_clouds(light: Daylight, noise: NDArray[np.float32], x: float, y: float, z: float, out: Array) -> None:
     scale = _CLOUD_SCALE / (z + 0.12)
     u, v = x * scale + _SHIFT, y * scale + _SHIFT
-    value = 0.62 * _smooth(noise, u, v) + 0.38 * _smooth(noise, u * 2.7, v * 2.7)
-    share = min(max((value - (0.9 - 0.85 * light.clouds)) * 3.0, 0.0), 1.0) * min(1.0, z * 7.0) * 0.9
+    value, least = 0.62 * _smooth(noise, u, v), 0.9 - 0.85 * light.clouds
+    if value + 0.38 <= least:
+        return
+    value += 0.38 * _smooth(noise, u * 2.7, v * 2.7)
+    share = min(max((value - least) * 3.0, 0.0), 1.0) * min(1.0, z * 7.0) * 0.9
     shade = 1.0 - 0.12 * value
     for k in range(3):
         out[k] += (light.cloud[k] * shade - out[k]) * share
