@@ -205,6 +205,23 @@ def test_each_site_has_a_lot_of_its_own_beside_it(name: str) -> None:
         assert towards @ (math.cos(lot.heading), math.sin(lot.heading)) < 0.0  # its front faces the road
 
 
+@pytest.mark.parametrize("name", TOWNS)
+def test_no_building_hides_a_landmark_from_a_car_40_metres_before_it(name: str) -> None:
+    town, lots = load_town(name), clearance_of(name).lots
+    ground = shapely.STRtree([shapely.Polygon(building.outline) for building in buildings_of(name)])
+    tried = 0
+    for site, lot in zip(town.sites, lots, strict=True):
+        lane = town.lanes[site.lane]
+        if site.station < 40.0:
+            continue
+        eye = lane.position(site.station - 40.0)
+        sides = [lot.at(0.0, side) for side in (-lot.length / 2.0 - 0.9, lot.length / 2.0 + 0.9)]
+        near = min(sides, key=lambda side: math.dist(eye, side))
+        assert not len(ground.query(shapely.LineString([eye, near]), predicate="intersects"))
+        tried += 1
+    assert tried > 5
+
+
 def test_buildings_stand_on_slopes_without_gaps() -> None:
     class Hill:
         def height_at(self, points: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,6 +34,8 @@ _PAINT = (
     palette.LANE_LINE, palette.EDGE_LINE, palette.CENTRE_LINE, palette.HATCHING, palette.STOP_LINE, palette.ARROW,
     palette.ONE_WAY,
 )  # fmt: skip
+_SEEN_FROM = (42.0, 26.0)  # [m] before the stop at a site
+_SIGN = (2.4, 3.4)  # [m] extent of signs before and behind the front of a lot
 BESIDE_LOT = 1.2
 """Room at both sides of a lot, for a sign [m]."""
 
@@ -112,8 +115,10 @@ class Clearance:
 
     @cached_property
     def reserved(self) -> shapely.STRtree:
-        """Lots, and the ground between them and their streets."""
-        return shapely.STRtree([_with_view(lot) for lot in self.lots])
+        """Lots, the ground between them and their streets, and the lines of sight of cars that come near."""
+        town = self._layers.town
+        sights = [sight for lot, site in zip(self.lots, town.sites, strict=True) for sight in _sights(town, site, lot)]
+        return shapely.STRtree([*(_with_view(lot) for lot in self.lots), *sights])
 
     def _lot(self, site: Site, taken: list[shapely.Polygon]) -> Lot:
         place, way = np.array(site.position), np.array(site.waypoint)
@@ -153,6 +158,32 @@ def _with_view(lot: Lot) -> shapely.Polygon:
     return shapely.Polygon(
         [lot.at(-ahead, -side), lot.at(-ahead, side), lot.at(lot.depth + 1.0, side), lot.at(lot.depth + 1.0, -side)]
     )
+
+
+def _sights(town: Town, site: Site, lot: Lot) -> list[shapely.Polygon]:
+    """Returns triangles between cars that approach a site and the near side of its lot, where signs stand."""
+    side = lot.length / 2.0 + BESIDE_LOT
+    found = []
+    for distance in _SEEN_FROM:
+        eye = _before(town, site, distance)
+        # the side of the lot that is closer to the car
+        near = min((side, -side), key=lambda right: math.dist(eye, lot.at(0.0, right)))
+        found.append(shapely.Polygon([eye, lot.at(-_SIGN[0], near), lot.at(_SIGN[1], near)]).buffer(0.3))
+    return found
+
+
+def _before(town: Town, site: Site, distance: float) -> tuple[float, float]:
+    """Returns the position (x, y) [m] on the way to a site at a distance before its stop, as far as there is a lane."""
+    lane, station = town.lanes[site.lane], site.station
+    seen = {lane.id}
+    while station < distance and (before := [k for k in town.predecessors(lane.id) if k not in seen]):
+        distance -= station
+        # straight on rather than round a corner
+        lane = min((town.lanes[k] for k in before), key=lambda row: abs(row.headings[-1] - row.headings[0]))
+        station = lane.length
+        seen.add(lane.id)
+    x, y = lane.position(max(station - distance, 0.0)).tolist()
+    return x, y
 
 
 def _footways(town: Town) -> list[shapely.Polygon]:
