@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.camera.cells import CellTable
-from dorothie_gym.camera.mesh import Mesh, Surface
+from dorothie_gym.camera.mesh import TOWN, Mesh, Surface
 from dorothie_gym.camera.models.model_bank import PlacementRecord
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.by_reference import by_reference
@@ -126,7 +126,8 @@ def _draw_tile(maps: ShadowMaps, tile: NDArray[np.int16], mesh: Mesh, cells: Cel
     for cell in range(len(cells.ranges)):
         if _shades(maps, cells.low[cell], cells.high[cell], column, row):
             for k in range(cells.ranges[cell, 0], cells.ranges[cell, 1]):
-                _cast(maps, tile, mesh, k, column * _TILE, row * _TILE, 0.0, 0.0, 0.0, 1.0, 0.0)
+                if mesh.instances[k] == TOWN:  # the shadow of a landmark would tell of one that is out of view
+                    _cast(maps, tile, mesh, k, column * _TILE, row * _TILE, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 
 @inlined

@@ -1,0 +1,112 @@
+"""Scenes: what stands in a town in every session, and what a session adds to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.camera.atlas import town_atlas, with_street_names
+from dorothie_gym.camera.cells import CellTable, sorted_by_cell
+from dorothie_gym.camera.first_person_camera import CameraScene
+from dorothie_gym.camera.ground.town_ground import Ground, build_ground
+from dorothie_gym.camera.lighting import LampMap, lamp_map
+from dorothie_gym.camera.mesh import Mesh, joined
+from dorothie_gym.camera.models.model_bank import model_bank
+from dorothie_gym.camera.scenery.clearance import Lot
+from dorothie_gym.camera.scenery.landmarks import build_landmarks
+from dorothie_gym.camera.scenery.signals import Lenses
+from dorothie_gym.camera.scenery.town_scenery import build_scenery
+from dorothie_gym.copying import shared
+from dorothie_gym.maps.town import Town
+from dorothie_gym.maps.traffic_lights import LightProgramme
+from dorothie_gym.rendering.map_layers import MapLayers
+from dorothie_gym.tasks import Landmark
+
+
+@shared
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TownScene:
+    """What stands in a town in every session.
+
+    Attributes:
+        ground: ground alone, for heights; its mesh is a part of `mesh`.
+        mesh: ground and scenery, sorted by cell.
+        cells: of the mesh.
+        signals: lights and signs; the lenses show another state in each session.
+        lenses: triangles of `signals` that show the state of traffic lights.
+        lamps: light of street lamps.
+        lots: ground reserved for the landmarks of the sites, by their ids.
+        programmes: of the traffic lights.
+    """
+
+    ground: Ground
+    mesh: Mesh
+    cells: CellTable
+    signals: Mesh
+    lenses: Lenses
+    lamps: LampMap
+    lots: tuple[Lot, ...]
+    programmes: tuple[LightProgramme, ...]
+
+    @property
+    def nbytes(self) -> int:
+        """Size of all arrays [bytes]."""
+        parts = (self.mesh, self.cells, self.ground.mesh, self.ground.arrays, self.signals, self.lenses, self.lamps)
+        return sum(array.nbytes for part in parts for array in part)
+
+
+def build_town_scene(town: Town) -> TownScene:
+    """Returns the scene of a town; it depends on the town and its name only."""
+    ground = build_ground(town)
+    scenery = build_scenery(MapLayers(town), ground)
+    mesh, cells, _ = sorted_by_cell(joined([ground.mesh, scenery.mesh]))
+    return TownScene(
+        ground=ground,
+        mesh=mesh,
+        cells=cells,
+        signals=scenery.signals,
+        lenses=scenery.lenses,
+        lamps=lamp_map(scenery.lights.astype(np.float64)),
+        lots=scenery.lots,
+        programmes=tuple(town.programmes),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SessionScene:
+    """What a session adds to the scene of its town: the names of its streets, and its landmarks.
+
+    Attributes:
+        town: what stands in every session.
+        street_names: on the blades, by the indices of the streets.
+        landmarks: of the session.
+    """
+
+    town: TownScene
+    street_names: Sequence[str] = field(default=())
+    landmarks: Sequence[Landmark] = field(default=())
+
+    @cached_property
+    def camera_scene(self) -> CameraScene:
+        """What a camera needs besides the overlay."""
+        town = self.town
+        return CameraScene(
+            town=town.mesh, cells=town.cells, ground=town.ground.arrays, lamps=town.lamps, bank=model_bank(),
+            atlas=with_street_names(town_atlas(), self.street_names),
+        )  # fmt: skip
+
+    @cached_property
+    def overlay(self) -> Mesh:
+        """Signals and landmarks; the rows of signals come first."""
+        town = self.town
+        return joined([town.signals, build_landmarks(self.landmarks, town.lots, town.ground)])
+
+
+def lens_rows(lenses: Lenses, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Returns the triangles of some lenses."""
+    parts = [np.arange(first, last) for first, last in lenses.ranges[chosen].tolist()]
+    return np.concatenate([np.zeros(0, np.int64), *parts]).astype(np.int64)
