@@ -20,8 +20,7 @@ from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
 
 _EMISSIVE, _GLASS, _LEAF = int(Surface.EMISSIVE), int(Surface.GLASS), int(Surface.LEAF)
-_GLOW = (1.0, 0.86, 0.62)  # colour of lit windows
-_WINDOW = 0.8  # brightness of lit windows
+_GLOW = (0.8, 0.69, 0.5)  # factors of the light of lit windows
 
 
 @by_reference
@@ -36,7 +35,7 @@ class Face(NamedTuple):
         v: (4,) the other one.
         along: (3,) change of u and v per metre along the longer side of footprints, texels per metre along the shorter.
         sun: (2,) share of direct light, height by which casters must be higher [m].
-        kind: (3,) texture, surface, whether the texture is that of a lit sign.
+        kind: (2,) texture, surface.
     """
 
     plane: Array
@@ -52,7 +51,7 @@ class Face(NamedTuple):
 def new_face() -> Face:
     """Returns scratch space."""
     return Face(
-        np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(4), np.zeros(4), np.zeros(3), np.zeros(2), np.zeros(3, np.int64)
+        np.zeros(4), np.zeros(3), np.zeros(3), np.zeros(4), np.zeros(4), np.zeros(3), np.zeros(2), np.zeros(2, np.int64)
     )
 
 
@@ -64,7 +63,6 @@ def read_face(view: View, optics: Optics, mesh: Mesh, row: int, textures: Textur
     for k in range(3):
         normal[k], face.colour[k] = mesh.normals[row, k], mesh.colours[row, k]
     face.kind[0], face.kind[1] = mesh.textures[row], mesh.surfaces[row]
-    face.kind[2] = textures.signs[face.kind[0]]
     cosine = normal[0] * optics.sun_x + normal[1] * optics.sun_y + normal[2] * optics.sun_z
     face.sun[0] = 0.35 + 0.5 * cosine if face.kind[1] & _LEAF else cosine
     # the surface itself rises from square to square of the map
@@ -162,14 +160,10 @@ def _lit(
     if optics.lamps > 0.0:
         lamp += lamp_light(lamps, optics.x + dx, optics.y + dy) * optics.lamps * 0.6
     ambient = 0.78 + 0.22 * face.normal[2]
-    glow, is_sign = own * optics.lamps, face.kind[2] != 0
-    r = red * (optics.sky_r * ambient + optics.sun_r * lit + lamp * WARM[0]) + _own_light(red, glow, _GLOW[0], is_sign)
-    g = green * (optics.sky_g * ambient + optics.sun_g * lit + lamp * WARM[1]) + _own_light(
-        green, glow, _GLOW[1], is_sign
-    )
-    b = blue * (optics.sky_b * ambient + optics.sun_b * lit + lamp * WARM[2]) + _own_light(
-        blue, glow, _GLOW[2], is_sign
-    )
+    glow = own * optics.lamps
+    r = red * (optics.sky_r * ambient + optics.sun_r * lit + lamp * WARM[0]) + glow * _GLOW[0]
+    g = green * (optics.sky_g * ambient + optics.sun_g * lit + lamp * WARM[1]) + glow * _GLOW[1]
+    b = blue * (optics.sky_b * ambient + optics.sun_b * lit + lamp * WARM[2]) + glow * _GLOW[2]
     if face.kind[1] & _GLASS:
         slant = -toward / math.sqrt(1.0 + right * right + up * up)
         share, sky, street = _mirror(face.normal[2], dz, slant, depth)
@@ -177,12 +171,6 @@ def _lit(
         g += (optics.horizon_g * sky + optics.sky_g * street - g) * share
         b += (optics.horizon_b * sky + optics.sky_b * street - b) * share
     return r, g, b
-
-
-@inlined
-def _own_light(colour: float, glow: float, warm: float, is_sign: bool) -> float:
-    """Returns the own light of a lit sign, which keeps its colour, or of a lit window, which is dark by day."""
-    return colour * (1.0 / 255.0) * glow if is_sign else warm * _WINDOW * glow
 
 
 @inlined

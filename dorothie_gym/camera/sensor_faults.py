@@ -42,7 +42,7 @@ def blur(picture: NDArray[np.uint8], channel: int, radius: int, scratch: NDArray
                 scratch[k] = picture[line, k, channel] if axis == 0 else picture[k, line, channel]
             total = 0
             for k in range(-radius, radius + 1):
-                total += scratch[min(max(k, 0), length - 1)]
+                total += int(scratch[min(max(k, 0), length - 1)])
             for k in range(length):
                 mean = (total + radius) // (2 * radius + 1)
                 if axis == 0:

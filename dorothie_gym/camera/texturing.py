@@ -23,20 +23,16 @@ class Textures(NamedTuple):
     Attributes:
         texels: (m,) uint32: red in the lowest byte, then green, blue and own light.
         table: see `AtlasArrays`.
-        signs: (k,) whether a texture gives off light everywhere, in its own colours; lit windows are warm.
     """
 
     texels: NDArray[np.uint32]
     table: NDArray[np.int32]
-    signs: NDArray[np.bool_]
 
 
 def textures_of(atlas: AtlasArrays) -> Textures:
     """Returns the textures of an atlas, without a copy on machines whose lowest byte comes first."""
     texels = np.ascontiguousarray(atlas.texels).view(np.uint32).reshape(-1)
-    own = [atlas.texels[first : first + width * height, 3] for first, width, height, _ in atlas.table.tolist()]
-    signs = np.array([light.min() > 0 for light in own], dtype=np.bool_)
-    return Textures(texels if sys.byteorder == "little" else texels.byteswap(), atlas.table, signs)
+    return Textures(texels if sys.byteorder == "little" else texels.byteswap(), atlas.table)
 
 
 @inlined

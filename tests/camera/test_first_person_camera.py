@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -269,6 +274,30 @@ def test_antialiasing_mixes_colours_at_edges_only() -> None:
     assert inside.sum() > 300
     differs = np.abs(smooth - rough).max(axis=-1) > 8
     assert 10 < (differs & inside).sum() < 0.2 * inside.sum()
+
+
+def small_picture() -> str:
+    """Returns the digest of a small picture and its labels."""
+    builder = MeshBuilder()
+    builder.box((12.0, 3.0), 0.2, 3.0, 2.0, 0.0, 2.0, colour=GREY, kind=ObjectClass.BUILDING)
+    builder.panel((8.0, 0.0, 1.5), 0.0, 2.0, 2.0, colour=WHITE, kind=ObjectClass.TRAFFIC_SIGN, texture=HALVES)
+    camera = FirstPersonCamera(scene(builder), replace(CONFIG, width=24, height=16))
+    digest, sky = hashlib.sha256(), weather(precipitation=50.0, sun_altitude_angle=20.0)
+    frame = camera.render(EYE, sky, bodies=placed((10.0, -3.0, 1.0)), head_lights=True, faults=(Sensor.BLUR,), time=2.0)
+    for part in (frame.rgb, frame.depth, frame.semantic, frame.instance):
+        assert part is not None
+        digest.update(part.tobytes())
+    return digest.hexdigest()
+
+
+def test_another_process_without_the_compiler_draws_the_same_bytes() -> None:
+    script = "from tests.camera.test_first_person_camera import small_picture; print(small_picture())"
+    root = Path(__file__).parents[2]
+    run = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script], cwd=root, env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert run.stdout.strip() == small_picture()
 
 
 def test_buffers_stay_small() -> None:
