@@ -131,7 +131,7 @@ class Clearance:
         count = len(options)
         middles = fronts + 0.5 * depth[:, None] * towards
         ground = rectangles(middles, np.full(count, heading), depth, length + 2.0 * BESIDE_LOT)
-        free = _free(ground, self.ways) & _free(ground, self.trees)
+        free = free_of(ground, self.ways) & free_of(ground, self.trees)
         if taken:
             free &= ~shapely.intersects(ground, shapely.MultiPolygon(taken).buffer(1.0))
         chosen = int(np.argmax(free)) if free.any() else count - len(_BEHIND)
@@ -140,15 +140,12 @@ class Clearance:
         return Lot(site.id, site.position, heading, (x, y), float(length[chosen]), float(depth[chosen]))
 
 
-def _free(polygons: NDArray[np.object_], tree: shapely.STRtree) -> NDArray[np.bool_]:
+def free_of(polygons: NDArray[np.object_], tree: shapely.STRtree) -> NDArray[np.bool_]:
     """Returns which polygons (n,) touch none of a tree."""
     free = np.ones(len(polygons), dtype=bool)
     if len(tree):
         free[tree.query(polygons, predicate="intersects")[0]] = False
     return free
-
-
-free_of = _free
 
 
 def _with_view(lot: Lot) -> shapely.Polygon:
