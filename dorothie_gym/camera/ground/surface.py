@@ -29,6 +29,7 @@ BELOW_DECK = 0.3
 
 _SAME = 1e-4  # [m]
 _FOUNDATION = 6.0  # [m] of the walls over mouths of tunnels below the ground before them
+_THICKNESS = 0.02  # [m] of these walls
 _KERB_FACE = 0.4  # [m]; higher faces are walls
 _KERB_COLOUR = (160, 158, 152)
 _WALL_COLOUR = (150, 148, 142)
@@ -148,6 +149,9 @@ def add_faces(builder: MeshBuilder, edges: Edges) -> None:
         # seen from inside a tunnel, whose floor lies below the slopes beside its mouth
         foot[~opening, :, 2] -= _FOUNDATION
         back = np.stack((foot[:, end], top[:, end], top[:, start], foot[:, start]), axis=1)[mouth]
+        way = back[:, 0] - back[:, 3]
+        inwards = np.column_stack((way[:, 1], -way[:, 0])) / np.maximum(np.hypot(*way[:, :2].T), 1e-9)[:, None]
+        back[..., :2] += _THICKNESS * inwards[:, None]
         builder.triangles(back[:, [0, 1, 2]], colour=_WALL_COLOUR, kind=ObjectClass.WALL)
         builder.triangles(back[:, [0, 2, 3]], colour=_WALL_COLOUR, kind=ObjectClass.WALL)
         for chosen, colour, kind in (

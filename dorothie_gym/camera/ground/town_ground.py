@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.base import BaseGeometry
 
 from dorothie_gym.camera.ground.arrays import ground_arrays
@@ -21,6 +21,8 @@ from dorothie_gym.camera.ground.surface import add_faces, add_sheet, find_edges,
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
+
+_SLIVER = 0.05  # [m] width
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +104,28 @@ def _faces(regions: Regions, cover: BaseGeometry, decks: BaseGeometry) -> list[C
     flags[shapely.contains(regions.flat, inside)] = int(Area.FLAT)
     for flag in (Area.COVERED, Area.BELOW):
         flags[shapely.contains(shapes[flag], inside)] |= int(flag)
+    _join_slivers(faces, flags)
     return [
         (flag, only_areas(shapely.union_all(faces[flags == flag])))
         for flag in np.unique(flags).tolist()
         if flag != Area.RAISED
     ]
+
+
+def _join_slivers(faces: NDArray[np.object_], flags: NDArray[np.int64]) -> None:
+    """Gives faces of a few centimetres' width the area of the neighbour with the longest common edge.
+
+    Edges that should coincide differ by the tolerance with which areas are simplified.
+    """
+    lines = shapely.boundary(faces)
+    lengths = shapely.length(lines)
+    thin = shapely.area(faces) < _SLIVER * lengths / 2.0
+    tree = shapely.STRtree(faces)
+    for k in np.flatnonzero(thin).tolist():
+        around = np.sort(tree.query(faces[k], predicate="intersects"))
+        shared = shapely.length(shapely.intersection(lines[k], lines[around]))
+        shared[around == k] = 0.0
+        outside = lengths[k] - shared.sum()  # beyond all faces lies raised ground
+        shared[thin[around]] = 0.0
+        best = int(np.argmax(shared))
+        flags[k] = int(Area.RAISED) if outside > shared[best] else flags[around[best]]

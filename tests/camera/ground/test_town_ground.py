@@ -72,7 +72,7 @@ def test_road_is_as_high_as_its_lanes(name: str) -> None:
     assert away.max() < 0.3
 
 
-@pytest.mark.parametrize("name", TOWNS)
+@pytest.mark.parametrize("name", [*TOWNS, "northgate"])
 def test_nothing_stands_in_the_way_of_a_car(name: str) -> None:
     places, headings = lane_points(town_of(name), 3000)
     eyes = places + [0.0, 0.0, 0.9]
@@ -80,6 +80,10 @@ def test_nothing_stands_in_the_way_of_a_car(name: str) -> None:
     free = distances(ground_of(name).mesh, eyes, ways)
     above = distances(ground_of(name).mesh, eyes, np.tile([0.0, 0.0, 1.0], (len(eyes), 1)))
     assert (free > 1.5).all()
+    aside = np.random.default_rng(4).uniform(-1.0, 1.0, (len(eyes), 1)) * np.stack(
+        (-ways[:, 1], ways[:, 0], 0.0 * ways[:, 0]), axis=-1
+    )
+    assert (distances(ground_of(name).mesh, eyes + aside, ways) > 1.0).all()
     assert above.min() > 2.5  # in tunnels and under bridges
 
 
