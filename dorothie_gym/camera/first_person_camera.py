@@ -124,6 +124,7 @@ class FirstPersonCamera:
             self._canvas, self._face = new_canvas(width, samples), new_face()
             self._shadows = new_shadow_maps(enabled=config.shadows)
             self._scratch = np.zeros(max(width, height), np.uint8)
+            self._light_key: tuple[float, ...] = ()
         if self._labelled:
             self._label_buffer = new_buffer(width, height)
             self._label_orders = self._new_orders(width, height)
@@ -167,7 +168,7 @@ class FirstPersonCamera:
         frame: dict[str, NDArray[np.generic] | Boxes] = {}
         placed = -1
         if self._draws_rgb:
-            light = daylight_of(weather, head_lights=head_lights)
+            light = self._daylight(weather, head_lights)
             placed = self._draw(view.scaled(config.samples), self._buffer, self._orders, bodies, placed)
             self._cast_shadows(pose, light, bodies)
             picture = np.empty((config.height, config.width, 3), np.uint8)
@@ -184,6 +185,13 @@ class FirstPersonCamera:
             self._draw(view, self._label_buffer, self._label_orders, bodies, placed)
             frame.update(self._write_labels(view, bodies))
         return CameraFrame(view, **frame)  # type: ignore[arg-type]  # by the names of the outputs
+
+    def _daylight(self, weather: Weather, head_lights: bool) -> Daylight:
+        """Returns the light of a weather, computed once as long as it stays."""
+        key = *weather.values.values(), head_lights
+        if key != self._light_key:
+            self._light_key, self._light = key, daylight_of(weather, head_lights=head_lights)
+        return self._light
 
     def _draw(
         self,
