@@ -95,7 +95,10 @@ def test_crowns_are_where_and_as_wide_as_on_the_map(name: str) -> None:
     layers = layers_of(name)
     places = tree_places(layers)
     kinds = palette.TREE, palette.COUNTRY_TREE, palette.MEDIAN_TREE
-    assert len(places) == sum(shape.colour in kinds for shape in layers.shapes)
+    drawn = sum(shape.colour in kinds for shape in layers.shapes)
+    assert 0.9 * drawn < len(places) <= drawn
+    lanes = shapely.STRtree([shapely.Polygon(ribbon(lane)).buffer(0.0) for lane in layers.town.lanes])
+    assert not len(lanes.query(shapely.points(places[:, :2]), predicate="intersects")[0])  # others are under a road
     mesh = build_trees(layers, FlatGround())
     crowns = mesh.corners[mesh.surfaces == Surface.LEAF].reshape(-1, 3)[:, :2].astype(float)
     for x, y, radius in places[:: max(1, len(places) // 10)]:

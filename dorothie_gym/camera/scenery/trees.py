@@ -6,6 +6,7 @@ import zlib
 from itertools import pairwise
 
 import numpy as np
+import shapely
 
 from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface, joined
@@ -14,7 +15,7 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.map_layers import MapLayers
-from dorothie_gym.rendering.shapes import disc
+from dorothie_gym.rendering.shapes import disc, ribbon
 
 _KINDS = (palette.TREE, palette.COUNTRY_TREE, palette.MEDIAN_TREE)
 _FORMS = 4
@@ -24,13 +25,18 @@ _BARK = (104, 86, 68)
 
 
 def tree_places(layers: MapLayers) -> Array:
-    """Returns centres and radii of crowns (n, 3) [m] of all trees on a map."""
-    rows = []
-    for shape in layers.shapes:
-        if shape.colour in _KINDS:
-            centre = shape.points.mean(axis=0)
-            rows.append((*centre, np.hypot(*(shape.points - centre).T).max()))
-    return np.array(rows).reshape(-1, 3)
+    """Returns centres and radii of crowns (n, 3) [m] of the trees that a map shows, none of them on a lane."""
+    shapes = layers.shapes
+    trees = np.array([k for k, shape in enumerate(shapes) if shape.colour in _KINDS], dtype=np.int64)
+    centres = np.array([shapes[k].points.mean(axis=0) for k in trees]).reshape(-1, 2)
+    radii = [np.hypot(*(shapes[k].points - centre).T).max() for k, centre in zip(trees, centres, strict=True)]
+    painted = shapely.STRtree([shapely.Polygon(shape.points) for shape in shapes])
+    tree, over = painted.query(shapely.points(centres), predicate="intersects")
+    later = (over > trees[tree]) & ~np.isin(over, trees)
+    lanes = shapely.STRtree([shapely.Polygon(ribbon(lane)).buffer(0.0) for lane in layers.town.lanes])
+    on_lanes = lanes.query(shapely.points(centres), predicate="intersects")[0]
+    shown = np.setdiff1d(np.arange(len(trees)), np.concatenate((tree[later], on_lanes)))
+    return np.asarray(np.column_stack((centres, np.array(radii).reshape(-1)))[shown])
 
 
 def build_trees(layers: MapLayers, ground: Heights) -> Mesh:
