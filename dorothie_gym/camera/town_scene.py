@@ -33,7 +33,7 @@ class TownScene:
     """What stands in a town in every session.
 
     Attributes:
-        ground: ground alone, for heights; its mesh is a part of `mesh`.
+        ground: lookups of heights, materials and colours of the ground.
         mesh: ground and scenery, sorted by cell.
         cells: of the mesh.
         signals: lights and signs; the lenses show another state in each session.
@@ -55,7 +55,7 @@ class TownScene:
     @property
     def nbytes(self) -> int:
         """Size of all arrays [bytes]."""
-        parts = (self.mesh, self.cells, self.ground.mesh, self.ground.arrays, self.signals, self.lenses, self.lamps)
+        parts = (self.mesh, self.cells, self.ground.arrays, self.signals, self.lenses, self.lamps)
         return sum(array.nbytes for part in parts for array in part)
 
 
@@ -65,7 +65,7 @@ def build_town_scene(town: Town) -> TownScene:
     scenery = build_scenery(MapLayers(town), ground)
     mesh, cells, _ = sorted_by_cell(joined([ground.mesh, scenery.mesh]))
     return TownScene(
-        ground=ground,
+        ground=Ground(mesh, ground.arrays),
         mesh=mesh,
         cells=cells,
         signals=scenery.signals,

@@ -296,12 +296,17 @@ def compiler_digest() -> str | None:
     """
     digest = hashlib.sha256(f"format {ARCHIVE_FORMAT}, numpy {np.__version__}".encode())
     digest.update(f"scipy {importlib.metadata.version('scipy')}".encode())
-    sources = sorted(_sources(files("dorothie_gym.maps"), ""))
+    sources = package_sources("dorothie_gym.maps")
     if sources:
         sources.append(("angles.py", Path(angles.__file__).read_bytes()))
     for name, text in sources:
         digest.update(f"{name} {len(text)}\n".encode() + text)
     return digest.hexdigest() if sources else None
+
+
+def package_sources(package: str) -> list[tuple[str, bytes]]:
+    """Returns names and contents of the modules of a package and its parts; nothing if they cannot be read."""
+    return sorted(_sources(files(package), ""))
 
 
 def _sources(folder: Traversable, prefix: str) -> Iterator[tuple[str, bytes]]:
@@ -347,15 +352,19 @@ def _keep(folder: Path, key: str, town: Town) -> None:
     data = pack(town, key)
     try:
         write_signed(folder / f"{key}.npz", data)
-        _prune(folder)
+        remove_oldest(folder, MOST_TOWNS)
     except OSError as error:
         _log.debug("the town %s cannot be kept in %s: %s", town.name, folder, error)
 
 
-def _prune(folder: Path) -> None:
-    """Removes the oldest entries beyond `MOST_TOWNS`, with the temporary files of processes that were killed."""
+def remove_oldest(folder: Path, most: int) -> None:
+    """Removes the oldest archives beyond a number, with the temporary files of processes that were killed.
+
+    Raises:
+        OSError: the folder cannot be read or written.
+    """
     entries = [entry for entry in folder.iterdir() if entry.suffix in (".npz", PART)]
-    if len(entries) > MOST_TOWNS:
+    if len(entries) > most:
         entries.sort(key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
-        for entry in entries[:-MOST_TOWNS]:
+        for entry in entries[:-most]:
             entry.unlink(missing_ok=True)
