@@ -74,16 +74,33 @@ def add_portals(builder: MeshBuilder, edges: Edges) -> None:
         _add_parapets(builder, line if which == 0 else line[:, ::-1])
 
 
-def add_tunnel(
-    builder: MeshBuilder, sheet: Sheet, number: int, field: HeightField, town: Town, cover: BaseGeometry
-) -> None:  # fmt: skip
-    """Adds floor, walls and ceiling of the tunnels."""
-    lanes = footprint(town, [_longer(town, part, _MOUTH) for part in sheet.stretches], _JOINT)
-    closed = shapely.buffer(shapely.buffer(lanes, _GAP / 2.0, join_style="mitre"), -_GAP / 2.0, join_style="mitre")
-    flat = [part.points for part in sheet.polygons if part.material is Material.TUNNEL_FLOOR]
+def tunnel_floor(town: Town, sheets: Sequence[Sheet], cover: BaseGeometry) -> BaseGeometry:
+    """Returns the area of the floors of tunnels below covered ground, up to slightly beyond their mouths."""
+    flat, lanes = [], []
+    for sheet in sheets:
+        if sheet.level < 0:
+            lanes += [_longer(town, part, _MOUTH) for part in sheet.stretches]
+            flat += [part.points for part in sheet.polygons if part.material is Material.TUNNEL_FLOOR]
+    longer = footprint(town, lanes, _JOINT)
+    closed = shapely.buffer(shapely.buffer(longer, _GAP / 2.0, join_style="mitre"), -_GAP / 2.0, join_style="mitre")
     within = shapely.buffer(cover, _OVERLAP, join_style="mitre")
-    area = tidy(only_areas(shapely.intersection(shapely.union_all([closed, *polygons_of(flat)]), within)))
-    floor = _at_height(cut_area(area, _CELL), field, sheet.level)
+    return tidy(only_areas(shapely.intersection(shapely.union_all([closed, *polygons_of(flat)]), within)))
+
+
+def add_tunnel(
+    builder: MeshBuilder, level: int, number: int, field: HeightField, area: BaseGeometry, cover: BaseGeometry
+) -> None:
+    """Adds floor, walls and ceiling of the tunnels.
+
+    Args:
+        builder: receives the triangles.
+        level: of the tunnels.
+        number: of their sheet.
+        field: heights.
+        area: of their floors.
+        cover: area of the ground above.
+    """
+    floor = _at_height(cut_area(area, _CELL), field, level)
     floor.corners[..., 2] -= _SUNK
     add_sheet(builder, floor.corners, number)
     ceiling = floor.corners.copy()

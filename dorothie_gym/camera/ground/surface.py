@@ -129,8 +129,15 @@ def find_edges(triangles: GroundTriangles) -> Edges:
     )
 
 
-def add_faces(builder: MeshBuilder, edges: Edges) -> None:
-    """Adds kerbs and walls: the vertical faces between triangles of different heights, tunnels left open."""
+def add_faces(builder: MeshBuilder, edges: Edges, tunnels: BaseGeometry) -> None:
+    """Adds kerbs and walls: the vertical faces between triangles of different heights.
+
+    Args:
+        builder: receives the triangles.
+        edges: of the ground.
+        tunnels: area of the floors of tunnels, whose mouths are left open.
+    """
+    shapely.prepare(tunnels)
     apart = np.abs(edges.heights[:, 0] - edges.heights[:, 1]).max(axis=1) > _SAME
     places = np.concatenate((edges.ends * GRID, np.zeros((len(edges.ends), 2, 1))), axis=2)
     for rows, above in ((apart & _higher(edges, 0), 0), (apart & _higher(edges, 1), 1)):
@@ -138,6 +145,7 @@ def add_faces(builder: MeshBuilder, edges: Edges) -> None:
         top[..., 2], foot[..., 2] = edges.heights[rows, above], edges.heights[rows, 1 - above]
         kinds = edges.areas[rows]
         opening = (kinds[:, 1 - above] == Area.FLAT) & (kinds[:, above] & Area.COVERED != 0)
+        opening &= shapely.contains_xy(tunnels, *top[..., :2].mean(axis=1).T)
         foot[opening, :, 2] = np.maximum(
             foot[opening, :, 2], np.minimum(foot[opening, :, 2] + PORTAL_HEIGHT, top[opening, :, 2] - ROOF)
         )

@@ -16,7 +16,14 @@ from dorothie_gym.camera.ground.lookup import GroundArrays
 from dorothie_gym.camera.ground.partition import Area, Cut, cut_ground
 from dorothie_gym.camera.ground.regions import GRID, Regions, find_regions, only_areas
 from dorothie_gym.camera.ground.sheets import GROUND_SHEET, town_sheets
-from dorothie_gym.camera.ground.structures import add_bridge, add_portals, add_tunnel, covered_ground, deck_area
+from dorothie_gym.camera.ground.structures import (
+    add_bridge,
+    add_portals,
+    add_tunnel,
+    covered_ground,
+    deck_area,
+    tunnel_floor,
+)
 from dorothie_gym.camera.ground.surface import add_faces, add_sheet, find_edges, lifted
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface
 from dorothie_gym.maps.model import Array
@@ -82,13 +89,14 @@ def build_ground(town: Town) -> Ground:
     edges = find_edges(triangles)
     builder = MeshBuilder()
     add_sheet(builder, triangles.corners, GROUND_SHEET)
-    add_faces(builder, edges)
+    tunnels = tunnel_floor(town, sheets, cover)
+    add_faces(builder, edges, tunnels)
     add_portals(builder, edges)
     for number, sheet in enumerate(sheets):
         if sheet.level > 0:
             add_bridge(builder, sheet, number, field, town, arrays)
         elif sheet.level < 0:
-            add_tunnel(builder, sheet, number, field, town, cover)
+            add_tunnel(builder, sheet.level, number, field, tunnels, cover)
     return Ground(builder.build(), arrays)
 
 
