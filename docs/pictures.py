@@ -21,24 +21,43 @@ from pathlib import Path
 from typing import Any, Final
 
 import environment_pages
+import numpy as np
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from dorothie_gym.bench.report import Report, draw, world_report
+from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.camera.scene_cache import town_scene
+from dorothie_gym.camera.session_camera import SessionCamera
+from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.cli.run import draw_session
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import fold_of, load_town
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.ontology import AGENT_ROLES, LandmarkName, WeatherParameter
 from dorothie_gym.policies import make_policy
 from dorothie_gym.rendering import town_picture
 from dorothie_gym.rollout import play_session
 from dorothie_gym.rollout.closed_loop.leaderboard import CHART_METRICS, PART_TITLES, ChartRow, draw_rows
+from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.sim.weather import Weather
 
 DOCS = Path(__file__).parent
 BENCHMARK = DOCS.parent / "benchmarks" / "results" / "world.json"
 
 FINGERPRINT: Final = "dorothie_gym content"
 """Key of the text in a PNG file with the hash of the content of a chart."""
+
+CLASS_COLOURS: Final = np.array(
+    [
+        (0, 0, 0), (70, 70, 70), (190, 153, 153), (72, 0, 90), (220, 20, 60), (153, 153, 153), (240, 240, 240),
+        (128, 64, 128), (244, 35, 232), (107, 142, 35), (0, 0, 142), (102, 102, 156), (220, 220, 0), (70, 130, 180),
+        (81, 0, 81), (150, 100, 100), (230, 150, 140), (180, 165, 180), (250, 170, 30), (110, 190, 160), (170, 120, 50),
+        (45, 60, 150), (152, 251, 152),
+    ],
+    dtype=np.uint8,
+)  # fmt: skip
+"""Colours of the semantic classes, as in Cityscapes."""
 
 COLOURS: Final = 256
 """Number of colours of the pictures, which keeps their files small."""
@@ -59,6 +78,40 @@ def draw_first_session(path: Path) -> None:
 def draw_midtown(path: Path) -> None:
     """Draws the map that `dorothie-gym towns midtown --picture` draws, in a size for a page."""
     town_picture(load_town("midtown"), path, size=(1400, 1372), fold=fold_of("midtown"))
+    _reduce(path)
+
+
+CAMERA_TOWN, CAMERA_SEED, CAMERA_LANDMARK = "midtown", 3, LandmarkName.IKEA
+
+
+def draw_camera(path: Path) -> None:
+    """Draws a street with a landmark: by day, at night, in rain, and its semantic classes."""
+    engine = SessionEngine(CAMERA_TOWN, config=EnvConfig(world=WorldConfig(vehicles=60, pedestrians=60)))
+    engine.reset(seed=CAMERA_SEED)
+    session = engine.session
+    session.world.step(600)
+    names = [name.label for name in session.scenario.street_names]
+    marks = session.task.storyboard.landmarks
+    scene = SessionScene(town_scene(engine.town), names, marks)
+    camera = SessionCamera(scene, CameraConfig(outputs=(CameraOutput.RGB, CameraOutput.SEMANTIC)))
+    mark = next(mark for mark in marks if mark.name is CAMERA_LANDMARK)
+    lane, station = engine.town.lanes[mark.lane], max(mark.station - 26.0, 0.0)
+    x, y = lane.position(station).tolist()
+    pose = camera.config.pose_on(x, y, lane.height_at(station), lane.heading_at(station))
+    day, night, rain = Weather(), Weather(), Weather()
+    night.set(WeatherParameter.SUN_ALTITUDE_ANGLE, -20.0)
+    for parameter, value in ((WeatherParameter.PRECIPITATION, 60.0), (WeatherParameter.CLOUDINESS, 90.0)):
+        rain.set(parameter, value)
+    frames = [
+        camera.render_from(
+            pose, session.world.actors.arrays, weather, time=session.world.time, head_lights=weather is night
+        )
+        for weather in (day, night, rain)
+    ]
+    pictures = [np.asarray(frame.rgb) for frame in frames]
+    pictures.append(CLASS_COLOURS[np.asarray(frames[0].semantic)])
+    rows = [np.concatenate(pictures[k : k + 2], axis=1) for k in (0, 2)]
+    Image.fromarray(np.concatenate(rows)).save(path)
     _reduce(path)
 
 
@@ -147,6 +200,7 @@ def _reduce(path: Path) -> None:
 PICTURES: Final[Mapping[str, Callable[[Path], None]]] = {
     "session": draw_first_session,
     "midtown": draw_midtown,
+    "camera": draw_camera,
     "bench_world": draw_benchmark,
     "leaderboard": draw_leaderboard,
 }

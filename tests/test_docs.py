@@ -16,6 +16,7 @@ import pytest
 from dorothie_gym.benchmark import metrics_of, read_predictions
 from dorothie_gym.benchmark.features import Batch
 from dorothie_gym.benchmark.predictions import file_schema
+from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.dialogue.grammar import parse_grammar
 from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.maps import describe, load_town
@@ -87,6 +88,23 @@ def test_the_talk_of_its_page_is_worded_misheard_and_read() -> None:
 def test_the_phrases_of_the_talk_page_are_grammar() -> None:
     text = example("talk.md", "text").replace("<soon>", "<soon_enough>")
     assert parse_grammar({**read_talk_files(), "page.talk": text})
+
+
+def test_the_example_of_the_camera_page_takes_a_picture() -> None:
+    names: dict[str, Any] = {}
+    exec(compile(example("camera.md", "python"), "camera.md", "exec"), names)
+    assert names["picture"].shape == (160, 240, 3)
+
+
+def test_the_camera_page_has_the_defaults_of_all_settings() -> None:
+    text = (DOCS / "camera.md").read_text(encoding="utf-8")
+    config = CameraConfig()
+    assert f"| {config.width}, {config.height} | pixels |" in text
+    assert f"| {config.field_of_view:g} | horizontal, degrees |" in text
+    assert f"`{config.mount}`" in text
+    missing = [field.name for field in dataclasses.fields(CameraConfig) if f"`{field.name}`" not in text]
+    missing += [output.name for output in CameraOutput if f"`{output.name}`" not in text]
+    assert missing == []
 
 
 def test_the_predictions_of_their_page_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TypeAlias
 
+from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.copying import shared
 from dorothie_gym.dialogue import WORDS_PER_SECOND
 from dorothie_gym.ontology import Role
@@ -99,6 +100,8 @@ class EnvConfig:
             The Ad-Wizard observes the spoken words.
         world: settings of traffic, pedestrians and sensing.
         rewards: weights of the reward terms.
+        camera: first-person camera on the car, whose pictures the participant and the Co-Wizard observe; None for none.
+            It changes nothing else in a session.
     """
 
     decision_frequency: float = 2.0
@@ -108,6 +111,7 @@ class EnvConfig:
     word_error_rate: float = 0.0
     world: WorldConfig = field(default_factory=WorldConfig)
     rewards: RewardWeights = field(default_factory=RewardWeights)
+    camera: CameraConfig | None = None
 
     def __post_init__(self) -> None:
         frames = FRAME_RATE / self.decision_frequency if self.decision_frequency > 0 else 0.5
@@ -122,8 +126,16 @@ class EnvConfig:
             raise ValueError(f"EnvConfig.words_per_second is {self.words_per_second}; it must be in 0.5..20")
         if not 0.0 <= self.word_error_rate < 1.0:
             raise ValueError(f"EnvConfig.word_error_rate is {self.word_error_rate}; it must be at least 0 and below 1")
+        if self.camera is not None and not isinstance(self.camera, CameraConfig):
+            raise ValueError(f"EnvConfig.camera is a {type(self.camera).__name__}; it must be a CameraConfig or None")
 
     @property
     def frames(self) -> int:
         """Number of physics frames between two decisions."""
         return round(FRAME_RATE / self.decision_frequency)
+
+    def record(self) -> dict[str, object]:
+        """Returns the settings in JSON types, for records; without the camera, which changes nothing in a session."""
+        settings = asdict(self)
+        del settings["camera"]
+        return settings

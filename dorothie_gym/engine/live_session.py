@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from dorothie_gym.engine.dialogue_channel import DialogueChannel
 from dorothie_gym.engine.exception_executor import ExceptionExecutor
 from dorothie_gym.engine.masks import ActionMasks
 from dorothie_gym.engine.observations import DeliveredMessages, ObservationBuilder
+from dorothie_gym.engine.pictures import SessionPictures
 from dorothie_gym.engine.scenario import Scenario, header_of
 from dorothie_gym.engine.session_log import EventLog, SessionSummary, SubgoalCounts, SubgoalTracker
 from dorothie_gym.engine.session_views import SessionViews
@@ -39,6 +40,9 @@ from dorothie_gym.spaces import (
     SpaceLimits,
 )
 from dorothie_gym.tasks import TaskState
+
+if TYPE_CHECKING:
+    from dorothie_gym.camera.first_person_camera import CameraFrame
 
 _INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
@@ -122,6 +126,7 @@ class LiveSession:
         self._end_reason = ""
         self._infractions: dict[str, int] | None = None
         self._delivered = self._deliver("")
+        self._pictures = None if config.camera is None else SessionPictures(self.world, scenario, config.camera)
 
     # made when they are first used: not all sessions observe by dicts, or ask for masks
 
@@ -184,7 +189,15 @@ class LiveSession:
 
     def observations(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
         """Builds the observations of some roles, by agent; what several of them need is computed once."""
-        return self._observations.build(self._delivered, roles)
+        observations = self._observations.build(self._delivered, roles)
+        if self._pictures is not None:
+            self._pictures.add_to(observations, self.decisions)
+        return observations
+
+    @property
+    def picture(self) -> CameraFrame | None:
+        """Picture of the camera on the car at the present decision, boxes included; None without a camera."""
+        return None if self._pictures is None else self._pictures.frame(self.decisions)
 
     def end(self, reason: str) -> None:
         """Closes the session."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
@@ -163,5 +163,5 @@ def header_of(scenario: Scenario, town: str, config: EnvConfig) -> SessionHeader
         ],
         story=storyboard.story,
         departure=scenario.departure,
-        config=asdict(config),
+        config=config.record(),
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.copying import Restorable
@@ -14,6 +15,7 @@ from dorothie_gym.engine.config import EnvConfig, RewardTerms
 from dorothie_gym.engine.live_session import LiveSession, StepBegun
 from dorothie_gym.engine.masks import RoleMask
 from dorothie_gym.engine.observations import LazyObservations
+from dorothie_gym.engine.pictures import OBSERVERS, picture_spaces
 from dorothie_gym.engine.scenario import Scenario, draw_scenario, template_option
 from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.maps import Town, load_town
@@ -27,6 +29,7 @@ from dorothie_gym.spaces import (
     RoleAction,
     SpaceLimits,
     StepInfo,
+    observation_space,
 )
 from dorothie_gym.tasks import StoryboardTemplate
 
@@ -191,6 +194,13 @@ class SessionEngine(Restorable):
         if self._session is None:
             raise RuntimeError("call reset() first")
         return self._session
+
+    def observation_space(self, role: Role) -> spaces.Dict:
+        """Returns the observation space of a role, with the pictures of the camera if there is one."""
+        space = observation_space(role, self.limits, self.config.observe_acts)
+        if self.config.camera is None or role not in OBSERVERS:
+            return space
+        return spaces.Dict({**space.spaces, **picture_spaces(self.config.camera)})
 
     @property
     def observations(self) -> LazyObservations:

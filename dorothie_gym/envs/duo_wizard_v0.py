@@ -30,7 +30,6 @@ from dorothie_gym.spaces import (
     SpaceLimits,
     StepInfo,
     action_space,
-    observation_space,
 )
 from dorothie_gym.tasks import StoryboardTemplate
 
@@ -102,9 +101,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         self.render_mode, self._view = render_mode, SessionView(render_mode, frames_per_second=rate)
         self.possible_agents = [str(role) for role in AGENT_ROLES]
         self.agents: list[str] = []
-        self.observation_spaces = {
-            str(role): deepcopy(observation_space(role, self.limits, self.config.observe_acts)) for role in AGENT_ROLES
-        }
+        self.observation_spaces = {str(role): deepcopy(self.engine.observation_space(role)) for role in AGENT_ROLES}
         self.action_spaces = {str(role): deepcopy(action_space(role, self.limits)) for role in AGENT_ROLES}
 
     # --- PettingZoo -------------------------------------------------------------------------------------------------

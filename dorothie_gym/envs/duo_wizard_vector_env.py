@@ -86,7 +86,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
             num_envs: number of environments.
             town: a town as in `DuoWizardEnv`, or several that the environments play in turn.
             storyboard: as in `DuoWizardEnv`.
-            config: as in `DuoWizardEnv`.
+            config: as in `DuoWizardEnv`, without a camera.
             render_mode: None or "rgb_array".
             max_cycles: as in `DuoWizardEnv`.
             threads: number of threads; None for one per processor.
@@ -95,6 +95,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         Raises:
             ValueError: an argument is out of its range.
         """
+        if config is not None and config.camera is not None:
+            raise ValueError("config.camera is set; batches have no cameras: make single environments for them")
         super().__init__(num_envs, town, config or EnvConfig(), render_mode, threads, autoreset_mode)
         rate = self.config.decision_frequency
         self.metadata = {**self.metadata, "render_fps": metadata_at(rate)["render_fps"]}

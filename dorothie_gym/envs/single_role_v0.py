@@ -20,7 +20,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, StepInfo, action_space, noop, observation_space
+from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, StepInfo, action_space, noop
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
@@ -87,7 +87,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         self.metadata = metadata_at(rate)
         self.render_mode, self._view = render_mode, SessionView.of_role(self.role, view, render_mode, rate)
         limits = self.engine.limits
-        self.observation_space = deepcopy(observation_space(self.role, limits, self.engine.config.observe_acts))
+        self.observation_space = deepcopy(self.engine.observation_space(self.role))
         self.action_space = deepcopy(action_space(self.role, limits))
         self.partners = self._cast(partners or {})
         self._observing = (self.role, *(role for role, policy in self.partners.items() if policy.observes))

@@ -9,7 +9,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
 
 from rich.console import Console
@@ -50,7 +49,7 @@ def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: Env
     """
     config = CONFIG if config is None else config
     sessions = SESSIONS if sessions is None else sessions
-    key = {"format": FORMAT_VERSION, "sessions": sessions, "seed": seed, "config": asdict(config)}
+    key = {"format": FORMAT_VERSION, "sessions": sessions, "seed": seed, "config": config.record()}
     digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:12]
     cache = cache_folder()
     if cache is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -141,7 +141,7 @@ def generate_corpus(
     plans, root, config = plan_corpus(sessions, seed), Path(root), config or EnvConfig()
     job = SessionJob(
         settings_file=GENERATION_FILE,
-        settings={"sessions": sessions, "seed": seed, "config": asdict(config)},
+        settings={"sessions": sessions, "seed": seed, "config": config.record()},
         config=config,
         cast=ALL_SCRIPTED,
         evaluate=_manifest_row,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -101,7 +101,7 @@ class RolloutSettings:
             "towns": list(self.towns),
             "sessions_planned": self.sessions,
             "seed": self.seed,
-            "config": asdict(self.config),
+            "config": self.config.record(),
         }
 
 

@@ -1,0 +1,86 @@
+"""Pictures of the camera on the car as parts of observations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import numpy as np
+from gymnasium import spaces
+
+from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.copying import Lookups
+from dorothie_gym.engine.scenario import Scenario
+from dorothie_gym.ontology import Role
+from dorothie_gym.sim.world import World
+from dorothie_gym.spaces import Observation
+
+if TYPE_CHECKING:
+    from dorothie_gym.camera.first_person_camera import CameraFrame
+    from dorothie_gym.camera.session_camera import SessionCamera
+
+OBSERVERS: Final = (Role.PARTICIPANT, Role.CO_WIZARD)
+"""Roles that look through the windscreen."""
+
+FIELDS: Final[Mapping[CameraOutput, str]] = {
+    CameraOutput.RGB: "camera",
+    CameraOutput.DEPTH: "depth",
+    CameraOutput.SEMANTIC: "semantic",
+    CameraOutput.INSTANCE: "instance",
+}
+"""Field of the observation for each part of a picture; boxes are in `LiveSession.picture` only."""
+
+
+def picture_spaces(config: CameraConfig) -> dict[str, spaces.Box]:
+    """Returns the spaces of the fields that a camera adds to an observation."""
+    size, keys = (config.height, config.width), np.iinfo(np.int32)
+    boxes: dict[CameraOutput, spaces.Box] = {
+        CameraOutput.RGB: spaces.Box(0, 255, (*size, 3), np.uint8),
+        CameraOutput.DEPTH: spaces.Box(0.0, np.inf, size, np.float32),
+        CameraOutput.SEMANTIC: spaces.Box(0, 255, size, np.uint8),
+        CameraOutput.INSTANCE: spaces.Box(int(keys.min), int(keys.max), size, np.int32),
+    }
+    return {FIELDS[output]: boxes[output] for output in config.outputs if output in boxes}
+
+
+class SessionPictures(Lookups):
+    """Pictures of a session; each is drawn when it is first asked for.
+
+    Pictures follow from the state of the world: copies of a session draw their own.
+    """
+
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_camera", "_taken")
+
+    _taken: tuple[int, CameraFrame] | None = None
+
+    def __init__(self, world: World, scenario: Scenario, config: CameraConfig) -> None:
+        self._world, self._scenario, self._config = world, scenario, config
+
+    @cached_property
+    def _camera(self) -> SessionCamera:
+        # imported here: most sessions have no camera
+        from dorothie_gym.camera.scene_cache import town_scene
+        from dorothie_gym.camera.session_camera import SessionCamera
+        from dorothie_gym.camera.town_scene import SessionScene
+
+        names = [name.label for name in self._scenario.street_names]
+        scene = SessionScene(town_scene(self._world.town), names, self._scenario.storyboard.landmarks)
+        return SessionCamera(scene, self._config)
+
+    def frame(self, decision: int) -> CameraFrame:
+        """Returns the picture at the present decision, of this number."""
+        if self._taken is None or self._taken[0] != decision:
+            self._taken = decision, self._camera.render(self._world)
+        return self._taken[1]
+
+    def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
+        """Adds the pictures of the present decision to the observations of the roles that see them."""
+        for role in OBSERVERS:
+            if role in observations:
+                observations[role].update(self._fields(decision))
+
+    def _fields(self, decision: int) -> dict[str, Any]:
+        frame = self.frame(decision)
+        parts = {FIELDS[output]: getattr(frame, output.value) for output in self._config.outputs if output in FIELDS}
+        return {name: part.copy() for name, part in parts.items()}
