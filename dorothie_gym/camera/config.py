@@ -50,7 +50,7 @@ class CameraMount:
             ("pitch", -60.0, 60.0, "degrees"),
         ):
             value = getattr(self, name)
-            if not low <= value <= high:
+            if not (isinstance(value, float | int) and low <= value <= high):
                 raise ValueError(f"CameraMount.{name} is {value}; it must be in {low:g}..{high:g} {unit}")
 
 
@@ -85,8 +85,17 @@ class CameraConfig:
             value = getattr(self, name)
             if not isinstance(value, int) or not 8 <= value <= 4096:
                 raise ValueError(f"CameraConfig.{name} is {value}; it must be a whole number in 8..4096 pixels")
-        if not 10.0 <= self.field_of_view <= 150.0:
+        if not (isinstance(self.field_of_view, float | int) and 10.0 <= self.field_of_view <= 150.0):
             raise ValueError(f"CameraConfig.field_of_view is {self.field_of_view}; it must be in 10..150 degrees")
+        if not isinstance(self.mount, CameraMount):
+            raise ValueError(f"CameraConfig.mount is a {type(self.mount).__name__}; it must be a CameraMount")
+        for name in ("antialiasing", "shadows"):
+            if not isinstance(getattr(self, name), bool):
+                raise ValueError(f"CameraConfig.{name} is {getattr(self, name)!r}; it must be True or False")
+        if not isinstance(self.outputs, tuple):
+            raise ValueError(
+                f"CameraConfig.outputs is a {type(self.outputs).__name__}; it must be a tuple of CameraOutput"
+            )
         known = [output.value for output in CameraOutput]
         for output in self.outputs:
             if output not in known:

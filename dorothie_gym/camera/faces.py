@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.camera.labels import plane_of
-from dorothie_gym.camera.lighting import WARM, LampMap, clearness, head_light, lamp_light
+from dorothie_gym.camera.lighting import WARM, LampMap, head_light, lamp_light, through_air
 from dorothie_gym.camera.mesh import PLAIN, Mesh, Surface
 from dorothie_gym.camera.optics import Optics, ray
 from dorothie_gym.camera.pose import View
@@ -117,12 +117,7 @@ def solid_colour(
         red, green, blue = red * r * (1.0 / 255.0), green * g * (1.0 / 255.0), blue * b * (1.0 / 255.0)
     if not face.kind[1] & _EMISSIVE:
         red, green, blue = _lit(optics, face, right, up, depth, toward, lamps, shadows, red, green, blue, own)
-    clear = clearness(optics, depth, right, up)
-    return (
-        optics.air_r + (red - optics.air_r) * clear,
-        optics.air_g + (green - optics.air_g) * clear,
-        optics.air_b + (blue - optics.air_b) * clear,
-    )
+    return through_air(optics, red, green, blue, depth, right, up)
 
 
 @inlined

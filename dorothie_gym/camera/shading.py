@@ -17,7 +17,7 @@ from dorothie_gym.camera.faces import Face, read_face, solid_colour
 from dorothie_gym.camera.ground.colours import colour_at
 from dorothie_gym.camera.ground.lookup import GroundArrays
 from dorothie_gym.camera.labels import mesh_of, row_in
-from dorothie_gym.camera.lighting import WARM, LampMap, clearness, head_light, lamp_light, mirrored_share
+from dorothie_gym.camera.lighting import WARM, LampMap, head_light, lamp_light, mirrored_share, through_air
 from dorothie_gym.camera.mesh import PLAIN, Mesh, Surface
 from dorothie_gym.camera.optics import Optics, ray
 from dorothie_gym.camera.pose import View
@@ -295,12 +295,7 @@ def _ground_colour(
             red * dark + optics.horizon_r * share, green * dark + optics.horizon_g * share,
             blue * dark + optics.horizon_b * share,
         )  # fmt: skip
-    clear = clearness(optics, depth, right, up)
-    return (
-        optics.air_r + (red - optics.air_r) * clear,
-        optics.air_g + (green - optics.air_g) * clear,
-        optics.air_b + (blue - optics.air_b) * clear,
-    )
+    return through_air(optics, red, green, blue, depth, right, up)
 
 
 @compiled

@@ -114,3 +114,19 @@ def test_batches_refuse_a_camera() -> None:
 def test_a_camera_that_is_none_is_refused_with_its_type() -> None:
     with pytest.raises(ValueError, match=r"EnvConfig\.camera is a dict; it must be a CameraConfig or None"):
         EnvConfig(camera={"width": 84})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"width": 3}, r"CameraConfig\.width is 3; it must be a whole number in 8\.\.4096 pixels"),
+        ({"field_of_view": "wide"}, r"CameraConfig\.field_of_view is wide; it must be in 10\.\.150 degrees"),
+        ({"mount": (1, 2)}, r"CameraConfig\.mount is a tuple; it must be a CameraMount"),
+        ({"antialiasing": 3}, r"CameraConfig\.antialiasing is 3; it must be True or False"),
+        ({"outputs": "rgb"}, r"CameraConfig\.outputs is a str; it must be a tuple"),
+        ({"outputs": ("smell",)}, r"CameraConfig\.outputs contains 'smell'; it must be of rgb, depth"),
+    ],
+)
+def test_settings_that_no_camera_has_are_refused(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        CameraConfig(**settings)
