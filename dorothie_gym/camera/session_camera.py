@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,9 @@ from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import Sensor, WeatherParameter
+from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Colour
-from dorothie_gym.sim.state.world_arrays import CAR_KEY, WorldArrays
+from dorothie_gym.sim.state.world_arrays import CAR_KEY
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import World
 
@@ -35,6 +37,25 @@ _LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # precipitation and density of fog
 _COLOURS = {LightColour.GREEN: Colour.GREEN, LightColour.YELLOW: Colour.YELLOW, LightColour.RED: Colour.RED}
 _RAISED = np.array([LOOKS[material].relief in (Relief.RAISED, Relief.SLOPE) for material in Material])
 _FIRST_LIFTED, _FIRST_LEFT, _NOTHING = FIRST_PERSON, FIRST_PROP, int(Material.NOTHING)
+
+
+class Bodies(Protocol):
+    """Bodies of a world, such as its arrays."""
+
+    @property
+    def vehicles(self) -> RecordArray[VehicleRecord]:
+        """Cars and cyclists; rows of the kind `Kind.EMPTY` are free."""
+        ...
+
+    @property
+    def pedestrians(self) -> RecordArray[PedestrianRecord]:
+        """People on foot; rows of the state `Walk.EMPTY` are free."""
+        ...
+
+    @property
+    def props(self) -> RecordArray[PropRecord]:
+        """Things on the road; rows that are not present are free."""
+        ...
 
 
 class SessionCamera:
@@ -64,53 +85,58 @@ class SessionCamera:
     def render_from(
         self,
         pose: CameraPose,
-        arrays: WorldArrays,
+        bodies: Bodies,
         weather: Weather,
         *,
         time: float,
         head_lights: bool = False,
         faults: Collection[Sensor] = (),
         own: int = CAR_KEY,
+        traffic_lights: Mapping[int, LightColour] | None = None,
     ) -> CameraFrame:
         """Returns the picture from a pose.
 
         Args:
             pose: of the camera.
-            arrays: bodies of a world.
+            bodies: of a world.
             weather: weather and light.
-            time: simulated time, of which the traffic lights are a function [s].
+            time: simulated time [s].
             head_lights: whether the lights of the car are on.
             faults: faulty sensors.
             own: key of the vehicle that carries the camera, which it does not see.
+            traffic_lights: their states by signal, dark where missing; by default those of their programmes.
         """
-        self._show_lights(time)
-        bodies = self._bodies(pose, arrays, own, drives_with_lights(weather))
+        self._show_lights(self._programmed_lights(time) if traffic_lights is None else traffic_lights)
+        placed = self._place(pose, bodies, own, drives_with_lights(weather))
         return self.camera.render(
-            pose, weather, bodies=bodies, time=time, head_lights=head_lights, faults=frozenset(faults)
+            pose, weather, bodies=placed, time=time, head_lights=head_lights, faults=frozenset(faults)
         )
 
-    def _bodies(self, pose: CameraPose, arrays: WorldArrays, own: int, lights: bool) -> RecordArray[PlacementRecord]:
-        room = len(arrays.vehicles) + len(arrays.pedestrians) + len(arrays.props)
+    def _place(self, pose: CameraPose, bodies: Bodies, own: int, lights: bool) -> RecordArray[PlacementRecord]:
+        room = len(bodies.vehicles) + len(bodies.pedestrians) + len(bodies.props)
         if room > len(self._placed):
             self._placed = empty_records(PlacementRecord, room)
         placed = argument(self._placed)
         count = place_bodies(
-            argument(arrays.vehicles), argument(arrays.pedestrians), argument(arrays.props),
+            argument(bodies.vehicles), argument(bodies.pedestrians), argument(bodies.props),
             np.array([pose.x, pose.y]), REACH, own, lights, placed,
         )  # fmt: skip
         _lift(self.scene.town.ground.arrays, placed, count)
         return self._placed[:count]
 
-    def _show_lights(self, time: float) -> None:
-        """Paints the lenses in the colours of the traffic lights, if one has changed."""
-        town, lenses = self.scene.town, self.scene.town.lenses
-        if not len(lenses.signals):
-            return
-        colours = {
-            signal: _COLOURS[programme.colour(signal, time)]
-            for programme in town.programmes
+    def _programmed_lights(self, time: float) -> dict[int, LightColour]:
+        return {
+            signal: programme.colour(signal, time)
+            for programme in self.scene.town.programmes
             for signal in programme.signals
         }
+
+    def _show_lights(self, states: Mapping[int, LightColour]) -> None:
+        """Paints the lenses in the colours of the traffic lights, if one has changed."""
+        lenses = self.scene.town.lenses
+        if not len(lenses.signals):
+            return
+        colours = {signal: int(_COLOURS[state]) for signal, state in states.items()}
         shown = np.array([colours.get(signal, -1) for signal in lenses.signals.tolist()], dtype=np.int64)
         if self._shown is not None and np.array_equal(shown, self._shown):
             return

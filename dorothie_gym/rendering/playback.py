@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, PhysicalAction, Role, parse_landmark
 from dorothie_gym.recording import FRAME_RATE, ActorKind, EventType, Session
+from dorothie_gym.recording.actor_tracks import ActorTracks
 from dorothie_gym.recording.header import LandmarkRow
 from dorothie_gym.rendering.exception_words import exception_words
 from dorothie_gym.rendering.scene import Actor, CarView, ExceptionMark, FigureKind, Pin, Scene, SpokenLine, SubgoalState
@@ -44,6 +44,7 @@ class Playback:
     def __init__(self, session: Session, town: Town) -> None:
         self._session, self._town = session, town
         self._lines = _lines(session)
+        self._tracks = ActorTracks(session.scene.actors)
         self._labels = map_labels([parse_landmark(row["name"]) for row in session.header.landmarks])
         self._waypoints = [_waypoint(row, town) for row in session.header.landmarks]
         self._exceptions = [
@@ -135,16 +136,7 @@ class Playback:
 
     def _others(self, frame: int) -> list[Actor]:
         """Returns the actors at a frame, interpolated between recorded positions."""
-        table = self._session.scene.actors
-        k = int(np.searchsorted(table.frames, frame, side="right")) - 1
-        if k < 0:
-            return []
-        here = table.rows[table.offsets[k] : table.offsets[k + 1]]
-        share, after = 0.0, {}
-        if k + 1 < len(table):
-            share = (frame - int(table.frames[k])) / int(table.frames[k + 1] - table.frames[k])
-            after = {int(row["key"]): row for row in table.rows[table.offsets[k + 1] : table.offsets[k + 2]]}
-        return [_actor(row, after.get(int(row["key"]), row), share) for row in here]
+        return [_actor(row) for row in self._tracks.actors(self._tracks.at(frame))]
 
     def _goals(self, frame: int) -> dict[int, tuple[str, SubgoalState]]:
         """Returns description and state of the active subgoals at a frame, by number."""
@@ -185,13 +177,12 @@ class Playback:
         return notes + [f"Sensor fault: {sensor}" for sensor, on in faults.items() if on]
 
 
-def _actor(row: np.void, after: np.void, share: float) -> Actor:
-    turn = wrap_radians(float(after["heading"] - row["heading"]))
+def _actor(row: np.void) -> Actor:
     return Actor(
         kind=_KINDS[int(row["kind"])],
-        x=float(row["x"] + share * (after["x"] - row["x"])),
-        y=float(row["y"] + share * (after["y"] - row["y"])),
-        heading=float(row["heading"]) + share * turn,
+        x=float(row["x"]),
+        y=float(row["y"]),
+        heading=float(row["heading"]),
         length=float(row["length"]),
         width=float(row["width"]),
     )
