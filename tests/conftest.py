@@ -9,6 +9,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import pytest
 from hypothesis import settings
 
 from dorothie_gym.compilation import compiled_folder
+from dorothie_gym.engine import camera_warm_up as camera
 from dorothie_gym.engine.warm_up import is_warm
 from dorothie_gym.envs import warm_up as navigation
 from dorothie_gym.user_cache import CACHE_VARIABLE
@@ -34,17 +36,27 @@ UNCOMPILED = frozenset(
 SESSIONS = frozenset(["benchmark", "engine", "recording", "rendering", "rollout", "test_routing.py"])
 """Folders and files whose tests step sessions; those of all others may step batches, too."""
 
+PICTURES = "camera", "picture", "video", "film"
+"""Words in the names of folders and files whose tests draw first-person pictures, besides sessions."""
+
 COMPILE = """
 import os, subprocess, sys
 from dorothie_gym.engine.warm_up import warm_up
 warm_up()
 os.close(int(sys.argv[1]))
-if sys.argv[2:]:
+if "2" in sys.argv[4:]:
     batches = "from dorothie_gym.envs.warm_up import warm_up; warm_up()"
     with subprocess.Popen([sys.executable, "-c", batches]):
         warm_up(everything=True)
+os.close(int(sys.argv[2]))
+if "3" in sys.argv[4:]:
+    from dorothie_gym.engine.camera_warm_up import warm_up
+    warm_up()
 """
-"""Program that compiles sessions, gives the first lock back, and compiles batches if it is asked to."""
+"""Program that compiles sessions, then batches, then the camera, and gives a lock back after each.
+
+Arguments: the locks, and the stages that are needed.
+"""
 
 _COMPILER = pytest.StashKey[subprocess.Popen[bytes]]()
 _COMPILED = pytest.StashKey[set[int]]()
@@ -89,22 +101,28 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Starts to compile what the tests need and is not in the cache: in one process, also for parallel workers.
 
-    The process holds a lock until sessions are compiled, and one until batches are.
+    The process holds a lock for each stage, until that is compiled.
     """
-    last = max(map(_stage, session.items), default=0)
-    warm = is_warm(everything=last > 1) and (navigation.is_warm() or last < 2)
+    stages = {_stage(item) for item in session.items} - {0}
+    warm = all(_is_warm(stage) for stage in stages)
     first = os.environ.get("PYTEST_XDIST_WORKER", "gw0") == "gw0" and not session.config.option.collectonly
-    if last == 0 or warm or not first or compiled_folder() is None:
+    if warm or not first or compiled_folder() is None:
         return
-    with _lock(1).open("w") as one, _lock(2).open("w") as two:
-        locks = [one.fileno(), two.fileno()]
+    with ExitStack() as stack:
+        locks = [stack.enter_context(_lock(stage).open("w")).fileno() for stage in (1, 2, 3)]
         for lock in locks:
             fcntl.flock(lock, fcntl.LOCK_EX)
         session.config.stash[_COMPILER] = subprocess.Popen(
-            [sys.executable, "-c", COMPILE, str(locks[0]), *["batches"][: last - 1]],
+            [sys.executable, "-c", COMPILE, *map(str, locks), *map(str, stages)],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(entry or os.getcwd() for entry in sys.path)},
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, pass_fds=locks,
         )  # fmt: skip
+
+
+def _is_warm(stage: int) -> bool:
+    if stage == 3:
+        return is_warm() and camera.is_warm()
+    return is_warm(everything=stage == 2) and (stage == 1 or navigation.is_warm())
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -122,8 +140,11 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 def _stage(item: pytest.Item) -> int:
-    """Returns 0 for a test that steps no simulation, 1 for one that steps sessions, 2 for one of batches."""
-    names = set(item.nodeid.partition("::")[0].split("/"))
+    """Returns 0 for a test that steps no simulation, or 1, 2, 3 for one of sessions, batches, pictures."""
+    path = item.nodeid.partition("::")[0]
+    names = set(path.split("/"))
+    if any(word in path for word in PICTURES):
+        return 3
     return 1 if names & SESSIONS else 0 if names & UNCOMPILED else 2
 
 

@@ -15,11 +15,13 @@ from typer.testing import CliRunner
 
 from dorothie_gym.cli import warm_up as command
 from dorothie_gym.cli.app import app
+from dorothie_gym.engine import camera_warm_up as camera
 from dorothie_gym.engine import warm_up as compiling
 from dorothie_gym.envs import warm_up as batches
 
 NAMES = ("sim.step.step", "sim.batch.play_share")
 BATCH_NAME = "envs.driving_steps.act_share"
+CAMERA_NAME = "camera.shading.shade"
 
 
 @pytest.fixture
@@ -35,7 +37,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     def compile_batch(progress: Callable[[str, int, int], None]) -> None:
         progress(BATCH_NAME, 1, 1)
 
+    def compile_camera(progress: Callable[[str, int, int], None]) -> None:
+        progress(CAMERA_NAME, 1, 1)
+
     monkeypatch.setattr(compiling, "warm_up", compile_two)
+    monkeypatch.setattr(camera, "warm_up", compile_camera)
     monkeypatch.setattr(batches, "warm_up", compile_batch)
     monkeypatch.setattr(command, "stderr", lambda: Console(stderr=True, force_terminal=True, width=130))
     return found
@@ -44,11 +50,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
 def test_warm_up_compiles_everything_and_reports_it(asked: list[bool]) -> None:
     result = CliRunner().invoke(app, ["warm-up"], catch_exceptions=False)
     assert result.exit_code == 0 and asked == [True]
-    assert result.stdout.startswith("Compiled 3 functions in 0 s; kept in ")
+    assert result.stdout.startswith("Compiled 4 functions in 0 s; kept in ")
     assert "Compiling, once per machine" in result.stderr
-    assert BATCH_NAME in result.stderr
+    assert CAMERA_NAME in result.stderr
     facts = json.loads(CliRunner().invoke(app, ["warm-up", "--json"], catch_exceptions=False).stdout)
-    assert facts["functions"] == 3 and facts["seconds"] < 5.0 and Path(facts["folder"]).is_dir()
+    assert facts["functions"] == 4 and facts["seconds"] < 5.0 and Path(facts["folder"]).is_dir()
 
 
 def test_cold_run_shows_what_is_compiled_before_the_session(asked: list[bool], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ def warm_up(
     if folder is None:
         fail("caching is turned off (DOROTHIE_GYM_CACHE is empty): compiled functions would be lost; unset it")
     begun = time.perf_counter()
-    compiled = compile_with_progress(everything=True, batches=True)
+    compiled = compile_with_progress(everything=True, batches=True, pictures=True)
     seconds = round(time.perf_counter() - begun, 1)
     if as_json:
         print_json({"functions": compiled, "seconds": seconds, "folder": str(folder)})
@@ -32,22 +32,30 @@ def warm_up(
         stdout().print(f"Nothing to compile; all is in {folder}", soft_wrap=True, markup=False)
 
 
-def compile_first(*, everything: bool = False, batches: bool = False) -> None:
+def compile_first(*, everything: bool = False, batches: bool = False, pictures: bool = False) -> None:
     """Compiles what is not in the cache, with a progress bar on a terminal.
 
     Args:
         everything: whether vectorised environments of `Town-v0` are needed, too, or sessions only.
         batches: whether batches of the navigation environments are needed.
+        pictures: whether the first-person camera is needed.
     """
     from dorothie_gym.engine import warm_up as sessions
     from dorothie_gym.envs import warm_up as navigation
 
     batches = batches and not navigation.is_warm()
-    if batches or not sessions.is_warm(everything=everything):
-        compile_with_progress(everything=everything, batches=batches)
+    pictures = pictures and not _is_camera_warm()
+    if batches or pictures or not sessions.is_warm(everything=everything):
+        compile_with_progress(everything=everything, batches=batches, pictures=pictures)
 
 
-def compile_with_progress(*, everything: bool, batches: bool) -> int:
+def _is_camera_warm() -> bool:
+    from dorothie_gym.engine import camera_warm_up  # imported here: most commands draw no pictures
+
+    return camera_warm_up.is_warm()
+
+
+def compile_with_progress(*, everything: bool, batches: bool, pictures: bool) -> int:
     """Compiles with a progress bar on a terminal; returns the number of functions. Arguments as `compile_first`."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -70,7 +78,12 @@ def compile_with_progress(*, everything: bool, batches: bool) -> int:
             progress.update(bar, completed=done, total=planned, description=name)
 
         sessions.warm_up(show, everything=everything)
-        before, begun = begun, 0
+        total, begun = begun, 0
         if batches:
             navigation.warm_up(show)
-    return before + begun
+            total, begun = total + begun, 0
+        if pictures:
+            from dorothie_gym.engine import camera_warm_up
+
+            camera_warm_up.warm_up(show)
+    return total + begun
