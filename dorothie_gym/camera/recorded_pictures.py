@@ -35,6 +35,7 @@ from dorothie_gym.recording.header import LandmarkRow
 from dorothie_gym.recording.recorded_perception import Switches, light_switches
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.network.network import network_of
+from dorothie_gym.sim.pedestrians.walking import PACE
 from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
@@ -186,9 +187,9 @@ class RecordedPictures:
         """Returns the height of the road under each row of the actors (m,), and its distance since it appeared [m]."""
         tracks, rows = self._tracks, self._tracks.table.rows
         heights, odometers = np.zeros(len(rows)), np.zeros(len(rows))
-        begins = float(tracks.table.frames[0]) / FRAME_RATE
-        x, y, heading, speed = (np.ascontiguousarray(rows[name]) for name in ("x", "y", "heading", "speed"))
-        _follow(town_arrays(network_of(self._town)), x, y, heading, speed, tracks.before, begins, heights, odometers)
+        x, y, heading = (np.ascontiguousarray(rows[name]) for name in ("x", "y", "heading"))
+        driven = _moved_before(self._tracks) * np.abs(rows["speed"])
+        _follow(town_arrays(network_of(self._town)), x, y, heading, tracks.before, driven, heights, odometers)
         return heights, odometers
 
     def _find_car_heights(self) -> Array:
@@ -200,7 +201,7 @@ class RecordedPictures:
             return heights
         x, y, heading = (np.ascontiguousarray(rows[name]) for name in ("x", "y", "heading"))
         before = np.arange(-1, len(rows) - 1)
-        _follow(town, x, y, heading, np.zeros(len(rows)), before, 0.0, heights, odometers)
+        _follow(town, x, y, heading, before, np.zeros(len(rows)), heights, odometers)
         for k, lane in enumerate(rows["lane"].tolist()):
             if 0 <= lane < len(lanes):  # the lane that it follows, of several above each other
                 heights[k] = lanes[lane].height_at(lanes[lane].project(np.array([x[k], y[k]]))[0])
@@ -239,10 +240,23 @@ def _accelerations_of(tracks: ActorTracks) -> Array:
     return np.asarray((speed[last] - speed[first]) / np.where(seconds > 0.0, seconds, math.inf))
 
 
+def _moved_before(tracks: ActorTracks) -> Array:
+    """Returns the time for which the actor of each row has probably moved since it appeared (m,) [s].
+
+    Those of the first record have been there since frame 0, where pedestrians take their first steps in turn.
+    """
+    first = slice(int(tracks.table.offsets[0]), int(tracks.table.offsets[1]))
+    walking = tracks.table.rows["kind"][first] == int(ActorKind.PEDESTRIAN)
+    frames = np.full(len(tracks.times), 0.5 * float(np.median(np.diff(tracks.table.frames, prepend=0))))
+    frames[first] = tracks.table.frames[0]
+    frames[first][walking] -= -np.arange(int(walking.sum())) % PACE
+    return np.asarray(np.maximum(frames, 0.0) / FRAME_RATE)
+
+
 @compiled
 def _follow(
-    town: TownArrays, x: Array, y: Array, heading: Array, speed: Array, before: NDArray[np.int64], begins: float,
-    heights: Array, odometers: Array,
+    town: TownArrays, x: Array, y: Array, heading: Array, before: NDArray[np.int64], begun: Array, heights: Array,
+    odometers: Array,
 ) -> None:  # fmt: skip
     """Writes heights and distances of the rows (m,) of actors, those of earlier records first.
 
@@ -251,15 +265,14 @@ def _follow(
         x: [m].
         y: [m].
         heading: [rad].
-        speed: [m/s].
         before: row of the same actor in the record before, -1 for none.
-        begins: time of the first record [s], before which its actors have moved as fast.
+        begun: distance of rows without one [m].
         heights: to be written [m].
         odometers: to be written [m].
     """
     for k in range(len(x)):
         last = before[k]
-        height, odometers[k] = math.nan, begins * abs(speed[k])
+        height, odometers[k] = math.nan, begun[k]
         if last >= 0:
             height = heights[last]
             odometers[k] = odometers[last] + math.sqrt((x[k] - x[last]) ** 2 + (y[k] - y[last]) ** 2)
