@@ -107,19 +107,22 @@ class SessionCamera:
             traffic_lights: their states by signal, dark where missing; by default those of their programmes.
         """
         self._show_lights(self._programmed_lights(time) if traffic_lights is None else traffic_lights)
-        placed = self._place(pose, bodies, own, drives_with_lights(weather))
+        placed = self.placed(pose, bodies, weather, own=own)
         return self.camera.render(
             pose, weather, bodies=placed, time=time, head_lights=head_lights, faults=frozenset(faults)
         )
 
-    def _place(self, pose: CameraPose, bodies: Bodies, own: int, lights: bool) -> RecordArray[PlacementRecord]:
+    def placed(
+        self, pose: CameraPose, bodies: Bodies, weather: Weather, *, own: int = CAR_KEY
+    ) -> RecordArray[PlacementRecord]:
+        """Returns the models of the bodies near a pose, overwritten by the next call; arguments as of `render_from`."""
         room = len(bodies.vehicles) + len(bodies.pedestrians) + len(bodies.props)
         if room > len(self._placed):
             self._placed = empty_records(PlacementRecord, room)
         placed = argument(self._placed)
         count = place_bodies(
             argument(bodies.vehicles), argument(bodies.pedestrians), argument(bodies.props),
-            np.array([pose.x, pose.y]), REACH, own, lights, placed,
+            np.array([pose.x, pose.y]), REACH, own, drives_with_lights(weather), placed,
         )  # fmt: skip
         _lift(self.scene.town.ground.arrays, placed, count)
         return self._placed[:count]
