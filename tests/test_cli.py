@@ -103,6 +103,13 @@ class TestRun:
         heard = [(move.text, move.recognised) for move in Session.load("back").moves()]
         assert heard == [(move.text, move.recognised) for move in moves]
 
+    def test_perception_by_the_camera_survives_replay(self) -> None:
+        loaded("run", "--seed", 3, "--max-seconds", 30, "--perception", "camera", "--out", "s", "--json")
+        assert Session.load("s").header.config["perception"] == "camera"
+        assert call("replay", "s", "--check").exit_code == 0
+        loaded("run", "--seed", 3, "--max-seconds", 30, "--out", "usual", "--json")
+        assert "perception" not in Session.load("usual").header.config
+
     def test_silent_roles_do_nothing(self) -> None:
         silent = ("--participant", "silent", "--co-wizard", "silent", "--ad-wizard", "silent")
         facts = loaded("run", "--max-seconds", 5, "--json", *silent)

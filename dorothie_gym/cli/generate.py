@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray, WordErrors, env_config
+from dorothie_gym.cli.options import AsJson, MaxSeconds, Perception, Players, Ray, WordErrors, env_config
 from dorothie_gym.cli.output import (
     FAILED,
     Facts,
@@ -20,6 +20,7 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def generate(
     workers: Players = None,
     max_seconds: MaxSeconds = None,
     word_errors: WordErrors = 0.0,
+    perception: Perception = PerceptionModel.SYMBOLIC,
     ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:
@@ -44,7 +46,7 @@ def generate(
         from dorothie_gym.errors import ProcessError
         from dorothie_gym.rollout import generate_corpus
 
-        config = env_config(max_seconds, word_errors)
+        config = env_config(max_seconds, word_errors, perception)
         try:
             compile_first()
             begun = time.perf_counter()
@@ -59,7 +61,7 @@ def generate(
                     on_session=on_session,
                 )
         except KeyboardInterrupt:
-            _exit_interrupted(out, sessions, seed, max_seconds, word_errors)
+            _exit_interrupted(out, sessions, seed, max_seconds, word_errors, perception)
         except ProcessError as error:
             fail(str(error), FAILED)
     facts = _facts(made, seed, time.perf_counter() - begun)
@@ -75,7 +77,9 @@ def generate(
         )
 
 
-def _exit_interrupted(out: Path, sessions: int, seed: int, max_seconds: float | None, word_errors: float) -> None:
+def _exit_interrupted(
+    out: Path, sessions: int, seed: int, max_seconds: float | None, word_errors: float, perception: PerceptionModel
+) -> None:  # fmt: skip
     from dorothie_gym.rollout import finished_sessions
 
     done = finished_sessions(out, sessions=sessions, seed=seed)
@@ -84,6 +88,8 @@ def _exit_interrupted(out: Path, sessions: int, seed: int, max_seconds: float | 
         command += f" --max-seconds {max_seconds:g}"
     if word_errors:
         command += f" --word-errors {word_errors:g}"
+    if perception is not PerceptionModel.SYMBOLIC:
+        command += f" --perception {perception}"
     exit_interrupted(f"Interrupted with {done} of {sessions} sessions finished; resume with: {command}")
 
 

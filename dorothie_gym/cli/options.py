@@ -10,6 +10,7 @@ from typer.core import TyperCommand
 
 from dorothie_gym.cli.completion import complete_policy
 from dorothie_gym.cli.output import fail
+from dorothie_gym.engine.perception_model import PerceptionModel
 
 if TYPE_CHECKING:
     from dorothie_gym.engine.config import EnvConfig
@@ -71,6 +72,13 @@ WordErrors = Annotated[
     ),
 ]
 
+Perception = Annotated[
+    PerceptionModel,
+    typer.Option(
+        help="What participant and Co-Wizard see: all bodies that are near enough, or those in the car's camera.",
+    ),
+]
+
 Ray = Annotated[
     str | None,
     typer.Option(
@@ -80,18 +88,21 @@ Ray = Annotated[
 ]
 
 
-def env_config(max_seconds: float | None, word_errors: float) -> EnvConfig:
+def env_config(
+    max_seconds: float | None, word_errors: float, perception: PerceptionModel = PerceptionModel.SYMBOLIC
+) -> EnvConfig:  # fmt: skip
     """Returns the engine settings of a command line.
 
     Args:
         max_seconds: simulated time after which a session is truncated [s]; None keeps the default.
         word_errors: word error rate of the speech recogniser.
+        perception: what participant and Co-Wizard see.
     """
     from dorothie_gym.engine.config import EnvConfig
 
     if max_seconds is None:
-        return EnvConfig(word_error_rate=word_errors)
-    return EnvConfig(max_seconds=max_seconds, word_error_rate=word_errors)
+        return EnvConfig(word_error_rate=word_errors, perception=perception)
+    return EnvConfig(max_seconds=max_seconds, word_error_rate=word_errors, perception=perception)
 
 
 # --- Players ----------------------------------------------------------------------------------------------------------

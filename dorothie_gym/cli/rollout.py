@@ -17,6 +17,7 @@ from dorothie_gym.cli.options import (
     CoWizard,
     MaxSeconds,
     Participant,
+    Perception,
     Players,
     Ray,
     WordErrors,
@@ -35,6 +36,7 @@ from dorothie_gym.cli.output import (
     wide_stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
@@ -60,6 +62,7 @@ def rollout(
     ] = None,
     max_seconds: MaxSeconds = None,
     word_errors: WordErrors = 0.0,
+    perception: Perception = PerceptionModel.SYMBOLIC,
     ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:
@@ -75,9 +78,8 @@ def rollout(
             chosen = parse_towns(towns)
         except ValueError as error:
             fail(str(error))
-        settings = RolloutSettings(
-            cast=cast, towns=chosen, sessions=sessions, seed=seed, config=env_config(max_seconds, word_errors)
-        )
+        config = env_config(max_seconds, word_errors, perception)
+        settings = RolloutSettings(cast=cast, towns=chosen, sessions=sessions, seed=seed, config=config)
         result = _play(settings, out, workers or available_processors(), ray, quiet=as_json)
     if as_json:
         print_json(result.to_json())

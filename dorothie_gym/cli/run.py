@@ -12,7 +12,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dorothie_gym.cli.completion import complete_storyboard, complete_town
-from dorothie_gym.cli.options import AdWizard, AsJson, CoWizard, Participant, WordErrors, env_config, find_cast, needs
+from dorothie_gym.cli.options import (
+    AdWizard,
+    AsJson,
+    CoWizard,
+    Participant,
+    Perception,
+    WordErrors,
+    env_config,
+    find_cast,
+    needs,
+)
 from dorothie_gym.cli.output import (
     Facts,
     check_picture,
@@ -24,6 +34,7 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
+from dorothie_gym.engine.perception_model import PerceptionModel
 
 if TYPE_CHECKING:
     from dorothie_gym.cli.film import Film
@@ -48,6 +59,7 @@ class _Plan:
     players: tuple[str, str, str]
     max_seconds: float | None
     word_errors: float
+    perception: PerceptionModel
     speed: float | None
 
 
@@ -83,6 +95,7 @@ def run(
         float | None, typer.Option(min=1.0, max=86400.0, help="Truncate the session after this simulated time [s].")
     ] = None,
     word_errors: WordErrors = 0.0,
+    perception: Perception = PerceptionModel.SYMBOLIC,
     speed: Annotated[
         float | None,
         typer.Option(
@@ -110,6 +123,7 @@ def run(
         players=(participant, co_wizard, ad_wizard),
         max_seconds=max_seconds,
         word_errors=word_errors,
+        perception=perception,
         speed=speed,
     )
     _check_outputs(plan)
@@ -139,7 +153,8 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
 
     cast = find_cast(*plan.players)
     compile_first()
-    engine = SessionEngine(plan.town, plan.storyboard, config=env_config(plan.max_seconds, plan.word_errors))
+    config = env_config(plan.max_seconds, plan.word_errors, plan.perception)
+    engine = SessionEngine(plan.town, plan.storyboard, config=config)
     engine.reset(seed=plan.seed)
     try:
         policies = {role: player.make(role, engine.limits) for role, player in cast.items()}

@@ -174,13 +174,21 @@ class MapNames:
         )
 
 
-def goals_on_map(scenario: Scenario, names: Sequence[LandmarkName]) -> list[GoalAhead]:
-    """Returns the places of goals on the Co-Wizard's map, in the order of the names."""
+def goals_on_map(
+    scenario: Scenario, names: Sequence[LandmarkName], recognised: Sequence[int] = ()
+) -> list[GoalAhead]:  # fmt: skip
+    """Returns the places of goals on the Co-Wizard's map, in the order of the names.
+
+    Args:
+        scenario: scenario of the session.
+        names: the goals.
+        recognised: indices of hidden landmarks that the camera has shown.
+    """
     return [
         GoalAhead(lane=landmark.lane, station=landmark.station)
         for name in names
         for landmark in scenario.storyboard.landmarks
-        if landmark.name is name and not landmark.hidden
+        if landmark.name is name and (not landmark.hidden or landmark.index in recognised)
     ]
 
 
@@ -233,6 +241,7 @@ class BeliefTracker:
         guesses: last marked places, by name of the landmark.
         places: estimated places of hidden landmarks after all marks and statements, by name.
         version: number of changes of `places`.
+        recognised: indices of the landmarks that the camera has shown, with `EnvConfig.perception` "camera".
     """
 
     def __init__(self, town: Town, scenario: Scenario) -> None:
@@ -241,6 +250,7 @@ class BeliefTracker:
         self.guesses: dict[LandmarkName, LandmarkGuess] = {}
         self.places: dict[LandmarkName, PlaceEstimate] = {}
         self.version = 0
+        self.recognised: Sequence[int] = ()
         self._topic: LandmarkName | None = None  # the hidden landmark mentioned last
         self._said: dict[LandmarkName, set[frozenset[LandmarkName | StreetName]]] = {}
         self._scenario = scenario
@@ -339,7 +349,7 @@ class BeliefTracker:
         places: list[GoalAhead] = []
         for name in self.goals:
             guess = self.guesses.get(name)
-            places.extend(goals_on_map(self._scenario, (name,)))
+            places.extend(goals_on_map(self._scenario, (name,), self.recognised))
             if guess is not None:
                 places.append(GoalAhead(lane=guess.lane, station=guess.station))
         return places

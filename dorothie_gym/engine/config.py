@@ -10,6 +10,7 @@ from typing import TypeAlias
 from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.copying import shared
 from dorothie_gym.dialogue import WORDS_PER_SECOND
+from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.ontology import Role
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 
@@ -102,6 +103,9 @@ class EnvConfig:
         rewards: weights of the reward terms.
         camera: first-person camera on the car, whose pictures the participant and the Co-Wizard observe; None for none.
             It changes nothing else in a session.
+        perception: what the participant and the Co-Wizard see. With `PerceptionModel.CAMERA` they observe the objects
+            that a picture shows, and the Co-Wizard also the hidden landmarks that have been in view. The car's own
+            safety functions stay as they are.
     """
 
     decision_frequency: float = 2.0
@@ -112,6 +116,7 @@ class EnvConfig:
     world: WorldConfig = field(default_factory=WorldConfig)
     rewards: RewardWeights = field(default_factory=RewardWeights)
     camera: CameraConfig | None = None
+    perception: PerceptionModel = PerceptionModel.SYMBOLIC
 
     def __post_init__(self) -> None:
         frames = FRAME_RATE / self.decision_frequency if self.decision_frequency > 0 else 0.5
@@ -128,6 +133,9 @@ class EnvConfig:
             raise ValueError(f"EnvConfig.word_error_rate is {self.word_error_rate}; it must be at least 0 and below 1")
         if self.camera is not None and not isinstance(self.camera, CameraConfig):
             raise ValueError(f"EnvConfig.camera is a {type(self.camera).__name__}; it must be a CameraConfig or None")
+        if self.perception not in (models := list(map(str, PerceptionModel))):
+            raise ValueError(f"EnvConfig.perception is {self.perception!r}; it must be {' or '.join(models)}")
+        object.__setattr__(self, "perception", PerceptionModel(self.perception))
 
     @property
     def frames(self) -> int:
@@ -135,7 +143,11 @@ class EnvConfig:
         return round(FRAME_RATE / self.decision_frequency)
 
     def record(self) -> dict[str, object]:
-        """Returns the settings in JSON types, for records; without the camera, which changes nothing in a session."""
+        """Returns the settings in JSON types, for records.
+
+        They lack the camera, which changes nothing in a session, and the usual perception, so that records are equal to
+        those of versions without a choice.
+        """
         settings = asdict(self)
-        del settings["camera"]
-        return settings
+        del settings["camera"], settings["perception"]
+        return settings if self.perception is EnvConfig.perception else {**settings, "perception": str(self.perception)}

@@ -10,11 +10,13 @@ import numpy as np
 
 from dorothie_gym.dialogue import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
+from dorothie_gym.engine.camera_perception import CameraPerception
 from dorothie_gym.engine.config import EnvConfig, RewardTerms
 from dorothie_gym.engine.dialogue_channel import DialogueChannel
 from dorothie_gym.engine.exception_executor import ExceptionExecutor
 from dorothie_gym.engine.masks import ActionMasks
 from dorothie_gym.engine.observations import DeliveredMessages, ObservationBuilder
+from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.pictures import SessionPictures
 from dorothie_gym.engine.scenario import Scenario, header_of
 from dorothie_gym.engine.session_log import EventLog, SessionSummary, SubgoalCounts, SubgoalTracker
@@ -89,6 +91,7 @@ class LiveSession:
         trail: positions of the ego [m], one for each decision.
         decisions: decisions played so far.
         over: whether the session is closed.
+        camera_perception: what the picture shows, if the roles see by the camera.
     """
 
     def __init__(
@@ -127,6 +130,9 @@ class LiveSession:
         self._infractions: dict[str, int] | None = None
         self._delivered = self._deliver("")
         self._pictures = None if config.camera is None else SessionPictures(self.world, scenario, config.camera)
+        self.camera_perception = (
+            CameraPerception(self.world, scenario) if config.perception is PerceptionModel.CAMERA else None
+        )
 
     # made when they are first used: not all sessions observe by dicts, or ask for masks
 
@@ -162,6 +168,9 @@ class LiveSession:
         self.note_arrivals()
         self._delivered = self._deliver(begun.message)
         self.note_place()
+        if self.camera_perception is not None:
+            self.camera_perception.look()
+            self.beliefs.recognised = self.camera_perception.recognised
         return self.config.rewards.terms(
             reached=self._subgoals.reached - begun.reached,
             success=self.success,
@@ -190,6 +199,8 @@ class LiveSession:
     def observations(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
         """Builds the observations of some roles, by agent; what several of them need is computed once."""
         observations = self._observations.build(self._delivered, roles)
+        if self.camera_perception is not None:
+            self.camera_perception.add_to(observations)
         if self._pictures is not None:
             self._pictures.add_to(observations, self.decisions)
         return observations

@@ -12,6 +12,7 @@ from gymnasium import spaces
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.scenario import Scenario
+from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces import Observation
@@ -44,6 +45,17 @@ def picture_spaces(config: CameraConfig) -> dict[str, spaces.Box]:
     return {FIELDS[output]: boxes[output] for output in config.outputs if output in boxes}
 
 
+def camera_of(town: Town, scenario: Scenario, config: CameraConfig) -> SessionCamera:
+    """Returns a camera on the car of a session."""
+    # imported here: most sessions have no camera
+    from dorothie_gym.camera.scene_cache import town_scene
+    from dorothie_gym.camera.session_camera import SessionCamera
+    from dorothie_gym.camera.town_scene import SessionScene
+
+    names = [name.label for name in scenario.street_names]
+    return SessionCamera(SessionScene(town_scene(town), names, scenario.storyboard.landmarks), config)
+
+
 class SessionPictures(Lookups):
     """Pictures of a session; each is drawn when it is first asked for.
 
@@ -59,14 +71,7 @@ class SessionPictures(Lookups):
 
     @cached_property
     def _camera(self) -> SessionCamera:
-        # imported here: most sessions have no camera
-        from dorothie_gym.camera.scene_cache import town_scene
-        from dorothie_gym.camera.session_camera import SessionCamera
-        from dorothie_gym.camera.town_scene import SessionScene
-
-        names = [name.label for name in self._scenario.street_names]
-        scene = SessionScene(town_scene(self._world.town), names, self._scenario.storyboard.landmarks)
-        return SessionCamera(scene, self._config)
+        return camera_of(self._world.town, self._scenario, self._config)
 
     def frame(self, decision: int) -> CameraFrame:
         """Returns the picture at the present decision, of this number."""

@@ -15,6 +15,7 @@ from dorothie_gym.engine.config import EnvConfig, RewardTerms
 from dorothie_gym.engine.live_session import LiveSession, StepBegun
 from dorothie_gym.engine.masks import RoleMask
 from dorothie_gym.engine.observations import LazyObservations
+from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.pictures import OBSERVERS, picture_spaces
 from dorothie_gym.engine.scenario import Scenario, draw_scenario, template_option
 from dorothie_gym.engine.session_log import SessionSummary
@@ -31,6 +32,8 @@ from dorothie_gym.spaces import (
     StepInfo,
     observation_space,
 )
+from dorothie_gym.spaces.fields import dict_space
+from dorothie_gym.spaces.observations import camera_perception_fields
 from dorothie_gym.tasks import StoryboardTemplate
 
 
@@ -196,11 +199,17 @@ class SessionEngine(Restorable):
         return self._session
 
     def observation_space(self, role: Role) -> spaces.Dict:
-        """Returns the observation space of a role, with the pictures of the camera if there is one."""
-        space = observation_space(role, self.limits, self.config.observe_acts)
-        if self.config.camera is None or role not in OBSERVERS:
+        """Returns the observation space of a role, with the fields of camera and perception if there are any."""
+        space, config = observation_space(role, self.limits, self.config.observe_acts), self.config
+        if role not in OBSERVERS:
             return space
-        return spaces.Dict({**space.spaces, **picture_spaces(self.config.camera)})
+        seen = (
+            dict_space(camera_perception_fields(self.limits)).spaces
+            if config.perception is PerceptionModel.CAMERA
+            else {}
+        )
+        pictures = {} if config.camera is None else picture_spaces(config.camera)
+        return spaces.Dict({**space.spaces, **seen, **pictures}) if seen or pictures else space
 
     @property
     def observations(self) -> LazyObservations:

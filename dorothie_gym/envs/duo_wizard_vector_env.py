@@ -14,6 +14,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.scenario import Scenario, scenario_option
 from dorothie_gym.engine.session_batch import SessionBatch
 from dorothie_gym.engine.session_engine import SessionEngine, StepOutcome
@@ -86,7 +87,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
             num_envs: number of environments.
             town: a town as in `DuoWizardEnv`, or several that the environments play in turn.
             storyboard: as in `DuoWizardEnv`.
-            config: as in `DuoWizardEnv`, without a camera.
+            config: as in `DuoWizardEnv`, without a camera, with symbolic perception.
             render_mode: None or "rgb_array".
             max_cycles: as in `DuoWizardEnv`.
             threads: number of threads; None for one per processor.
@@ -97,6 +98,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         """
         if config is not None and config.camera is not None:
             raise ValueError("config.camera is set; batches have no cameras: make single environments for them")
+        if config is not None and config.perception is PerceptionModel.CAMERA:
+            raise ValueError('config.perception is "camera"; batches have no cameras: make single environments for it')
         super().__init__(num_envs, town, config or EnvConfig(), render_mode, threads, autoreset_mode)
         rate = self.config.decision_frequency
         self.metadata = {**self.metadata, "render_fps": metadata_at(rate)["render_fps"]}

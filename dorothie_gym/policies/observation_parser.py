@@ -62,9 +62,21 @@ IN_VIEW = 45.0
 """Largest distance, along each axis, of a landmark that utterances refer to [m]."""
 
 
-def nearest_landmark(landmarks: Sequence[SeenLandmark], x: float, y: float) -> SeenLandmark | None:
-    """Returns the landmark closest to a point [m]; None if none is in view from there."""
-    near = [mark for mark in landmarks if abs(mark.x - x) < IN_VIEW and abs(mark.y - y) < IN_VIEW]
+def landmarks_in_view(
+    observation: ObservationMapping, landmarks: Sequence[SeenLandmark]
+) -> Sequence[SeenLandmark] | None:  # fmt: skip
+    """Returns those landmarks of an observation that the picture shows; None without perception by a camera."""
+    flags = observation.get("landmarks_in_view")
+    return None if flags is None else [mark for mark in landmarks if flags[mark.row]]
+
+
+def nearest_landmark(
+    observation: ObservationMapping, landmarks: Sequence[SeenLandmark], x: float, y: float
+) -> SeenLandmark | None:  # fmt: skip
+    """Returns the landmark of an observation that is closest to a point [m]; None if none is in view from there."""
+    shown = landmarks_in_view(observation, landmarks)
+    seen = landmarks if shown is None else shown
+    near = [mark for mark in seen if abs(mark.x - x) < IN_VIEW and abs(mark.y - y) < IN_VIEW]
     return min(near, key=lambda mark: (math.hypot(mark.x - x, mark.y - y), mark.row), default=None)
 
 

@@ -221,6 +221,15 @@ def observation_space(role: Role, limits: SpaceLimits, observe_acts: bool = True
     return dict_space(observation_fields(role, limits, observe_acts))
 
 
+def camera_perception_fields(limits: SpaceLimits) -> tuple[FieldSpec, ...]:
+    """Returns the specifications of the fields that participant and Co-Wizard have besides where they see by a camera.
+
+    The Co-Wizard's `landmarks` then also contain, behind those that are not hidden, the hidden ones that have been in
+    view.
+    """
+    return (flags("landmarks_in_view", limits.landmarks, meaning="1 for landmarks that the picture shows"),)
+
+
 def _objects(limits: SpaceLimits) -> FieldSpec:
     return real("objects", limits.objects, columns=ObjectColumn, unit="mixed", meaning="objects in sight")
 

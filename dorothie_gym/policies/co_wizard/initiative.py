@@ -60,7 +60,7 @@ def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
 
 def scene_of(state: CoWizardState, view: CoWizardView) -> WordingContext:
     """Returns the context that utterances may refer to: street, landmark nearby, and whether there is an exception."""
-    landmark = nearest_landmark(view.landmarks, *view.position)
+    landmark = nearest_landmark(view.raw, view.landmarks, *view.position)
     street = street_of(view.raw, state.town, view.lane)
     blocked = view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC
     return WordingContext(

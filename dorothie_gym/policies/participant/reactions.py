@@ -49,7 +49,7 @@ _ROADSIDE_OBJECTS = (
 
 def scene_of(state: ParticipantState, view: ParticipantView) -> WordingContext:
     """Returns the context that utterances may refer to: street, landmark nearby, and whether there is an exception."""
-    landmark = nearest_landmark(view.landmarks, *view.position)
+    landmark = nearest_landmark(view.raw, view.landmarks, *view.position)
     street = street_of(view.raw, state.town, view.lane)
     return WordingContext(
         street=street if street is not StreetName.UNKNOWN else None,

@@ -73,6 +73,8 @@ class LeaderboardEntry:
         ]
         if rate := settings["config"]["word_error_rate"]:
             others.append(f"word errors {100 * rate:g} %")
+        if perception := settings["config"].get("perception"):
+            others.append(f"perception {perception}")
         if self.shortened:
             others.append(f"sessions of at most {self.time_limit:g} s")
         return f"{name} ({', '.join(others)})" if others else name

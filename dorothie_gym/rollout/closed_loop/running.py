@@ -119,6 +119,8 @@ def command_of(settings: Mapping[str, Any]) -> str:
     for option, name in (("--max-seconds", "max_seconds"), ("--word-errors", "word_error_rate")):
         if config[name] != getattr(usual, name):
             words += [option, f"{config[name]:g}"]
+    if perception := config.get("perception"):
+        words += ["--perception", perception]
     return shlex.join(words)
 
 
