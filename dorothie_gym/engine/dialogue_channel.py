@@ -126,6 +126,12 @@ class DialogueChannel:
         self._annotator.tick(now)
         return delivered
 
+    @property
+    def in_progress(self) -> list[Utterance]:
+        """Utterances that have begun and are not over, in the order of their starts."""
+        begun = [self._conversation.in_air(role) for role in AGENT_ROLES]
+        return sorted((each for each in begun if each is not None), key=lambda each: each.start)
+
     def speaking(self, now: float) -> dict[Role, float]:
         """Returns the remaining speaking time of each role at a time [s]."""
         return {role: self._conversation.speaking(role, now) for role in AGENT_ROLES}

@@ -236,6 +236,11 @@ class LiveSession:
         return self._dialogue.said
 
     @property
+    def in_progress(self) -> Sequence[Utterance]:
+        """Utterances that have begun and are not over."""
+        return self._dialogue.in_progress
+
+    @property
     def infractions(self) -> Mapping[str, int]:
         """Number of infractions so far by kind, collisions of any cause included."""
         if self._infractions is None:

@@ -79,6 +79,10 @@ class SessionPictures(Lookups):
             self._taken = decision, self._camera.render(self._world)
         return self._taken[1]
 
+    def draw(self) -> CameraFrame:
+        """Returns the picture of the world as it is now."""
+        return self._camera.render(self._world)
+
     def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
         """Adds the pictures of the present decision to the observations of the roles that see them."""
         for role in OBSERVERS:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from dorothie_gym.dialogue import Utterance
 from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.ontology import GoalStatus, Role
 from dorothie_gym.rendering.exception_words import exception_words
@@ -24,18 +25,20 @@ from dorothie_gym.rendering.scene import (
 
 def utterances_of(session: LiveSession) -> list[SpokenLine]:
     """Returns the utterances that are over and the messages of the Ad-Wizard, by the time at which they were heard."""
-    rate = session.config.decision_frequency
-    lines = [
-        SpokenLine(
-            time=math.ceil(u.end * rate - 1e-6) / rate,  # the decision at which it is delivered
-            speaker=u.speaker,
-            text=u.text,
-            acts=" ".join(str(act).removesuffix("()") for act in u.acts),
-        )
-        for u in session.said
-    ]
+    lines = [_line(utterance, session) for utterance in session.said]
     lines += [SpokenLine(time=time, speaker=Role.AD_WIZARD, text=text) for time, text in session.messages]
     return sorted(lines, key=lambda line: line.time)
+
+
+def _line(utterance: Utterance, session: LiveSession) -> SpokenLine:
+    rate = session.config.decision_frequency
+    return SpokenLine(
+        time=math.ceil(utterance.end * rate - 1e-6) / rate,  # the decision at which it is delivered
+        speaker=utterance.speaker,
+        text=utterance.text,
+        acts=" ".join(str(act).removesuffix("()") for act in utterance.acts),
+        start=utterance.start,
+    )
 
 
 def scene_of(session: LiveSession, caption: str = "", heard: Sequence[SpokenLine] = ()) -> Scene:
@@ -96,6 +99,7 @@ def scene_of(session: LiveSession, caption: str = "", heard: Sequence[SpokenLine
             for time, (x, y), data in session.exceptions
         ],
         utterances=sorted((*utterances_of(session), *heard), key=lambda line: line.time),
+        speaking=[_line(utterance, session) for utterance in session.in_progress],
         notes=notes,
         weather={str(parameter): value for parameter, value in world.weather.values.items()},
         caption=caption or task.storyboard.name,

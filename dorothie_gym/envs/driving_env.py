@@ -43,12 +43,13 @@ class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
 
     def __init__(
         self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
-        render_mode: str | None, view: str, *, pedals: bool,
+        render_mode: str | None, view: str, render_view: str, *, pedals: bool,
     ) -> None:  # fmt: skip
         self.config = config
         self.metadata = metadata_at(config.decision_frequency)
         self.render_mode = render_mode
-        self._view = DrivingView(SessionView.of_role(Role.CO_WIZARD, view, render_mode, config.decision_frequency))
+        drawn = SessionView.of_role(Role.CO_WIZARD, view, render_mode, config.decision_frequency, render_view)
+        self._view = DrivingView(drawn)
         self.town = town if isinstance(town, Town) else load_town(town)
         self.template = template_option(storyboard)
         self.batch = DrivingBatch(self.town, self.template, config, 1, 1, pedals=pedals)

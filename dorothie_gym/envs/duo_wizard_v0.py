@@ -74,6 +74,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
     - `storyboard`: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one each reset.
     - `config`: `EnvConfig`.
     - `render_mode`: None, `"rgb_array"` or `"human"`.
+    - `render_view`: picture of `render()`: `"map"`, `"camera"` (the windscreen) or `"both"`, with subtitles.
     - `max_cycles`: decisions until truncation, instead of `config.max_seconds`.
 
     `reset(options={"scenario": Scenario})` plays a given scenario, whose seed is then the session's; other options
@@ -94,11 +95,13 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         config: EnvConfig | None = None,
         render_mode: str | None = None,
         max_cycles: int | None = None,
+        render_view: str = "map",
     ) -> None:
         self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
         rate = self.engine.config.decision_frequency
         self.metadata = {**_METADATA, **metadata_at(rate)}
-        self.render_mode, self._view = render_mode, SessionView(render_mode, frames_per_second=rate)
+        self.render_mode = render_mode
+        self._view = SessionView(render_mode, frames_per_second=rate, render_view=render_view)
         self.possible_agents = [str(role) for role in AGENT_ROLES]
         self.agents: list[str] = []
         self.observation_spaces = {str(role): deepcopy(self.engine.observation_space(role)) for role in AGENT_ROLES}
@@ -167,7 +170,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         return self.engine.observations.of(), rewards, terminations, truncations, infos
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws the whole session: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
+        """Draws the whole session: an array (800, 1280, 3), with a windscreen (720, 1280, 3); None in human mode."""
         return self._view.render(self.session)
 
     def close(self) -> None:

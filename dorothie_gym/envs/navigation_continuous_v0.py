@@ -125,12 +125,13 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         control: str = "pedals",
         render_mode: str | None = None,
         view: str = "role",
+        render_view: str = "map",
     ) -> None:
         config = NavigationConfig(
             traffic=traffic, exceptions=exceptions, weights=weights_of(reward), max_seconds=max_seconds,
             patience=patience, decision_frequency=decision_frequency,
         )  # fmt: skip
-        super().__init__(town, storyboard, config, render_mode, view, pedals=True)
+        super().__init__(town, storyboard, config, render_mode, view, render_view, pedals=True)
         self.action_space, self.observation_space = control_space(control), path_space()
         self.control = control
 

@@ -61,6 +61,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
     - `render_mode`: None, `"rgb_array"` or `"human"`.
     - `view`: picture of `render()`: `"role"` (what the Co-Wizard observes, and the instructions) or `"session"`
       (everything).
+    - `render_view`: `"map"`, `"camera"` (the windscreen) or `"both"`, side by side.
 
     `reset(seed=...)` plays the scenario of `DuoWizardEnv` for this seed; `reset(options={"scenario": Scenario})`
     plays a given one.
@@ -84,12 +85,13 @@ class NavigationEnv(DrivingEnv[np.int64]):
         patience: float = 60.0,
         render_mode: str | None = None,
         view: str = "role",
+        render_view: str = "map",
     ) -> None:
         config = NavigationConfig(
             guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
             max_seconds=max_seconds, patience=patience,
         )  # fmt: skip
-        super().__init__(town, storyboard, config, render_mode, view, pedals=False)
+        super().__init__(town, storyboard, config, render_mode, view, render_view, pedals=False)
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = navigation_space()
 

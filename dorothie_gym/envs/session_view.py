@@ -1,8 +1,9 @@
-"""`render()` of the environments: a session from above, for one role or for all, as an array or in a window."""
+"""`render()` of the environments: a session from above or through the windscreen, as an array or in a window."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
@@ -14,12 +15,16 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import Observation
 
 if TYPE_CHECKING:
+    from dorothie_gym.engine.pictures import SessionPictures
     from dorothie_gym.engine.role_scene import RoleView
-    from dorothie_gym.rendering.frames import HumanWindow, SceneRenderer
+    from dorothie_gym.rendering.frames import HumanWindow
     from dorothie_gym.rendering.scene import Scene, SpokenLine
+    from dorothie_gym.rendering.session_views import SessionRenderer
 
 RENDER_MODES: Final[tuple[str, ...]] = ("human", "rgb_array")
 """Render modes of the environments that play sessions."""
+
+_MAP: Final = "map"
 
 VIEWS: Final[tuple[str, ...]] = ("role", "session")
 """Views of the environments of one role: what the role observes, or the whole session."""
@@ -42,29 +47,41 @@ class SessionView(Lookups):
         render_mode: None, "human" or "rgb_array".
         frames_per_second: highest frame rate of the window [1/s].
         role: role whose observations are drawn; None draws the whole session.
+        render_view: "map", "camera" or "both": see `RenderView`.
 
     Raises:
-        ValueError: the render mode is unknown.
+        ValueError: the render mode or view is unknown.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_renderer", "_window")
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_renderer", "_pictures", "_window")
 
-    _renderer: SceneRenderer | None = None
+    _renderer: SessionRenderer | None = None
+    _pictures: tuple[LiveSession, SessionPictures] | None = None
     _window: HumanWindow | None = None
 
-    def __init__(self, render_mode: str | None, *, frames_per_second: float, role: Role | None = None) -> None:
+    def __init__(
+        self, render_mode: str | None, *, frames_per_second: float, role: Role | None = None, render_view: str = _MAP
+    ) -> None:
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or one of {', '.join(RENDER_MODES)}")
+        if render_view != _MAP:
+            from dorothie_gym.rendering.session_views import checked_view
+
+            checked_view(render_view)
+        self._view = render_view
         self._mode, self._rate, self._role = render_mode, frames_per_second, role
         self._seen: RoleView | None = None
         self._heard: list[SpokenLine] = []
 
     @classmethod
-    def of_role(cls, role: Role, view: str, render_mode: str | None, frames_per_second: float) -> SessionView:
+    def of_role(
+        cls, role: Role, view: str, render_mode: str | None, frames_per_second: float, render_view: str = _MAP
+    ) -> SessionView:
         """Returns the view of an environment of one role; raises `ValueError` if `view` is not one of `VIEWS`."""
         if view not in VIEWS:
             raise ValueError(f"view is {view!r}; it must be one of {', '.join(VIEWS)}")
-        return cls(render_mode, frames_per_second=frames_per_second, role=role if view == "role" else None)
+        seen = role if view == "role" else None
+        return cls(render_mode, frames_per_second=frames_per_second, role=seen, render_view=render_view)
 
     def begin(self, session: LiveSession) -> None:
         """Begins a session; what was noted of the last one is forgotten."""
@@ -102,15 +119,16 @@ class SessionView(Lookups):
         self._heard.append(SpokenLine(time=time, speaker=Role.PARTICIPANT, text=text, acts=acts))
 
     def render(self, session: LiveSession) -> NDArray[np.uint8] | None:
-        """Draws the aerial view: an array (800, 1280, 3), or in a window in human mode (then returns None)."""
+        """Draws the view: an array (800, 1280, 3), with a windscreen (720, 1280, 3); None in human mode."""
         if self._mode is None:
             raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
         if self._renderer is None:
             # Imported here: pygame's fonts and surfaces are slow to import, and most sessions are never drawn.
-            from dorothie_gym.rendering.frames import SceneRenderer
+            from dorothie_gym.rendering.session_views import SessionRenderer, checked_view
 
-            self._renderer = SceneRenderer()
-        frame = self._renderer.draw(self._scene(session))
+            self._renderer = SessionRenderer(checked_view(self._view))
+        size = self._renderer.windscreen
+        frame = self._renderer.draw(self._scene(session), None if size is None else self._windscreen(session, size))
         if self._mode != "human":
             return frame
         if self._window is None:
@@ -120,6 +138,17 @@ class SessionView(Lookups):
             self._window = HumanWindow((width, height), "dorothie_gym")
         self._window.show(frame, self._rate)
         return None
+
+    def _windscreen(self, session: LiveSession, size: tuple[int, int]) -> NDArray[np.uint8] | None:
+        """Returns what a camera of this width and height sees [px], otherwise with the settings of the session's."""
+        if self._pictures is None or self._pictures[0] is not session:
+            from dorothie_gym.camera.config import CameraConfig, CameraOutput
+            from dorothie_gym.engine.pictures import SessionPictures
+
+            own = session.config.camera or CameraConfig()
+            config = replace(own, width=size[0], height=size[1], outputs=(CameraOutput.RGB,))
+            self._pictures = session, SessionPictures(session.world, session.scenario, config)
+        return self._pictures[1].draw().rgb
 
     def _scene(self, session: LiveSession) -> Scene:
         from dorothie_gym.engine.session_scene import scene_of, utterances_of
@@ -134,4 +163,4 @@ class SessionView(Lookups):
         if self._window is not None:
             self._window.close()
             self._window = None
-        self._renderer = None
+        self._renderer = self._pictures = None

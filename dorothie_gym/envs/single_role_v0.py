@@ -54,7 +54,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
 
     ## Arguments
     - `role`: role of the agent, `"participant"`, `"co_wizard"` or `"ad_wizard"`.
-    - `town`, `storyboard`, `config`, `render_mode`, `max_cycles`: as of `DuoWizardEnv`.
+    - `town`, `storyboard`, `config`, `render_mode`, `max_cycles`, `render_view`: as of `DuoWizardEnv`.
     - `view`: picture of `render()`: `"role"` (what the role observes) or `"session"` (everything).
     - `partners`: policy of each other role: `"scripted"` (default), `"silent"`, `"random"`, or a `Policy`.
 
@@ -78,6 +78,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         render_mode: str | None = None,
         max_cycles: int | None = None,
         view: str = "role",
+        render_view: str = "map",
     ) -> None:
         if role not in AGENT_ROLES:
             raise ValueError(f"role is {str(role)!r}; it must be one of {', '.join(AGENT_ROLES)}")
@@ -85,7 +86,8 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         self.engine = SessionEngine(town, storyboard, config=config, max_cycles=max_cycles)
         rate = self.engine.config.decision_frequency
         self.metadata = metadata_at(rate)
-        self.render_mode, self._view = render_mode, SessionView.of_role(self.role, view, render_mode, rate)
+        self.render_mode = render_mode
+        self._view = SessionView.of_role(self.role, view, render_mode, rate, render_view)
         limits = self.engine.limits
         self.observation_space = deepcopy(self.engine.observation_space(self.role))
         self.action_space = deepcopy(action_space(self.role, limits))
@@ -148,7 +150,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         return observation, reward, outcome.terminated, outcome.truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Draws what the role observes, or the session (see `view`): an array (800, 1280, 3), or None in human mode."""
+        """Draws what the role observes, or the session (see `view`), as `DuoWizardEnv.render`."""
         return self._view.render(self.engine.session)
 
     def _show(self, observation: Observation) -> None:

@@ -124,8 +124,14 @@ class AerialView:
         size: width and height [px].
     """
 
-    def __init__(self, size: tuple[int, int]) -> None:
-        self.size = size
+    def __init__(self, size: tuple[int, int], *, goals_only: bool = False) -> None:
+        """Allocates the view.
+
+        Args:
+            size: width and height [px].
+            goals_only: whether notes at the edge point to goals only, not to all landmarks outside the picture.
+        """
+        self.size, self._goals_only = size, goals_only
         self._canvas = Canvas(size)
         self._painters: dict[tuple[object, ...], MapPainter] = {}
 
@@ -212,6 +218,8 @@ class AerialView:
             self._write_name(canvas, pin, taken, names)
         if follow:
             for pin in away:
+                if self._goals_only and pin.state not in ("pending", "ongoing"):
+                    continue
                 self._point_to(canvas, pin, taken)
 
     def _write_name(self, canvas: Canvas, pin: Pin, taken: list[_Box], names: list[_Box]) -> None:

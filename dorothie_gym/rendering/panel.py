@@ -35,10 +35,11 @@ class Panel:
     Attributes:
         size: width and height [px].
         transcript: whether the dialogue is a transcript in columns instead of bubbles.
+        talk: whether there is a dialogue.
     """
 
-    def __init__(self, size: tuple[int, int], *, transcript: bool = False) -> None:
-        self.size, self.transcript = size, transcript
+    def __init__(self, size: tuple[int, int], *, transcript: bool = False, talk: bool = True) -> None:
+        self.size, self.transcript, self.talk = size, transcript, talk
         self._held: tuple[object, pygame.Surface] | None = None
 
     def draw(self, scene: Scene) -> pygame.Surface:
@@ -52,7 +53,9 @@ class Panel:
             pen = Pen(self.size)
             top = self._tasks(pen, scene, _HEADER)
             top = self._notes(pen, scene, top)
-            if self.transcript:
+            if not self.talk:
+                pass
+            elif self.transcript:
                 write_transcript(pen, scene, self.size, top)
             else:
                 self._talk(pen, scene, top)
@@ -168,11 +171,11 @@ class _Bubble:
 class Pen:
     """Supersampled surface with coordinates in final pixels."""
 
-    def __init__(self, size: tuple[int, int]) -> None:
+    def __init__(self, size: tuple[int, int], ground: Colour = palette.PANEL) -> None:
         import pygame
 
         self.surface = pygame.Surface((size[0] * _PANEL_FINE, size[1] * _PANEL_FINE))
-        self.surface.fill(palette.PANEL)
+        self.surface.fill(ground)
 
     def text(
         self, text: str, x: float, middle: float, size: int, colour: Colour, bold: bool = False, align: float = 0.0

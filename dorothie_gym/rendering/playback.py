@@ -102,6 +102,7 @@ class Playback:
             ],
             subgoals=list(goals.values()),
             utterances=[line for line in self._lines if line.time <= time],
+            speaking=[line for line in self._lines if line.start is not None and line.start <= time < line.time],
             exceptions=[mark for mark in self._exceptions if mark.time <= time],
             notes=self._notes(frame),
             weather={} if weather is None else {name: float(weather[name][0]) for name in weather.dtype.names or ()},
@@ -204,6 +205,7 @@ def _lines(session: Session) -> list[SpokenLine]:
             speaker=said.speaker,
             text=said.text,
             acts=" ".join(_short(move.act) for move in said.moves),
+            start=said.start,
         )
         for said in session.utterances()
     ]

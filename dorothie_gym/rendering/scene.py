@@ -89,12 +89,16 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True)
 class SpokenLine:
-    """Utterance or message: time at which it is heard, at its end [s], speaker, text, and acts in short form."""
+    """Utterance or message: time at which it is heard, at its end [s], speaker, text, and acts in short form.
+
+    `start` is the time at which it begins [s], None where it is not known or the line was not spoken.
+    """
 
     time: float
     speaker: Role
     text: str
     acts: str = ""
+    start: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,6 +126,7 @@ class Scene:
         landmarks: landmarks with pins.
         subgoals: (description, state) of each task, deleted ones included.
         utterances: utterances and messages, oldest first.
+        speaking: utterances in progress, which nobody has heard to the end.
         notes: warnings, such as a hazard or an exception.
         exceptions: exceptions so far.
         weather: the ten parameters by name; missing ones have their values of a clear noon.
@@ -139,6 +144,7 @@ class Scene:
     landmarks: Sequence[Pin] = ()
     subgoals: Sequence[tuple[str, SubgoalState]] = ()
     utterances: Sequence[SpokenLine] = ()
+    speaking: Sequence[SpokenLine] = ()
     notes: Sequence[str] = ()
     exceptions: Sequence[ExceptionMark] = ()
     weather: Mapping[str, float] = field(default_factory=dict)

@@ -1,7 +1,8 @@
-"""`render()` of an environment of one role shows what the role observes, and nothing else."""
+"""`render()` of an environment of one role shows what the role observes, and nothing else; and the windscreen."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -12,8 +13,12 @@ from numpy.typing import NDArray
 
 import dorothie_gym
 from dorothie_gym import EnvConfig, WorldConfig, make_policy
+from dorothie_gym.camera.config import CameraConfig, CameraMount
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
+from dorothie_gym.rendering import palette
+from dorothie_gym.rendering.palette import Colour
+from dorothie_gym.spaces import ParticipantAction, Speech, noop
 from dorothie_gym.testing.leaks import with_hidden_landmarks_moved, with_other_tasks
 
 CONFIG = EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2))
@@ -144,3 +149,91 @@ def test_window_is_paced_at_the_frame_rate(monkeypatch: pytest.MonkeyPatch) -> N
     env.step(np.zeros(3, dtype=np.float32))
     env.close()
     assert rates == [15.0, 15.0]
+
+
+# --- Views through the windscreen -------------------------------------------------------------------------------------
+
+LEFT, TOP = 832, 540
+"""Width and height of the windscreen of the view "both" [px]."""
+
+SMALL_TOWN: dict[str, Any] = {"town": "brookside", "render_mode": "rgb_array"}
+DRIVEN = ["dorothie_gym/CoWizard-v0", "dorothie_gym/Navigation-v0", "dorothie_gym/Navigation-continuous-v0"]
+
+
+def duo(render_view: str, camera: CameraConfig | None = None) -> dorothie_gym.DuoWizardEnv:
+    return dorothie_gym.DuoWizardEnv(**SMALL_TOWN, config=replace(CONFIG, camera=camera), render_view=render_view)
+
+
+@pytest.mark.parametrize("name", DRIVEN)
+def test_every_environment_with_a_car_shows_its_windscreen(name: str) -> None:
+    frames = {}
+    for view in ("map", "camera", "both"):
+        env = gym.make(name, **SMALL_TOWN, render_view=view).unwrapped
+        env.reset(seed=3)
+        env.step(env.action_space.sample() if "continuous" in name else getattr(env, "noop_action", 0))
+        picture: Any = env.render()
+        frames[view] = picture
+        env.close()
+    assert {view: frame.shape for view, frame in frames.items()} == {
+        "map": (800, 1280, 3), "camera": (720, 1280, 3), "both": (720, 1280, 3),
+    }  # fmt: skip
+    assert all(frame.dtype == np.uint8 for frame in frames.values())
+    sky = frames["both"][: TOP // 6, :LEFT].astype(int)
+    assert (sky[..., 2] >= sky[..., 0]).mean() > 0.5, "the sky is above"
+
+
+def test_the_windscreen_is_the_picture_of_the_sessions_camera() -> None:
+    """Also where the session has no camera of its own; with one, its mount and angle count."""
+    for own in (CameraConfig(), CameraConfig(field_of_view=60.0, mount=CameraMount(pitch=-8.0))):
+        seen = duo("both", replace(own, width=LEFT, height=TOP))
+        shown = duo("both") if own == CameraConfig() else duo("both", replace(own, width=40, height=24))
+        for seed in (1, 2):
+            observations, _ = seen.reset(seed=seed)
+            shown.reset(seed=seed)
+            picture = shown.render()
+            assert picture is not None
+            np.testing.assert_array_equal(picture[:TOP, :LEFT], observations["co_wizard"]["camera"])
+
+
+def test_rendering_with_a_camera_changes_nothing_in_the_session() -> None:
+    one, other = duo("both"), duo("map")
+    for env in (one, other):
+        env.reset(seed=4)
+    for _ in range(3):
+        actions = {agent: noop(Role(agent), one.limits) for agent in one.agents}
+        observations, expected = one.step(actions)[0], other.step(actions)[0]
+        one.render()
+        for agent, fields in expected.items():
+            assert list(observations[agent]) == list(fields)
+            for name, value in fields.items():
+                np.testing.assert_array_equal(observations[agent][name], value)
+
+
+def test_subtitles_show_what_is_said_in_the_colour_of_its_speaker() -> None:
+    env = duo("both")
+    env.reset(seed=4)
+
+    def inks() -> set[Colour]:
+        picture = env.render()
+        assert picture is not None
+        found = np.unique(picture[TOP:, :LEFT].reshape(-1, 3), axis=0)
+        return {(int(red), int(green), int(blue)) for red, green, blue in found}
+
+    assert inks() == {palette.SUBTITLE_GROUND}
+    words = "Please go to the red house over there."
+    speech = ParticipantAction(speech=Speech(act=DialogueAct(move=DialogueMove.INSTRUCT), text=words))
+    env.step({
+        "participant": speech.encode(env.limits), "co_wizard": noop(Role.CO_WIZARD, env.limits),
+        "ad_wizard": noop(Role.AD_WIZARD, env.limits),
+    })  # fmt: skip
+    assert palette.SUBTITLE_PARTICIPANT in inks() and palette.SUBTITLE_CO_WIZARD not in inks()
+    for _ in range(14):  # until it was said, and some time ago
+        env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})
+    assert palette.SUBTITLE_PARTICIPANT not in inks() and len(inks()) > 2
+
+
+def test_an_unknown_view_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(ValueError, match="render_view is 'side'; it must be one of map, camera, both"):
+        duo("side")
+    with pytest.raises(ValueError, match="it must be one of map, camera, both"):
+        gym.make("dorothie_gym/Navigation-v0", render_view="windscreen")
