@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
+from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.camera.scenery.landmarks import landmark_key
+from dorothie_gym.camera.session_camera import SessionCamera
+from dorothie_gym.camera.visibility import PERCEPTION_CAMERA
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.perception_model import PerceptionModel
+from dorothie_gym.engine.pictures import FIELDS, OBSERVERS, camera_of
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
@@ -25,6 +33,9 @@ CO_WIZARD = str(Role.CO_WIZARD)
 AD_WIZARD = str(Role.AD_WIZARD)
 PARTICIPANT = str(Role.PARTICIPANT)
 
+PICTURES: Final = frozenset(FIELDS.values())
+"""Fields of observations that are pictures."""
+
 
 def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decisions: int = 60) -> None:
     """Checks that the Co-Wizard observes neither hidden landmarks nor the participant's tasks.
@@ -34,6 +45,10 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
     action mask and refusals of the Co-Wizard must be equal to the bit at every decision (with other tasks: up to the
     first arrival, which all roles may notice, and with an idle Ad-Wizard, because its refusals depend on the task). The
     participant's observation must differ, or the check would prove nothing.
+
+    Pictures may show a hidden landmark. With a camera, the pictures of the Co-Wizard and of the participant must be
+    equal at every decision at which no hidden landmark is in view in either session. With perception by the camera,
+    what they observe of their surroundings, too, must be equal until the first such decision.
 
     Args:
         env: a `DuoWizardEnv`, or a wrapper around one with the same parallel API and
@@ -45,22 +60,101 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
         AssertionError: a field differs; the message names the scenario, the decision and the field.
     """
     for play in (play_random, play_scripted):
-        _check_hidden_landmarks(env, play, _seed_with_hidden_landmark(env.unwrapped.town, seed), decisions)
+        check_hidden_landmarks(env, play, _seed_with_hidden_landmark(env.unwrapped.town, seed), decisions)
         _check_errands(env, play, seed, decisions)
 
 
 Play = Callable[..., Iterator[Decision]]
 
 
-def _check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decisions: int) -> None:
-    played = list(play(env, seed=seed, decisions=decisions))
+class Compared(NamedTuple):
+    """Numbers of decisions of a pair of sessions: all, and those at which a hidden landmark was in view in either."""
+
+    decisions: int
+    in_view: int
+
+
+def check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decisions: int) -> Compared:
+    """Checks that hidden landmarks at other sites change nothing that the Co-Wizard observes.
+
+    Args:
+        env: see `check_observations_do_not_leak`.
+        play: plays a session, such as `playing.play_scripted`.
+        seed: of the session, whose scenario has a hidden landmark.
+        decisions: decisions played.
+
+    Raises:
+        AssertionError: see `check_observations_do_not_leak`.
+    """
+    played, in_view = _with_views(env, play(env, seed=seed, decisions=decisions))
     moved = with_hidden_landmarks_moved(env.unwrapped.scenario, env.unwrapped.town, np.random.default_rng(seed))
-    again = list(play_again(env, moved, [decision.actions for decision in played if decision.actions]))
+    actions = [decision.actions for decision in played if decision.actions]
+    again, in_view_again = _with_views(env, play_again(env, moved, actions))
     where = f"hidden landmarks moved, seed {seed}"
+    by_camera = env.unwrapped.config.perception is PerceptionModel.CAMERA
+    views = list(map(bool.__or__, in_view, in_view_again))
     for k, (decision, (observations, infos)) in enumerate(zip(played, again, strict=False)):
-        _check_equal(where, k, (decision.observations, decision.infos), (observations, infos))
+        if not views[k]:
+            _check_pictures(where, k, decision.observations, observations)
+        if not by_camera or not any(views[: k + 1]):
+            one, other = (_without_pictures(part) for part in (decision.observations, observations))
+            _check_equal(where, k, (one, decision.infos), (other, infos))
+            field = first_unequal(one[PARTICIPANT]["objects"], other[PARTICIPANT]["objects"], "objects")
+            assert field is None, f"{where}, decision {k}: the participant's observation {field} differs"
         seen, moved_seen = (part[PARTICIPANT]["landmarks"] for part in (decision.observations, observations))
         assert not np.array_equal(seen, moved_seen), f"{where}, decision {k}: the participant must see the difference"
+    return Compared(len(views), sum(views))
+
+
+# --- Pictures ---------------------------------------------------------------------------------------------------------
+
+_Played = TypeVar("_Played")
+
+
+def _with_views(env: ParallelSession, playing: Iterator[_Played]) -> tuple[list[_Played], list[bool]]:
+    """Returns what a session yields, and at each decision whether a sample of a picture is one of a hidden landmark."""
+    played, views, cameras = list[_Played](), list[bool](), list[SessionCamera]()
+    for decision in playing:
+        session = env.unwrapped.session
+        if not played:
+            cameras = [camera_of(env.unwrapped.town, session.scenario, each) for each in _cameras(session.config)]
+        keys = [landmark_key(mark.index) for mark in session.scenario.storyboard.landmarks if mark.hidden]
+        instances = [camera.render(session.world).instance for camera in cameras]
+        views.append(any(each is not None and bool(np.isin(each, keys).any()) for each in instances))
+        played.append(decision)
+    return played, views
+
+
+def _cameras(config: EnvConfig) -> list[CameraConfig]:
+    """Returns cameras whose pixels are the samples of the pictures that the roles see, or see by."""
+    cameras = [] if config.camera is None else [config.camera]
+    if config.perception is PerceptionModel.CAMERA:
+        cameras.append(PERCEPTION_CAMERA)
+    return [
+        dataclasses.replace(
+            camera, width=camera.samples * camera.width, height=camera.samples * camera.height, antialiasing=False,
+            outputs=(CameraOutput.INSTANCE,),
+        )
+        for camera in cameras
+    ]  # fmt: skip
+
+
+def _check_pictures(where: str, k: int, observations: ByAgent, others: ByAgent) -> None:
+    for role in OBSERVERS:
+        one, other = observations[str(role)], others[str(role)]
+        for name in PICTURES:
+            field = first_unequal(one.get(name), other.get(name), name)
+            assert field is None, f"{where}, decision {k}: the picture {field} of {role} differs"
+
+
+def _without_pictures(observations: ByAgent) -> ByAgent:
+    return {
+        agent: {name: value for name, value in observation.items() if name not in PICTURES}
+        for agent, observation in observations.items()
+    }
+
+
+# --- Tasks ------------------------------------------------------------------------------------------------------------
 
 
 def _check_errands(env: ParallelSession, play: Play, seed: int, decisions: int) -> None:
