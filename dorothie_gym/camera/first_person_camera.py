@@ -22,8 +22,9 @@ from dorothie_gym.camera.models.model_bank import ModelBank, PlacementRecord
 from dorothie_gym.camera.optics import optics_of
 from dorothie_gym.camera.pose import CameraPose, View, view_from
 from dorothie_gym.camera.rasterizer import VisibilityBuffer, clear, draw_triangles, new_buffer
+from dorothie_gym.camera.samples import new_samples
 from dorothie_gym.camera.sensor_faults import apply_faults
-from dorothie_gym.camera.shading import new_canvas, shade
+from dorothie_gym.camera.shading import shade
 from dorothie_gym.camera.shadows import draw_body_shadows, draw_town_shadows, new_shadow_maps, turn_sun
 from dorothie_gym.camera.sky import sky_noise
 from dorothie_gym.camera.texturing import textures_of
@@ -121,7 +122,7 @@ class FirstPersonCamera:
             self._buffer = new_buffer(width * samples, height * samples)
             self._orders = self._new_orders(width * samples, height * samples)
             self._textures = textures_of(scene.atlas)
-            self._canvas, self._face = new_canvas(width, samples), new_face()
+            self._samples, self._face = new_samples(), new_face()
             self._shadows = new_shadow_maps(enabled=config.shadows)
             self._scratch = np.zeros(max(width, height), np.uint8)
             self._light_key: tuple[float, ...] = ()
@@ -175,7 +176,7 @@ class FirstPersonCamera:
             shade(
                 view, optics_of(view, light, self._shadows), self._buffer, config.samples, self.scene.town,
                 self._overlay, self._bodies, self.scene.ground, self._textures, light, sky_noise(), self.scene.lamps,
-                self._shadows, self._canvas, self._face, picture,
+                self._shadows, self._samples, self._face, picture.reshape(-1, 3),
             )  # fmt: skip
             if light.rainfall > 0.02:
                 add_rain(picture, light.rainfall, round(time * 30.0))
@@ -244,7 +245,7 @@ class FirstPersonCamera:
         """Size of the buffers [bytes]."""
         parts: list[tuple[object, ...]] = [self._bodies, self._overlay]
         if self._draws_rgb:
-            parts += [self._buffer, *self._orders, self._canvas, self._shadows]
+            parts += [self._buffer, *self._orders, self._samples, self._shadows]
         if self._labelled:
             parts += [self._label_buffer, *self._label_orders, self._labels]
         return sum(array.nbytes for part in parts for array in part if isinstance(array, np.ndarray))

@@ -120,19 +120,6 @@ def clearness(optics: Optics, depth: float, right: float, up: float) -> float:
     return clear
 
 
-@inlined
-def through_air(
-    optics: Optics, red: float, green: float, blue: float, depth: float, right: float, up: float
-) -> tuple[float, float, float]:
-    """Returns the colour that the air leaves of a surface at a depth [m] in a direction (right, up, 1)."""
-    clear = clearness(optics, depth, right, up)
-    return (
-        optics.air_r + (red - optics.air_r) * clear,
-        optics.air_g + (green - optics.air_g) * clear,
-        optics.air_b + (blue - optics.air_b) * clear,
-    )
-
-
 @compiled
 def add_rain(picture: NDArray[np.uint8], rainfall: float, frame: int) -> None:
     """Draws streaks of rain.

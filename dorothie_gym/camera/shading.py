@@ -1,84 +1,47 @@
 """Colours of a picture from its visibility buffer: light, shadows, textures, fog, and smooth edges.
 
-The picture is shaded in bands of rows. A pixel whose samples all see the same surface is shaded once, others once for
-each sample. What has to be shaded is first sorted by kind: sky, ground, and solid bodies.
+A pixel whose samples all see the same surface is shaded once, others once for each triangle that they see. Neighbours
+that see the same triangle are a run, which is coloured at once; light and air follow for many runs together.
 """
 
 from __future__ import annotations
-
-import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.camera.daylight import Daylight
-from dorothie_gym.camera.faces import Face, read_face, solid_colour
-from dorothie_gym.camera.ground.colours import colour_at
+from dorothie_gym.camera.faces import Face, add_face, read_face
 from dorothie_gym.camera.ground.lookup import GroundArrays
+from dorothie_gym.camera.illumination import light_samples
 from dorothie_gym.camera.labels import mesh_of, row_in
-from dorothie_gym.camera.lighting import WARM, LampMap, head_light, lamp_light, mirrored_share, through_air
+from dorothie_gym.camera.lighting import LampMap
 from dorothie_gym.camera.mesh import PLAIN, Mesh, Surface
-from dorothie_gym.camera.optics import Optics, ray
+from dorothie_gym.camera.optics import Optics
+from dorothie_gym.camera.paving import add_ground
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.rasterizer import SKY, VisibilityBuffer
-from dorothie_gym.camera.shadows import REACH, ShadowMaps, faded, sunlit
-from dorothie_gym.camera.sky import sky_colour
+from dorothie_gym.camera.samples import BLUE, GREEN, RED, RIGHT, ROOM, UP, WEIGHT, Samples
+from dorothie_gym.camera.shadows import ShadowMaps
+from dorothie_gym.camera.sky import add_sky
 from dorothie_gym.camera.texturing import Textures
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.maps.model import Array
 
-BAND = 8
-"""Rows of pixels that are shaded together."""
-
-_SKIES, _GROUNDS, _SOLIDS = 0, 1, 2
 _GROUND = int(Surface.GROUND)
-
-
-@by_reference
-class Canvas(NamedTuple):
-    """Scratch space of a band of a picture, n = samples per band.
-
-    Attributes:
-        counts: (3,) number of samples of each kind.
-        pixels: (3, n) int32 pixel in the band.
-        numbers: (3, n) int32 triangle.
-        places: (3, n, 3) float32: to the right and up per metre of depth, and weight.
-        sums: (pixels, 3) float32 weighted colours.
-        colour: (4,) colour of the present sample.
-    """
-
-    counts: NDArray[np.int64]
-    pixels: NDArray[np.int32]
-    numbers: NDArray[np.int32]
-    places: NDArray[np.float32]
-    sums: NDArray[np.float32]
-    colour: Array
-
-
-def new_canvas(width: int, samples: int) -> Canvas:
-    """Returns scratch space for pictures of a width, with `samples` x `samples` samples in a pixel."""
-    count = BAND * width * samples * samples
-    return Canvas(
-        np.zeros(3, np.int64), np.zeros((3, count), np.int32), np.zeros((3, count), np.int32),
-        np.zeros((3, count, 3), np.float32), np.zeros((BAND * width, 3), np.float32), np.zeros(4),
-    )  # fmt: skip
 
 
 @compiled
 def shade(
-    view: View, optics: Optics, buffer: VisibilityBuffer, samples: int, town: Mesh, overlay: Mesh, bodies: Mesh,
+    view: View, optics: Optics, buffer: VisibilityBuffer, side: int, town: Mesh, overlay: Mesh, bodies: Mesh,
     ground: GroundArrays, textures: Textures, light: Daylight, noise: NDArray[np.float32], lamps: LampMap,
-    shadows: ShadowMaps, canvas: Canvas, face: Face, picture: NDArray[np.uint8],
+    shadows: ShadowMaps, samples: Samples, face: Face, picture: NDArray[np.uint8],
 ) -> None:  # fmt: skip
     """Writes the colours of a picture.
 
     Args:
         view: projection of the picture.
         optics: numbers of the picture.
-        buffer: triangles, with `samples` x `samples` samples in a pixel.
-        samples: 1 or 2.
+        buffer: triangles, with `side` x `side` samples in a pixel.
+        side: 1 or 2.
         town: what stands in every session.
         overlay: what stands in this session.
         bodies: what moves.
@@ -88,52 +51,93 @@ def shade(
         noise: of the sky.
         lamps: light of street lamps on the ground.
         shadows: maps that were drawn for the picture.
-        canvas: scratch space.
+        samples: scratch space.
         face: scratch space.
-        picture: (h, w, 3) to be written.
+        picture: (h * w, 3) to be written.
     """
-    for top in range(0, view.height, BAND):
-        rows = min(BAND, view.height - top)
-        _gather(view, optics.pixel, buffer, samples, town, overlay, bodies, top, rows, canvas)
-        _shade_skies(optics, light, noise, canvas)
-        _shade_grounds(optics, town, overlay, bodies, ground, lamps, shadows, canvas)
-        _shade_solids(view, optics, town, overlay, bodies, textures, lamps, shadows, canvas, face)
-        for y in range(rows):
-            for x in range(view.width):
-                for k in range(3):
-                    picture[top + y, x, k] = int(canvas.sums[y * view.width + x, k] + np.float32(0.5))
+    pixel, count = 0, 0
+    face.kind[0] = SKY
+    for y in range(view.height):
+        upper, lower = buffer.triangles[y * side], buffer.triangles[y * side + side - 1]
+        x = 0
+        while x < view.width:
+            if count > ROOM - 4:
+                light_samples(optics, lamps, shadows, samples, count)
+                pixel = _write(samples, count, picture, pixel)
+                count = 0
+            end = x + 1
+            if side == 1 or _is_uniform(upper, lower, x * side, town, overlay, bodies):
+                number = upper[x * side]
+                end = _end_of_run(upper, lower, side, number, end, min(view.width, x + ROOM - count))
+                _place(view, optics, samples, count, end - x, x + 0.5, y + 0.5, 1.0)
+                _add_run(
+                    view, optics, town, overlay, bodies, ground, textures, light, noise, samples, face, number, count,
+                    end - x,
+                )  # fmt: skip
+                samples.parts[count : count + end - x] = 1
+                count += end - x
+            else:
+                first = count
+                for k in range(4):
+                    number = _sample(upper, lower, x, k)
+                    across, down, share = _place_of(upper, lower, x, k)
+                    if share > 0.0:
+                        _place(view, optics, samples, count, 1, x + across, y + down, share)
+                        _add_run(
+                            view, optics, town, overlay, bodies, ground, textures, light, noise, samples, face, number,
+                            count, 1,
+                        )  # fmt: skip
+                        count += 1
+                samples.parts[first] = count - first
+            x = end
+    light_samples(optics, lamps, shadows, samples, count)
+    _write(samples, count, picture, pixel)
 
 
 # --- Samples ----------------------------------------------------------------------------------------------------------
 
 
+@inlined
+def _end_of_run(
+    upper: NDArray[np.int32], lower: NDArray[np.int32], side: int, number: int, first: int, last: int
+) -> int:
+    """Returns the first pixel from `first` to `last` that does not see a triangle with all its samples."""
+    x = first
+    if side == 1:
+        while x < last and upper[x] == number:
+            x += 1
+        return x
+    while x < last and (
+        (upper[2 * x] == number)
+        & (upper[2 * x + 1] == number)
+        & (lower[2 * x] == number)
+        & (lower[2 * x + 1] == number)
+    ):
+        x += 1
+    return x
+
+
+@inlined
+def _sample(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) -> int:
+    """Returns the triangle that sample k of four in a pixel sees."""
+    return int(lower[2 * x + (k & 1)] if k >> 1 else upper[2 * x + (k & 1)])
+
+
 @compiled
-def _gather(
-    view: View, size: float, buffer: VisibilityBuffer, samples: int, town: Mesh, overlay: Mesh, bodies: Mesh, top: int,
-    rows: int, canvas: Canvas,
-) -> None:  # fmt: skip
-    """Sorts the samples of a band; `size` is the width of a pixel at a depth of 1 m [m]."""
-    triangles, last, kind = buffer.triangles, SKY, _SKIES
-    for k in range(3):
-        canvas.counts[k] = 0
-    for y in range(rows):
-        upper = triangles[(top + y) * samples]
-        lower = triangles[(top + y) * samples + samples - 1]
-        for x in range(view.width):
-            pixel, column = y * view.width + x, x * samples
-            canvas.sums[pixel, 0] = canvas.sums[pixel, 1] = canvas.sums[pixel, 2] = 0.0
-            number = upper[column]
-            if samples == 1 or _is_uniform(upper, lower, column, town, overlay, bodies):
-                if number != last:
-                    last, kind = number, _kind_of(town, overlay, bodies, number)
-                _add_sample(view, size, canvas, kind, pixel, number, x + 0.5, top + y + 0.5, 1.0)
-            else:
-                for k in range(4):
-                    number = lower[column + (k & 1)] if k >> 1 else upper[column + (k & 1)]
-                    if number != last:
-                        last, kind = number, _kind_of(town, overlay, bodies, number)
-                    across, down = x + 0.25 + 0.5 * (k & 1), top + y + 0.25 + 0.5 * (k >> 1)
-                    _add_sample(view, size, canvas, kind, pixel, number, across, down, 0.25)
+def _place_of(
+    upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int
+) -> tuple[float, float, float]:  # fmt: skip
+    """Returns the middle and the share of the samples of a pixel that see the triangle of sample k.
+
+    The share is 0 if an earlier sample sees it, too.
+    """
+    number, across, down, count = _sample(upper, lower, x, k), 0, 0, 0
+    for j in range(4):
+        if _sample(upper, lower, x, j) == number:
+            if j < k:
+                return 0.0, 0.0, 0.0
+            across, down, count = across + (j & 1), down + (j >> 1), count + 1
+    return 0.25 + 0.5 * across / count, 0.25 + 0.5 * down / count, 0.25 * count
 
 
 @inlined
@@ -181,133 +185,48 @@ def _are_textured_alike(one: Mesh, i: int, two: Mesh, j: int) -> bool:
 
 
 @inlined
-def _kind_of(town: Mesh, overlay: Mesh, bodies: Mesh, number: int) -> int:
-    if number == SKY:
-        return _SKIES
-    surface = mesh_of(town, overlay, bodies, number).surfaces[row_in(town, overlay, number)]
-    return _GROUNDS if surface & _GROUND else _SOLIDS
-
-
-@inlined
-def _add_sample(
-    view: View, size: float, canvas: Canvas, kind: int, pixel: int, number: int, x: float, y: float, weight: float
+def _place(
+    view: View, optics: Optics, samples: Samples, first: int, count: int, x: float, y: float, weight: float
 ) -> None:
-    at = canvas.counts[kind]
-    canvas.counts[kind] = at + 1
-    canvas.pixels[kind, at], canvas.numbers[kind, at] = pixel, number
-    canvas.places[kind, at, 0] = (x - 0.5 * view.width) * size
-    canvas.places[kind, at, 1] = (0.5 * view.height - y) * size
-    canvas.places[kind, at, 2] = weight
+    """Writes the places of neighbours in a row of the picture, of which the first is at (x, y) [pixels]."""
+    values, size = samples.values[first:], optics.pixel
+    left, up = x - 0.5 * view.width, (0.5 * view.height - y) * size
+    for k in range(count):
+        values[RIGHT + k], values[UP + k], values[WEIGHT + k] = (left + k) * size, up, weight
+
+
+@compiled
+def _add_run(
+    view: View, optics: Optics, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays, textures: Textures,
+    light: Daylight, noise: NDArray[np.float32], samples: Samples, face: Face, number: int, first: int, count: int,
+) -> None:  # fmt: skip
+    """Writes colours and surfaces of samples that see a triangle."""
+    if number == SKY:
+        add_sky(optics, light, noise, samples, first, count)
+        return
+    if number != face.kind[0]:
+        mesh, row = mesh_of(town, overlay, bodies, number), row_in(town, overlay, number)
+        read_face(view, optics, mesh, row, textures, face)
+        face.kind[0] = number
+    if face.kind[2] & _GROUND:
+        add_ground(optics, ground, samples, face, first, count)
+    else:
+        add_face(optics, textures, samples, face, first, count)
 
 
 @inlined
-def _add_colour(canvas: Canvas, kind: int, k: int, red: float, green: float, blue: float) -> None:
-    """Adds a colour to the pixel of a sample."""
-    pixel, weight = canvas.pixels[kind, k], canvas.places[kind, k, 2]
-    canvas.sums[pixel, 0] += weight * min(red, 255.0)
-    canvas.sums[pixel, 1] += weight * min(green, 255.0)
-    canvas.sums[pixel, 2] += weight * min(blue, 255.0)
-
-
-# --- Kinds ------------------------------------------------------------------------------------------------------------
-
-
-@compiled
-def _shade_skies(optics: Optics, light: Daylight, noise: NDArray[np.float32], canvas: Canvas) -> None:
-    colour = canvas.colour
-    for k in range(canvas.counts[_SKIES]):
-        right, up = canvas.places[_SKIES, k, 0], canvas.places[_SKIES, k, 1]
-        x, y, z = ray(optics, right, up)
-        scale = 1.0 / math.sqrt(1.0 + right * right + up * up)
-        sky_colour(light, noise, x * scale, y * scale, z * scale, colour)
-        _add_colour(canvas, _SKIES, k, colour[0], colour[1], colour[2])
-
-
-@compiled
-def _shade_grounds(
-    optics: Optics, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays, lamps: LampMap, shadows: ShadowMaps,
-    canvas: Canvas,
-) -> None:  # fmt: skip
-    last, sheet, nx, ny, nz, offset, facing = SKY, 0, 0.0, 0.0, 1.0, 0.0, 0.0
-    for k in range(canvas.counts[_GROUNDS]):
-        if canvas.numbers[_GROUNDS, k] != last:
-            last = canvas.numbers[_GROUNDS, k]
-            mesh, row = mesh_of(town, overlay, bodies, last), row_in(town, overlay, last)
-            sheet, corner, normal = int(mesh.textures[row]), mesh.corners[row, 0], mesh.normals[row]
-            nx, ny, nz = float(normal[0]), float(normal[1]), float(normal[2])
-            offset = nx * (corner[0] - optics.x) + ny * (corner[1] - optics.y) + nz * (corner[2] - optics.z)
-            facing = max(nx * optics.sun_x + ny * optics.sun_y + nz * optics.sun_z, 0.0)
-        right, up = float(canvas.places[_GROUNDS, k, 0]), float(canvas.places[_GROUNDS, k, 1])
-        dx, dy, dz = ray(optics, right, up)
-        toward = min(nx * dx + ny * dy + nz * dz, -1e-6)
-        red, green, blue = _ground_colour(
-            optics, sheet, offset / toward, right, up, toward, facing, nz, ground, lamps, shadows, canvas.colour
-        )
-        _add_colour(canvas, _GROUNDS, k, red, green, blue)
-
-
-@inlined
-def _ground_colour(
-    optics: Optics, sheet: int, depth: float, right: float, up: float, toward: float, facing: float, level: float,
-    ground: GroundArrays, lamps: LampMap, shadows: ShadowMaps, colour: Array,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Returns the colour of the ground at a depth in a direction (right, up, 1).
-
-    Args:
-        optics: numbers of the picture.
-        sheet: of the ground.
-        depth: [m].
-        right: of the direction.
-        up: of the direction.
-        toward: scalar product of direction and normal.
-        facing: cosine to the sun.
-        level: vertical part of the normal.
-        ground: materials and colours.
-        lamps: light of street lamps.
-        shadows: maps.
-        colour: scratch space.
-    """
-    dx, dy, dz = ray(optics, right, up)
-    x, y, z = depth * dx, depth * dy, optics.z + depth * dz
-    colour_at(ground, sheet, optics.x + x, optics.y + y, depth * optics.pixel / math.sqrt(max(-toward, 0.02)), colour)
-    lit = facing
-    if lit > 0.0 and optics.shadows and depth < REACH:
-        u, v = optics.x + x - optics.slope_x * z, optics.y + y - optics.slope_y * z
-        shade = sunlit(
-            shadows.town, shadows.bodies, optics.town_x, optics.town_y, optics.bodies_x, optics.bodies_y, u, v, z + 0.05
-        )
-        lit *= faded(shade, depth)
-    lamp, slant = 0.0, 0.0
-    if optics.head_lights > 0.0 or optics.wetness > 0.0:
-        slant = -toward / math.sqrt(1.0 + right * right + up * up)
-    if optics.head_lights > 0.0:
-        lamp = head_light(optics, x, y, z - optics.z, slant)
-    if optics.lamps > 0.0:
-        lamp += lamp_light(lamps, optics.x + x, optics.y + y) * optics.lamps
-    ambient = 0.8 + 0.2 * level
-    red = colour[0] * (optics.sky_r * ambient + optics.sun_r * lit + lamp * WARM[0])
-    green = colour[1] * (optics.sky_g * ambient + optics.sun_g * lit + lamp * WARM[1])
-    blue = colour[2] * (optics.sky_b * ambient + optics.sun_b * lit + lamp * WARM[2])
-    if optics.wetness > 0.0:
-        share = mirrored_share(optics.wetness, slant)
-        dark = (1.0 - 0.42 * optics.wetness) * (1.0 - share)
-        red, green, blue = (
-            red * dark + optics.horizon_r * share, green * dark + optics.horizon_g * share,
-            blue * dark + optics.horizon_b * share,
-        )  # fmt: skip
-    return through_air(optics, red, green, blue, depth, right, up)
-
-
-@compiled
-def _shade_solids(
-    view: View, optics: Optics, town: Mesh, overlay: Mesh, bodies: Mesh, textures: Textures, lamps: LampMap,
-    shadows: ShadowMaps, canvas: Canvas, face: Face,
-) -> None:  # fmt: skip
-    last = SKY
-    for k in range(canvas.counts[_SOLIDS]):
-        if canvas.numbers[_SOLIDS, k] != last:
-            last = canvas.numbers[_SOLIDS, k]
-            read_face(view, optics, mesh_of(town, overlay, bodies, last), row_in(town, overlay, last), textures, face)
-        right, up = float(canvas.places[_SOLIDS, k, 0]), float(canvas.places[_SOLIDS, k, 1])
-        red, green, blue = solid_colour(optics, face, right, up, textures, lamps, shadows)
-        _add_colour(canvas, _SOLIDS, k, red, green, blue)
+def _write(samples: Samples, count: int, picture: NDArray[np.uint8], first: int) -> int:
+    """Writes the colours of pixels from one on; returns the pixel after the last."""
+    values, pixel, k = samples.values, first, 0
+    while k < count:
+        parts = int(samples.parts[k])
+        red, green, blue = values[RED + k], values[GREEN + k], values[BLUE + k]
+        if parts > 1:
+            red, green, blue = 0.0, 0.0, 0.0
+            for j in range(k, k + parts):
+                red += values[WEIGHT + j] * values[RED + j]
+                green += values[WEIGHT + j] * values[GREEN + j]
+                blue += values[WEIGHT + j] * values[BLUE + j]
+        picture[pixel, 0], picture[pixel, 1], picture[pixel, 2] = int(red + 0.5), int(green + 0.5), int(blue + 0.5)
+        pixel, k = pixel + 1, k + parts
+    return pixel

@@ -28,14 +28,17 @@ TEXEL = 0.2
 REACH = 70.0
 """Distance from the camera up to which shadows are drawn [m]; the last quarter fades."""
 
+STEPS = 50.0
+"""Heights in maps per metre."""
+
 LOWEST_SUN = 4.0
 """Altitude of the sun below which nothing casts shadows [degrees]."""
 
 _TILE = 128  # width of a tile [squares]
 _TILES = 8  # tiles along each side of the map; a power of two
 _SIDE = _TILE * _TILES
+_WRAP = _SIDE - 1
 _BODIES = 512  # width of the map of bodies [squares]
-_STEPS = 50.0  # heights per metre
 _NOTHING = -32768
 _GROUND = int(Surface.GROUND)
 
@@ -184,8 +187,8 @@ def _cast(
         height = z + mesh.corners[k, j, 2]
         corners[j, 0] = (x + px * c - py * s - slope[0] * height) / TEXEL - left
         corners[j, 1] = (y + px * s + py * c - slope[1] * height) / TEXEL - top
-        corners[j, 2] = height * _STEPS
-    _fill_heights(target, corners, -nx / rise * TEXEL * _STEPS, -ny / rise * TEXEL * _STEPS)
+        corners[j, 2] = height * STEPS
+    _fill_heights(target, corners, -nx / rise * TEXEL * STEPS, -ny / rise * TEXEL * STEPS)
 
 
 @inlined
@@ -211,7 +214,7 @@ def _fill_heights(target: NDArray[np.int16], corners: Array, right: float, down:
 @inlined
 def sunlit(
     town: NDArray[np.int16], bodies: NDArray[np.int16], town_x: int, town_y: int, bodies_x: int, bodies_y: int,
-    u: float, v: float, z: float,
+    column: int, row: int, a: float, b: float, level: float,
 ) -> float:  # fmt: skip
     """Returns the share of the sun's light at a place on the plane, 0 to 1, with soft edges.
 
@@ -222,21 +225,15 @@ def sunlit(
         town_y: first row.
         bodies_x: first column of the map of bodies.
         bodies_y: first row.
-        u: place on the plane [m].
-        v: place on the plane [m].
-        z: height above which surfaces cast a shadow on the place [m].
+        column: square whose middle is left of the place.
+        row: square whose middle is above the place.
+        a: way from there to the right [squares].
+        b: way from there downwards [squares].
+        level: height above which surfaces cast a shadow on the place [1/50 m].
     """
-    across, down = u * (1.0 / TEXEL) - 0.5, v * (1.0 / TEXEL) - 0.5
-    column, row = math.floor(across), math.floor(down)
-    a, b, level, lit = across - column, down - row, z * _STEPS, 1.0
-    i, j = column - town_x, row - town_y
+    lit, i, j = 1.0, column - town_x, row - town_y
     if 0 <= i < _SIDE - 1 and 0 <= j < _SIDE - 1:
-        left, right, top, below = (
-            column & (_SIDE - 1),
-            (column + 1) & (_SIDE - 1),
-            row & (_SIDE - 1),
-            (row + 1) & (_SIDE - 1),
-        )
+        left, right, top, below = column & _WRAP, (column + 1) & _WRAP, row & _WRAP, (row + 1) & _WRAP
         lit = _mixed(town[top, left], town[top, right], town[below, left], town[below, right], level, a, b)
     i, j = column - bodies_x, row - bodies_y
     if 0 <= i < _BODIES - 1 and 0 <= j < _BODIES - 1 and lit > 0.0:
@@ -247,12 +244,8 @@ def sunlit(
 @inlined
 def _mixed(one: int, two: int, three: int, four: int, level: float, a: float, b: float) -> float:
     """Returns the share of the light that four squares let through."""
+    if max(max(one, two), max(three, four)) <= level:
+        return 1.0
     upper = (1.0 - a if one <= level else 0.0) + (a if two <= level else 0.0)
     lower = (1.0 - a if three <= level else 0.0) + (a if four <= level else 0.0)
     return upper * (1.0 - b) + lower * b
-
-
-@inlined
-def faded(lit: float, distance: float) -> float:
-    """Returns the share of light at a distance from the camera [m]: distant shadows fade."""
-    return lit + (1.0 - lit) * min(1.0, max(0.0, distance * (4.0 / REACH) - 3.0))

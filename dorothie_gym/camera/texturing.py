@@ -37,35 +37,40 @@ def textures_of(atlas: AtlasArrays) -> Textures:
 
 @inlined
 def sample_texture(
-    textures: Textures, texture: int, u: float, v: float, du: float, dv: float, across: float
-) -> tuple[float, float, float, float]:
-    """Returns red, green, blue and own light of a texture, 0..255.
+    texels: NDArray[np.uint32], first: int, width: int, height: int, last: int, u: float, v: float, du: float,
+    dv: float, along: float, across: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Returns red, green and blue of a texture, 0..1, and its own light, 0..255.
 
     Args:
-        textures: all textures.
-        texture: index.
+        texels: of all textures.
+        first: texel of the texture.
+        width: [texels].
+        height: [texels].
+        last: number of halvings of the texture.
         u: coordinate to the right, in repeats.
         v: coordinate upwards.
         du: of the longer side of the footprint.
         dv: of the longer side of the footprint.
-        across: shorter side of the footprint [texels].
+        along: square of the longer side of the footprint [texels^2].
+        across: square of the shorter side of the footprint [texels^2].
     """
-    table = textures.table
-    first, width, height = int(table[texture, 0]), int(table[texture, 1]), int(table[texture, 2])
-    along = du * du * width * width + dv * dv * height * height  # squares of lengths [texels], as below
-    size = max(across * across, 0.25 * along, 1.0)
-    probes, step, last = (1, 1.0, table[texture, 3] - 1) if along < 2.25 * size else (2, 0.5, table[texture, 3] - 1)
+    size = max(across, 0.25 * along, 1.0)
+    is_long = along >= 2.25 * size
     while size >= 2.25 and last > 0:
         first += width * height
         width, height, size, last = width >> 1, height >> 1, 0.25 * size, last - 1
-    total, wide, high = 0, width * 256.0, height * 256.0
-    u, v = u + (0.5 * step - 0.5) * du, v + (0.5 * step - 0.5) * dv
-    for _ in range(probes):
-        total += _mixed_texel(textures.texels, first, width, height, u * wide, v * high)
-        u, v = u + step * du, v + step * dv
+    wide, high = width * 256.0, height * 256.0
+    if is_long:
+        total = _mixed_texel(texels, first, width, height, (u - 0.25 * du) * wide, (v - 0.25 * dv) * high)
+        total += _mixed_texel(texels, first, width, height, (u + 0.25 * du) * wide, (v + 0.25 * dv) * high)
+        scale = 0.5
+    else:
+        total, scale = _mixed_texel(texels, first, width, height, u * wide, v * high), 1.0
+    share = scale * (1.0 / 255.0)
     return (
-        (total & 0xFFFF) * step, ((total >> 32) & 0xFFFF) * step, ((total >> 16) & 0xFFFF) * step,
-        ((total >> 48) & 0xFFFF) * step,
+        (total & 0xFFFF) * share, ((total >> 32) & 0xFFFF) * share, ((total >> 16) & 0xFFFF) * share,
+        ((total >> 48) & 0xFFFF) * scale,
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from dorothie_gym.camera.ground.colours import TEXEL, ground_noise, halved, pain
 from dorothie_gym.camera.ground.lookup import GroundArrays
 from dorothie_gym.camera.ground.materials import material_classes, material_colours, material_grains
 from dorothie_gym.camera.ground.sheets import Sheet
+from dorothie_gym.camera.ground.squares import find_squares
 
 LEVELS = 8
 """Number of averaged pictures: texels of 0.5 to 64 m."""
@@ -21,6 +22,7 @@ def ground_arrays(sheets: Sequence[Sheet]) -> GroundArrays:
     """Returns the lookup of materials and colours of sheets."""
     cells = [build_cells(sheet.polygons, sheet.low, sheet.high, sheet.outside) for sheet in sheets]
     ground = _joined(cells)
+    ground = ground._replace(squares=find_squares(ground))
     levels, texels = _pictures(ground, cells)
     return ground._replace(levels=levels, texels=texels)
 
@@ -44,6 +46,7 @@ def _joined(parts: Sequence[Cells]) -> GroundArrays:
         cells=np.concatenate(cells),
         bases=np.concatenate([part.bases for part in parts]),
         entries=_ranges(counts),
+        squares=np.zeros((0, 1), np.uint8),
         materials=np.concatenate([part.materials for part in parts]),
         parities=np.concatenate([part.parities for part in parts]),
         uses=_ranges(uses),

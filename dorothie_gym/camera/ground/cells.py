@@ -124,7 +124,7 @@ def _box(grid: Array, shape: NDArray[np.int64], segments: Array, first: int, las
 
 
 @compiled
-def _row_span(grid: Array, segments: Array, edge: int, row: int) -> tuple[int, int]:
+def row_span(grid: Array, segments: Array, edge: int, row: int) -> tuple[int, int]:
     """Returns the first and last column of cells that an edge touches in a row (first > last if none)."""
     ax, ay, bx, by = segments[edge, 0], segments[edge, 1], segments[edge, 2], segments[edge, 3]
     low, high = grid[1] + row * grid[2] - _CLOSE, grid[1] + (row + 1) * grid[2] + _CLOSE
@@ -162,7 +162,7 @@ def _rasterise(
         begin = max(top, int(np.floor((min(ay, by) - _CLOSE - grid[1]) / grid[2])))
         end = min(bottom, int(np.floor((max(ay, by) + _CLOSE - grid[1]) / grid[2])))
         for row in range(begin, end + 1):
-            a, b = _row_span(grid, segments, edge, row)
+            a, b = row_span(grid, segments, edge, row)
             for column in range(max(a, left), min(b, right) + 1):
                 touched[row * shape[0] + column] += 1
             y = grid[1] + row * grid[2]
@@ -225,7 +225,7 @@ def _fill(
             begin = max(box[2], int(np.floor((low - _CLOSE - grid[1]) / grid[2])))
             end = min(box[3], int(np.floor((high + _CLOSE - grid[1]) / grid[2])))
             for row in range(begin, end + 1):
-                a, b = _row_span(grid, segments, edge, row)
+                a, b = row_span(grid, segments, edge, row)
                 for column in range(max(a, box[0]), min(b, box[1]) + 1):
                     cell = row * shape[0] + column
                     if base[cell] == _OPEN:

@@ -6,115 +6,146 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.camera.ground.lookup import GroundArrays, cell_at, material_at, material_in
-from dorothie_gym.compilation import compiled
-from dorothie_gym.maps.model import Array
+from dorothie_gym.compilation import compiled, inlined
 
 TEXEL = 0.5
 """Width of a texel of the finest averaged picture [m]; doubles from level to level."""
 
 NOISE_SIZE = 256
+_NOISE_BITS = 8
 
-_FINE, _COARSE = 24.0, 2.1  # [1/m] points of noise: grains, patches
-_SHARP = 0.03  # [m] footprint up to which one sample is sufficient
-_BLENDED = 0.3  # [m] footprint from which averaged colours are blended in
-_COARSE_SHARE = 0.5  # strength of the patches relative to the grains
+GRAINS, PATCHES = 24.0, 2.1
+"""Points of noise of two sizes [1/m]."""
+
+BLENDED = 0.3
+"""Width of a footprint from which on averaged colours are blended in [m]."""
+
+SHARP = 0.03
+"""Width of a footprint up to which one sample is sufficient [m]."""
+
+_PATCH_SHARE = 0.5  # strength of the patches relative to the grains
 _SHIFT = 1 << 20  # makes all coordinates positive: truncation instead of rounding down
+_MASK = NOISE_SIZE - 1
 
 
 @compiled
-def colour_at(ground: GroundArrays, sheet: int, x: float, y: float, footprint: float, out: Array) -> None:
-    """Writes the colour at a position [m], averaged over a square of a width `footprint` [m], to `out` (3,), 0..255."""
+def colour_at(
+    ground: GroundArrays, sheet: int, x: float, y: float, footprint: float
+) -> tuple[float, float, float]:  # fmt: skip
+    """Returns red, green and blue, 0..255, at a position [m], averaged over a square of a width `footprint` [m]."""
     if footprint >= TEXEL:
-        _averaged(ground, sheet, x, y, footprint, out)
-        return
-    _sampled(ground, sheet, x, y, footprint, out)
-    if footprint > _BLENDED:
-        share = (footprint - _BLENDED) / (TEXEL - _BLENDED)
-        red, green, blue = out[0], out[1], out[2]
-        _averaged(ground, sheet, x, y, TEXEL, out)
-        out[0] = red + share * (out[0] - red)
-        out[1] = green + share * (out[1] - green)
-        out[2] = blue + share * (out[2] - blue)
+        return _averaged(ground, sheet, x, y, footprint)
+    red, green, blue = _sampled(ground, sheet, x, y, footprint)
+    if footprint > BLENDED:
+        share = (footprint - BLENDED) / (TEXEL - BLENDED)
+        other = _averaged(ground, sheet, x, y, TEXEL)
+        red, green, blue = (
+            red + share * (other[0] - red), green + share * (other[1] - green), blue + share * (other[2] - blue)
+        )  # fmt: skip
+    return red, green, blue
 
 
 @compiled
-def _sampled(ground: GroundArrays, sheet: int, x: float, y: float, footprint: float, out: Array) -> None:
-    """Writes the colour of the material, or the mean of four samples where they differ, with noise."""
-    value = cell_at(ground, sheet, x, y)
-    if value >= 0 or footprint <= _SHARP:
-        material = value if value >= 0 else material_in(ground, sheet, -1 - value, x, y)
-        red, green, blue = ground.colours[material, 0], ground.colours[material, 1], ground.colours[material, 2]
-        grain = ground.grains[material]
+def _sampled(
+    ground: GroundArrays, sheet: int, x: float, y: float, footprint: float
+) -> tuple[float, float, float]:  # fmt: skip
+    """Returns the colour of the material, or the mean of four samples where they differ, with noise."""
+    if footprint <= SHARP or cell_at(ground, sheet, x, y) >= 0:
+        red, green, blue, grain = _look(ground, material_at(ground, sheet, x, y))
     else:
-        step = footprint / 4.0
+        step, share = footprint / 4.0, 0.5
         a = material_at(ground, sheet, x - step, y - step)
         d = material_at(ground, sheet, x + step, y + step)
-        red = ground.colours[a, 0] + ground.colours[d, 0]
-        green = ground.colours[a, 1] + ground.colours[d, 1]
-        blue = ground.colours[a, 2] + ground.colours[d, 2]
-        grain = ground.grains[a] + ground.grains[d]
-        share = np.float32(0.5)
+        red, green, blue, grain = _look(ground, a)
+        r, g, b, n = _look(ground, d)
+        red, green, blue, grain = red + r, green + g, blue + b, grain + n
         if a != d:
-            b = material_at(ground, sheet, x + step, y - step)
-            c = material_at(ground, sheet, x - step, y + step)
-            red += ground.colours[b, 0] + ground.colours[c, 0]
-            green += ground.colours[b, 1] + ground.colours[c, 1]
-            blue += ground.colours[b, 2] + ground.colours[c, 2]
-            grain += ground.grains[b] + ground.grains[c]
-            share = np.float32(0.25)
+            for k in range(2):
+                side = step if k == 0 else -step
+                r, g, b, n = _look(ground, material_at(ground, sheet, x + side, y - side))
+                red, green, blue, grain = red + r, green + g, blue + b, grain + n
+            share = 0.25
         red, green, blue, grain = red * share, green * share, blue * share, grain * share
-    factor = 1.0 + grain * _noise(ground, x, y, footprint)
-    out[0], out[1], out[2] = red * factor, green * factor, blue * factor
+    noise = noise_at(ground.noise, noise_place(x, y, GRAINS)) * grain_weight(footprint)
+    noise += noise_at(ground.noise, noise_place(x, y, PATCHES)) * patch_weight(footprint)
+    factor = 1.0 + grain * noise
+    return red * factor, green * factor, blue * factor
+
+
+@inlined
+def _look(ground: GroundArrays, material: int) -> tuple[float, float, float, float]:
+    """Returns red, green, blue and the strength of the noise of a material."""
+    colours = ground.colours
+    return (
+        float(colours[material, 0]), float(colours[material, 1]), float(colours[material, 2]),
+        float(ground.grains[material]),
+    )  # fmt: skip
+
+
+@inlined
+def noise_place(x: float, y: float, density: float) -> int:
+    """Returns the entry of the noise at a position [m] for points of a density [1/m]."""
+    return (int(y * density + _SHIFT) & _MASK) * NOISE_SIZE + (int(x * density + _SHIFT) & _MASK)
+
+
+@inlined
+def noise_at(noise: NDArray[np.uint8], place: int) -> float:
+    """Returns noise in about -1..1 around 0."""
+    return int(noise[place >> _NOISE_BITS, place & _MASK]) * (1.0 / 128.0) - 1.0
+
+
+@inlined
+def grain_weight(footprint: float) -> float:
+    """Returns the strength of grains, which are finer than a large footprint [m]."""
+    return max(0.0, 1.0 - footprint * 6.0)
+
+
+@inlined
+def patch_weight(footprint: float) -> float:
+    """Returns the strength of patches for a footprint [m]."""
+    return _PATCH_SHARE * max(0.0, 1.0 - footprint * (1.0 / TEXEL))
 
 
 @compiled
-def _noise(ground: GroundArrays, x: float, y: float, footprint: float) -> float:
-    """Returns noise in about -1..1 around 0, without the grains that are finer than a footprint [m]."""
-    mask = NOISE_SIZE - 1
-    coarse = ground.noise[int(y * _COARSE + _SHIFT) & mask, int(x * _COARSE + _SHIFT) & mask] / 128.0 - 1.0
-    visible = 1.0 - footprint * 6.0
-    if visible <= 0.0:
-        return float(coarse * _COARSE_SHARE * max(0.0, 1.0 - footprint / TEXEL))
-    fine = ground.noise[int(y * _FINE + _SHIFT) & mask, int(x * _FINE + _SHIFT) & mask] / 128.0 - 1.0
-    return float(fine * visible + coarse * _COARSE_SHARE * (1.0 - footprint / TEXEL))
+def _averaged(
+    ground: GroundArrays, sheet: int, x: float, y: float, footprint: float
+) -> tuple[float, float, float]:  # fmt: skip
+    """Returns the colour of the averaged pictures: linear within two levels and between them."""
+    level, size, last = 0, TEXEL, ground.levels.shape[1] - 1
+    while level < last and footprint >= 2.0 * size:
+        level, size = level + 1, 2.0 * size
+    red, green, blue = _level_colour(ground, sheet, level, size, x, y)
+    share = min(max(footprint / size - 1.0, 0.0), 1.0)
+    if share > 0.0 and level < last:
+        r, g, b = _level_colour(ground, sheet, level + 1, 2.0 * size, x, y)
+        red, green, blue = red + share * (r - red), green + share * (g - green), blue + share * (b - blue)
+    return red, green, blue
 
 
 @compiled
-def _averaged(ground: GroundArrays, sheet: int, x: float, y: float, footprint: float, out: Array) -> None:
-    """Writes the colour of the averaged pictures: linear within two levels and between them."""
-    last = ground.levels.shape[1] - 1
-    depth = np.log2(footprint / TEXEL)
-    level = min(int(depth), last)
-    share = min(max(depth - level, 0.0), 1.0) if level < last else 0.0
-    out[0] = out[1] = out[2] = 0.0
-    _add_level(ground, sheet, level, x, y, 1.0 - share, out)
-    if share > 0.0:
-        _add_level(ground, sheet, level + 1, x, y, share, out)
-
-
-@compiled
-def _add_level(ground: GroundArrays, sheet: int, level: int, x: float, y: float, weight: float, out: Array) -> None:
-    """Adds the bilinear colour of one level with a weight."""
+def _level_colour(
+    ground: GroundArrays, sheet: int, level: int, size: float, x: float, y: float
+) -> tuple[float, float, float]:  # fmt: skip
+    """Returns the bilinear colour of one level, whose texels have a size [m]."""
     columns, rows = ground.levels[sheet, level, 0], ground.levels[sheet, level, 1]
-    size = TEXEL * 2.0**level
-    u = (x - ground.origins[sheet, 0]) / size - 0.5
-    v = (y - ground.origins[sheet, 1]) / size - 0.5
+    u, v = (x - ground.origins[sheet, 0]) / size - 0.5, (y - ground.origins[sheet, 1]) / size - 0.5
     if u < -0.5 or v < -0.5 or u > columns - 0.5 or v > rows - 0.5:
-        material = ground.outside[sheet]
-        for k in range(3):
-            out[k] += weight * ground.colours[material, k]
-        return
+        red, green, blue, _ = _look(ground, int(ground.outside[sheet]))
+        return red, green, blue
     u, v = min(max(u, 0.0), columns - 1.0), min(max(v, 0.0), rows - 1.0)
     left, top = int(u), int(v)
     right, below = min(left + 1, columns - 1), min(top + 1, rows - 1)
     u, v = u - left, v - top
-    first = ground.levels[sheet, level, 2]
+    first, texels = ground.levels[sheet, level, 2], ground.texels
     a, b = first + top * columns + left, first + top * columns + right
     c, d = first + below * columns + left, first + below * columns + right
-    for k in range(3):
-        upper = ground.texels[a, k] * (1.0 - u) + ground.texels[b, k] * u
-        lower = ground.texels[c, k] * (1.0 - u) + ground.texels[d, k] * u
-        out[k] += weight * (upper * (1.0 - v) + lower * v)
+    both = u * v
+    wa, wb, wc, wd = 1.0 - u - v + both, u - both, v - both, both
+    return (
+        int(texels[a, 0]) * wa + int(texels[b, 0]) * wb + int(texels[c, 0]) * wc + int(texels[d, 0]) * wd,
+        int(texels[a, 1]) * wa + int(texels[b, 1]) * wb + int(texels[c, 1]) * wc + int(texels[d, 1]) * wd,
+        int(texels[a, 2]) * wa + int(texels[b, 2]) * wb + int(texels[c, 2]) * wc + int(texels[d, 2]) * wd,
+    )
 
 
 # --- Building ---------------------------------------------------------------------------------------------------------

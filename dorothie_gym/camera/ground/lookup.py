@@ -7,6 +7,7 @@ crossed an odd number of times by the edges of a polygon if one end is inside an
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,12 @@ from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
+
+SQUARES = 8
+"""Squares along each side of a mixed cell."""
+
+SEVERAL = 255
+"""Material of squares that edges touch."""
 
 
 @by_reference
@@ -33,6 +40,7 @@ class GroundArrays(NamedTuple):
         size: (1,) width of a cell [m].
         cells: material of a cell, or -1 - k for the mixed cell k.
         bases: material of each mixed cell below all polygons with edges in it.
+        squares: (n, SQUARES * SQUARES) material of the squares of each mixed cell, `SEVERAL` where edges are.
         entries: range of candidates of mixed cell k: entries[k] to entries[k + 1], from the top.
         materials: material of each candidate.
         parities: whether the first corner of the cell lies inside the candidate.
@@ -54,6 +62,7 @@ class GroundArrays(NamedTuple):
     size: Array
     cells: NDArray[np.int32]
     bases: NDArray[np.uint8]
+    squares: NDArray[np.uint8]
     entries: NDArray[np.int32]
     materials: NDArray[np.uint8]
     parities: NDArray[np.bool_]
@@ -109,8 +118,17 @@ def material_in(ground: GroundArrays, sheet: int, mixed: int, x: float, y: float
 @compiled
 def material_at(ground: GroundArrays, sheet: int, x: float, y: float) -> int:
     """Returns the material of a sheet at a position [m]: of the top-most polygon that contains it."""
-    value = cell_at(ground, sheet, x, y)
-    return value if value >= 0 else material_in(ground, sheet, -1 - value, x, y)
+    size = ground.size[0]
+    across, down = (x - ground.origins[sheet, 0]) / size, (y - ground.origins[sheet, 1]) / size
+    column, row = math.floor(across), math.floor(down)
+    if column < 0 or row < 0 or column >= ground.shapes[sheet, 0] or row >= ground.shapes[sheet, 1]:
+        return int(ground.outside[sheet])
+    value = int(ground.cells[ground.firsts[sheet] + row * ground.shapes[sheet, 0] + column])
+    if value >= 0:
+        return value
+    square = int((down - row) * SQUARES) * SQUARES + int((across - column) * SQUARES)
+    material = int(ground.squares[-1 - value, square])
+    return material if material != SEVERAL else material_in(ground, sheet, -1 - value, x, y)
 
 
 @compiled

@@ -117,7 +117,7 @@ def test_colours_of_the_map_are_materials_or_symbols() -> None:
 @compiled
 def colours_at(ground: GroundArrays, points: Array, footprint: float, out: Array) -> None:
     for k in range(len(points)):
-        colour_at(ground, 0, points[k, 0], points[k, 1], footprint, out[k])
+        out[k, 0], out[k, 1], out[k, 2] = colour_at(ground, 0, points[k, 0], points[k, 1], footprint)
 
 
 def seen_colours(ground: GroundArrays, points: Array, footprint: float) -> Array:

@@ -1,0 +1,111 @@
+"""Colours of the ground in a picture."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.camera.faces import Face
+from dorothie_gym.camera.ground.colours import (
+    BLENDED,
+    GRAINS,
+    PATCHES,
+    SHARP,
+    colour_at,
+    grain_weight,
+    noise_at,
+    noise_place,
+    patch_weight,
+)  # fmt: skip
+from dorothie_gym.camera.ground.lookup import SEVERAL, SQUARES, GroundArrays
+from dorothie_gym.camera.mesh import Surface
+from dorothie_gym.camera.optics import Optics
+from dorothie_gym.camera.samples import (
+    AMBIENT,
+    BIAS,
+    BLUE,
+    BRIGHT,
+    DEPTH,
+    FIRST,
+    GREEN,
+    LAMP,
+    ONE,
+    OWN,
+    RED,
+    RIGHT,
+    SECOND,
+    SLANT,
+    SUN,
+    THIRD,
+    THREE,
+    TWO,
+    UP,
+    Samples,
+    X,
+    Y,
+)  # fmt: skip
+from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.maps.model import Array
+
+_GROUND = int(Surface.GROUND)
+_PARTS = SQUARES * SQUARES
+
+
+@compiled
+def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Face, first: int, count: int) -> None:
+    """Writes colours and surfaces of samples from `first` on that see the present triangle, which is ground."""
+    values, places, sheet = samples.values[first:], samples.indices[first:], face.kind[1]
+    _place_ground(optics, ground, values, places, face, count)
+    samples.surfaces[first : first + count] = _GROUND
+    cells, squares, noise = ground.cells[ground.firsts[sheet] :], ground.squares, ground.noise
+    outside = int(ground.outside[sheet])
+    for k in range(count):
+        width, place, material = values[ONE + k], places[FIRST + k], outside
+        if place >= 0:
+            material = int(cells[place // _PARTS])
+            if material < 0:
+                material = int(squares[-1 - material, place % _PARTS]) if width <= SHARP else SEVERAL
+        if material != SEVERAL and width <= BLENDED:
+            fine, coarse = places[SECOND + k], places[THIRD + k]
+            grain = noise_at(noise, fine) * values[TWO + k] + noise_at(noise, coarse) * values[THREE + k]
+            factor = 1.0 + float(ground.grains[material]) * grain
+            values[RED + k] = float(ground.colours[material, 0]) * factor
+            values[GREEN + k] = float(ground.colours[material, 1]) * factor
+            values[BLUE + k] = float(ground.colours[material, 2]) * factor
+        else:
+            values[RED + k], values[GREEN + k], values[BLUE + k] = colour_at(
+                ground, sheet, values[X + k], values[Y + k], width
+            )
+
+
+@inlined
+def _place_ground(
+    optics: Optics, ground: GroundArrays, values: Array, places: NDArray[np.int64], face: Face, count: int
+) -> None:
+    """Writes where samples lie, and all that is the same for all of them."""
+    plane, sheet, inverse = face.plane, face.kind[1], 1.0 / ground.size[0]
+    offset, rightward, upward, inward = plane[0], plane[1], plane[2], plane[3]
+    sun, bias, ambient = face.light[0], face.light[1], face.light[2]
+    left, top = ground.origins[sheet, 0], ground.origins[sheet, 1]
+    columns, rows = ground.shapes[sheet, 0], ground.shapes[sheet, 1]
+    for k in range(count):
+        right, up = values[RIGHT + k], values[UP + k]
+        toward = min(rightward * right + upward * up + inward, -1e-6)
+        depth = offset / toward
+        x = optics.x + depth * (optics.ahead_x + right * optics.right_x + up * optics.up_x)
+        y = optics.y + depth * (optics.ahead_y + right * optics.right_y + up * optics.up_y)
+        width = depth * optics.pixel / math.sqrt(max(-toward, 0.02))
+        values[DEPTH + k], values[SLANT + k], values[X + k], values[Y + k] = depth, -toward, x, y
+        values[ONE + k] = width
+        values[TWO + k], values[THREE + k] = grain_weight(width), patch_weight(width)
+        across, down = (x - left) * inverse, (y - top) * inverse
+        column, row = math.floor(across), math.floor(down)
+        square = int((down - row) * SQUARES) * SQUARES + int((across - column) * SQUARES)
+        inside = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+        places[FIRST + k] = (row * columns + column) * _PARTS + square if inside else -1
+        places[SECOND + k], places[THIRD + k] = noise_place(x, y, GRAINS), noise_place(x, y, PATCHES)
+    for k in range(count):
+        values[OWN + k], values[BRIGHT + k], values[LAMP + k] = 0.0, 0.0, 1.0
+        values[SUN + k], values[BIAS + k], values[AMBIENT + k] = sun, bias, ambient
