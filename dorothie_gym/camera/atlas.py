@@ -14,7 +14,7 @@ from dorothie_gym.camera import patterns
 from dorothie_gym.camera.lettering import Ink, Picture, lettered
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
-from dorothie_gym.ontology import LandmarkName
+from dorothie_gym.ontology import LandmarkName, StreetName
 
 SIGN_SIZE = 256, 64
 """Width and height of panels with words [px]."""
@@ -182,7 +182,27 @@ def town_atlas() -> AtlasArrays:
 
 
 def with_street_names(base: AtlasArrays, names: Sequence[str]) -> AtlasArrays:
-    """Returns the textures of a town, followed by the blades of its streets with the names of a session."""
+    """Returns the textures of a town, followed by the blades of its streets with the names of a session.
+
+    Sessions share the texels of the names of the ontology: only their tables differ.
+    """
+    if base is town_atlas() and all(name in _STREETS for name in names):
+        atlas, first = _atlas_of_streets(), len(base.table)
+        rows = [first + _STREETS[name] for name in names]
+        return AtlasArrays(atlas.texels, np.concatenate((base.table, atlas.table[rows])))
+    return _with_blades(base, names)
+
+
+_STREETS = {street.label: k for k, street in enumerate(StreetName)}
+
+
+@lru_cache(maxsize=1)
+def _atlas_of_streets() -> AtlasArrays:
+    """Returns the textures of a town, followed by the blades of all names of the ontology."""
+    return _with_blades(town_atlas(), list(_STREETS))
+
+
+def _with_blades(base: AtlasArrays, names: Sequence[str]) -> AtlasArrays:
     blades = TextureAtlas(
         lettered(name or " ", SIGN_SIZE, ink=STREET_INK, ground=STREET_GROUND, rim=STREET_INK, margin=0.1)
         for name in names

@@ -11,12 +11,12 @@ from dorothie_gym.camera.cells import is_hidden, is_in_view
 from dorothie_gym.camera.mesh import PLAIN, Mesh
 from dorothie_gym.camera.models.model_bank import PlacementRecord
 from dorothie_gym.camera.pose import View
-from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation import concurrent, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.model import Array
 
 
-@compiled
+@concurrent
 def copy_bodies(
     view: View, tiles: NDArray[np.float32], bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32],
     bodies: RecordArray[PlacementRecord], box: Array, target: Mesh,

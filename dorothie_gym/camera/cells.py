@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.rasterizer import NEAR, VisibilityBuffer, draw_triangles
-from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
@@ -85,7 +85,7 @@ def new_order(cells: CellTable, width: int, height: int) -> CellOrder:
     )  # fmt: skip
 
 
-@compiled
+@concurrent
 def draw_cells(
     view: View, buffer: VisibilityBuffer, mesh: Mesh, cells: CellTable, scratch: CellOrder, number: int
 ) -> int:

@@ -11,7 +11,7 @@ from dorothie_gym.camera.ground.lookup import GroundArrays, material_at
 from dorothie_gym.camera.mesh import Mesh, Surface
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.rasterizer import SKY, VisibilityBuffer
-from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.ontology import ObjectClass
 
@@ -42,7 +42,7 @@ def new_labels(width: int, height: int) -> Labels:
     )  # fmt: skip
 
 
-@compiled
+@concurrent
 def write_labels(
     view: View, buffer: VisibilityBuffer, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays, labels: Labels
 ) -> None:
@@ -123,7 +123,7 @@ def plane_of(view: View, mesh: Mesh, row: int) -> tuple[float, float, float, flo
     )
 
 
-@compiled
+@concurrent
 def find_boxes(instance: NDArray[np.int32], keys: NDArray[np.int32], boxes: NDArray[np.int32]) -> None:
     """Writes the box and the number of the pixels of each instance.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.camera.optics import Optics
-from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation import concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
@@ -120,7 +120,7 @@ def clearness(optics: Optics, depth: float, right: float, up: float) -> float:
     return clear
 
 
-@compiled
+@concurrent
 def add_rain(picture: NDArray[np.uint8], rainfall: float, frame: int) -> None:
     """Draws streaks of rain.
 

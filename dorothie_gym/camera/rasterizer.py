@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.pose import View
-from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
 
@@ -51,14 +51,14 @@ def new_buffer(width: int, height: int) -> VisibilityBuffer:
     )  # fmt: skip
 
 
-@compiled
+@concurrent
 def clear(buffer: VisibilityBuffer) -> None:
     """Empties a buffer."""
     buffer.nearness[:] = 0.0
     buffer.triangles[:] = SKY
 
 
-@compiled
+@concurrent
 def draw_triangles(
     view: View, buffer: VisibilityBuffer, mesh: Mesh, first: int, last: int, number: int
 ) -> None:  # fmt: skip

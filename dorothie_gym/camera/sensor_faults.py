@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation import concurrent
 from dorothie_gym.ontology import Sensor
 
 _SHARE = 0.012  # radius of the blur as a share of the picture's width
@@ -31,7 +31,7 @@ def apply_faults(picture: NDArray[np.uint8], faults: Collection[Sensor], scratch
                 blur(picture, channel, radius, scratch)
 
 
-@compiled
+@concurrent
 def blur(picture: NDArray[np.uint8], channel: int, radius: int, scratch: NDArray[np.uint8]) -> None:
     """Replaces a channel by its means over squares; rows and columns go on as they end."""
     height, width, _ = picture.shape

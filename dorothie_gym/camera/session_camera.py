@@ -17,7 +17,7 @@ from dorothie_gym.camera.models.model_bank import FIRST_PERSON, FIRST_PROP, Plac
 from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.camera.scenery.signals import LENS_OFF, LENS_ON
 from dorothie_gym.camera.town_scene import SessionScene, lens_rows
-from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation import concurrent
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import Sensor, WeatherParameter
@@ -160,7 +160,7 @@ def drives_with_lights(weather: Weather) -> bool:
     )
 
 
-@compiled
+@concurrent
 def _lift(ground: GroundArrays, placed: RecordArray[PlacementRecord], count: int) -> None:
     """Puts people on pavements and lawns on top of the kerb; the simulation has the height of the road for them."""
     for k in range(count):

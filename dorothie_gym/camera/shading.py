@@ -24,12 +24,12 @@ from dorothie_gym.camera.samples import BLUE, GREEN, RED, RIGHT, ROOM, UP, WEIGH
 from dorothie_gym.camera.shadows import ShadowMaps
 from dorothie_gym.camera.sky import add_sky
 from dorothie_gym.camera.texturing import Textures
-from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation import compiled, concurrent, inlined
 
 _GROUND = int(Surface.GROUND)
 
 
-@compiled
+@concurrent
 def shade(
     view: View, optics: Optics, buffer: VisibilityBuffer, side: int, town: Mesh, overlay: Mesh, bodies: Mesh,
     ground: GroundArrays, textures: Textures, light: Daylight, noise: NDArray[np.float32], lamps: LampMap,

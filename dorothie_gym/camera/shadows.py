@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dorothie_gym.camera.cells import CellTable
 from dorothie_gym.camera.mesh import TOWN, Mesh, Surface
 from dorothie_gym.camera.models.model_bank import PlacementRecord
-from dorothie_gym.compilation import compiled, inlined
+from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.model import Array
@@ -88,7 +88,7 @@ def turn_sun(maps: ShadowMaps, sun: Array, strength: float) -> bool:
     return bool(casts)
 
 
-@compiled
+@concurrent
 def draw_town_shadows(
     maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable, x: float, y: float,
     z: float,
@@ -146,7 +146,7 @@ def _shades(maps: ShadowMaps, low: Array, high: Array, column: int, row: int) ->
     return True
 
 
-@compiled
+@concurrent
 def draw_body_shadows(
     maps: ShadowMaps, bank: Mesh, ranges: NDArray[np.int32], bodies: RecordArray[PlacementRecord]
 ) -> None:

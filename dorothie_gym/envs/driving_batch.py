@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import ClassVar
 
@@ -16,6 +16,7 @@ from dorothie_gym.engine.live_session import world_seed_of
 from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.envs.driving_arrays import EVENTS, Event, Stage, row_of
+from dorothie_gym.envs.driving_cameras import DriverObservation, DrivingCameras
 from dorothie_gym.envs.driving_rows import DrivingFace, DrivingRows, RowHolder
 from dorothie_gym.envs.driving_start import write_scenario
 from dorothie_gym.envs.driving_steps import act_share, guide_share
@@ -39,11 +40,30 @@ class DrivingBatch(DrivingRows):
     arrivals, new sessions.
     """
 
-    LOOKED_UP: ClassVar[tuple[str, ...]] = (*DrivingRows.LOOKED_UP, "_pool")
+    LOOKED_UP: ClassVar[tuple[str, ...]] = (*DrivingRows.LOOKED_UP, "_pool", "_cameras")
 
     @cached_property
     def _pool(self) -> ThreadPool:
         return ThreadPool(self.threads - 1)
+
+    @cached_property
+    def _cameras(self) -> DrivingCameras | None:
+        """Cameras of the environments; None where the observations are vectors."""
+        camera = self._config.camera
+        return None if camera is None else DrivingCameras(camera, self._count)
+
+    @property
+    def observations(self) -> DriverObservation:
+        """Observations at the present decision: vectors (environments, n) or pictures (environments, h, w, 3).
+
+        They are to be copied. Those of a restored batch are up to date after its next decision.
+        """
+        return self.vectors if self._cameras is None else self._cameras.pictures
+
+    def _draw(self, numbers: Sequence[int]) -> None:
+        """Draws the pictures of some environments, if they observe any."""
+        if self._cameras is not None:
+            self._cameras.draw(self, numbers, self._pool)
 
     def close(self) -> None:
         """Ends the threads."""
@@ -61,6 +81,7 @@ class DrivingBatch(DrivingRows):
         for number, seed in seeds.items():
             self._put(number, draw_scenario(self.town, self._template, seed) if scenario is None else scenario)
         self._guide()
+        self._draw(list(seeds))
 
     def _put(self, number: int, scenario: Scenario) -> None:
         """Starts a session in a row."""
@@ -103,6 +124,7 @@ class DrivingBatch(DrivingRows):
             for number in np.flatnonzero(state["near"] & playing).tolist():
                 self._arrive(number)
         self._guide()
+        self._draw(np.flatnonzero(playing).tolist())
 
     def _act(self) -> int:
         """Plays the first half of a decision, or lays new paths; returns the `Event` flags."""

@@ -14,6 +14,7 @@ from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_option, template_option
 from dorothie_gym.envs.driving_batch import DrivingBatch
+from dorothie_gym.envs.driving_cameras import DriverObservation
 from dorothie_gym.envs.driving_rows import INFRACTIONS
 from dorothie_gym.envs.driving_view import DrivingView
 from dorothie_gym.envs.episode import TERMS, Ending
@@ -21,7 +22,6 @@ from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import Role
-from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.spaces import StepInfo
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
@@ -29,7 +29,7 @@ from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 Action = TypeVar("Action")
 
 
-class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
+class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
     """Base class of the navigation environments; subclasses define observations and actions.
 
     Attributes:
@@ -94,7 +94,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
         if not self.batch.has_begun:
             raise gym.error.ResetNeeded("no session is being played: call reset() first")
 
-    def _begin(self, seed: int | None, options: ResetOptions | None) -> tuple[Vector, StepInfo]:
+    def _begin(self, seed: int | None, options: ResetOptions | None) -> tuple[DriverObservation, StepInfo]:
         """Begins a session, see `reset`."""
         super().reset(seed=seed)
         check_options(options, "scenario")
@@ -104,7 +104,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[Vector, Action]):
         self._show()
         return self.batch.observations[0].copy(), self._info()
 
-    def _play(self, action: NDArray[np.generic] | int) -> tuple[Vector, float, bool, bool, StepInfo]:
+    def _play(self, action: NDArray[np.generic] | int) -> tuple[DriverObservation, float, bool, bool, StepInfo]:
         """Plays a decision, see `step`."""
         if self._ending:
             raise gym.error.ResetNeeded("the session is over: call reset() first")

@@ -220,8 +220,8 @@ class DrivingRows(Lookups):
         return cast(DriveArrays, self._stacks[4])
 
     @property
-    def observations(self) -> Vector:
-        """Observations at the present decision (environments, n), to be copied."""
+    def vectors(self) -> Vector:
+        """Vectors at the present decision (environments, n), to be copied."""
         return self._drivers.vector
 
     @property
@@ -280,6 +280,10 @@ class DrivingRows(Lookups):
     @cached_property
     def _plans(self) -> NDArray[np.void]:
         return plain(self._drives.plans)[:, 0]
+
+    def driver(self, number: int) -> DriverArrays:
+        """Returns the arrays of the driver of an environment: views."""
+        return row_of(self._drivers, number)
 
     def heard(self, number: int) -> HeardInstruction:
         """Returns the last instruction of an environment, as its driver remembers it."""

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from dorothie_gym.engine.scenario import Scenario, check_options, scenario_option, template_option
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.driving_batch import DrivingBatch
+from dorothie_gym.envs.driving_cameras import DriverObservation
 from dorothie_gym.envs.driving_rows import INFRACTIONS
 from dorothie_gym.envs.driving_view import DrivingView
 from dorothie_gym.envs.episode import TERMS, Ending
@@ -26,7 +27,6 @@ from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology import Role
-from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.vector_infos import Infos, mask_of, masked_infos, seeds_of
 
@@ -35,7 +35,7 @@ LARGEST_SEED: Final = 2**31
 
 
 class DrivingVectorEnv(
-    BatchedEnv[NavigationConfig, DrivingBatch], VectorEnv[Vector, NDArray[np.generic], NDArray[np.generic]]
+    BatchedEnv[NavigationConfig, DrivingBatch], VectorEnv[DriverObservation, NDArray[np.generic], NDArray[np.generic]]
 ):
     """Base class of the vectorised navigation environments.
 
@@ -50,7 +50,7 @@ class DrivingVectorEnv(
 
     def __init__(
         self, num_envs: int, town: Towns, storyboard: str | Path | StoryboardTemplate | None,
-        config: NavigationConfig, observation_space: spaces.Space[Vector],
+        config: NavigationConfig, observation_space: spaces.Space[DriverObservation],
         action_space: spaces.Space[np.int64] | spaces.Space[NDArray[np.float32]], render_mode: str | None, view: str,
         threads: int | None, autoreset_mode: str | AutoresetMode, *, pedals: bool,
     ) -> None:  # fmt: skip
@@ -61,7 +61,9 @@ class DrivingVectorEnv(
         self.observation_space = batch_space(observation_space, num_envs)
         self.action_space = batch_space(action_space, num_envs)
         assert self.observation_space.shape is not None
-        self._observations: Vector = np.zeros(self.observation_space.shape, dtype=np.float32)
+        self._observations: DriverObservation = np.zeros(
+            self.observation_space.shape, dtype=self.observation_space.dtype
+        )
         self._rewards = np.zeros(num_envs)
         self._terminations, self._truncations = (np.zeros(num_envs, dtype=np.bool_) for _ in range(2))
         self._terms = np.zeros((num_envs, len(TERMS)))
@@ -90,7 +92,7 @@ class DrivingVectorEnv(
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, object] | None = None
-    ) -> tuple[Vector, Infos]:
+    ) -> tuple[DriverObservation, Infos]:
         """Begins new episodes.
 
         Args:
@@ -99,7 +101,7 @@ class DrivingVectorEnv(
                 single environment, for all of them.
 
         Returns:
-            Observations (num_envs, n) of all environments, and infos of those that begin.
+            Observations (num_envs, ...) of all environments, and infos of those that begin.
 
         Raises:
             ValueError: not one seed for each environment, or a mask of the wrong shape or type.
@@ -113,14 +115,14 @@ class DrivingVectorEnv(
 
     def step(
         self, actions: NDArray[np.generic]
-    ) -> tuple[Vector, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
+    ) -> tuple[DriverObservation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
         """Plays a decision in every environment; those that are over begin anew, as the autoreset mode says.
 
         Args:
             actions: (num_envs, ...) one for each.
 
         Returns:
-            Observations (num_envs, n), rewards, terminations and truncations (num_envs,), infos.
+            Observations (num_envs, ...), rewards, terminations and truncations (num_envs,), infos.
 
         Raises:
             ValueError: the actions are none of the action space.

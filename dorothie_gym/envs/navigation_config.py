@@ -1,4 +1,4 @@
-"""Settings of the navigation environments: difficulty, guidance and reward."""
+"""Settings of the navigation environments: difficulty, guidance, reward and observation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Final
 
+from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.copying import shared
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.policies.ad_wizard import MOST_TRICKS
@@ -18,6 +20,13 @@ TRAFFIC: Mapping[str, tuple[int, int]] = MappingProxyType(
     {"none": (0, 0), "light": (4, 2), "medium": (10, 4), "heavy": (30, 20)}
 )
 """Numbers of vehicles and pedestrians of each traffic density; upper bounds where the town is small."""
+
+
+OBSERVATIONS: Final = ("vector", "camera")
+"""Kinds of observations."""
+
+SMALL_CAMERA: Final = CameraConfig(width=84, height=84)
+"""Camera of drivers unless another one is given."""
 
 
 @shared
@@ -81,6 +90,8 @@ class NavigationConfig:
         patience: time without progress after which the participant gives up and the episode terminates [s].
         decision_frequency: decisions per second [Hz]; it divides the 30 Hz of the physics.
         weights: weights of the reward terms.
+        observation: one of `OBSERVATIONS`.
+        camera: camera of the observation "camera", with RGB only; None for `SMALL_CAMERA`.
 
     Raises:
         ValueError: a setting is out of its range; names the field.
@@ -93,6 +104,8 @@ class NavigationConfig:
     patience: float = 60.0
     decision_frequency: float = DECISION_FREQUENCY
     weights: NavigationWeights = field(default_factory=NavigationWeights)
+    observation: str = "vector"
+    camera: CameraConfig | None = None
 
     def __post_init__(self) -> None:
         if self.guidance not in tuple(Guidance):
@@ -109,6 +122,21 @@ class NavigationConfig:
         if not 10.0 <= self.patience <= 86400.0:
             raise ValueError(f"NavigationConfig.patience is {self.patience}; it must be in 10..86400 s")
         EnvConfig(decision_frequency=self.decision_frequency, max_seconds=self.max_seconds)  # validates both
+        self._check_camera()
+
+    def _check_camera(self) -> None:
+        if self.observation not in OBSERVATIONS:
+            raise ValueError(f"observation is {self.observation!r}; it must be one of {', '.join(OBSERVATIONS)}")
+        if self.observation == "vector":
+            if self.camera is not None:
+                raise ValueError('camera is set, but observation is "vector"; choose observation="camera"')
+            return
+        camera = SMALL_CAMERA if self.camera is None else self.camera
+        if not isinstance(camera, CameraConfig):
+            raise ValueError(f"camera is a {type(camera).__name__}; it must be a CameraConfig or None")
+        if camera.outputs != (CameraOutput.RGB,):
+            raise ValueError(f"camera.outputs is {camera.outputs}; drivers observe (CameraOutput.RGB,) only")
+        object.__setattr__(self, "camera", camera)
 
     @property
     def session_config(self) -> EnvConfig:

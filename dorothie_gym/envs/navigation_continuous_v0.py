@@ -10,7 +10,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.action_values import real_numbers
+from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.engine.scenario import ResetOptions
+from dorothie_gym.envs.driving_cameras import DriverObservation, driver_space
 from dorothie_gym.envs.driving_env import DrivingEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.pedals import CONTINUOUS_FIELD_SPECS, CONTINUOUS_FIELDS
@@ -87,6 +89,10 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
     ## Observation Space
     `Box(-1, 1, (n,), float32)`, see `dorothie_gym.envs.navigation_continuous_v0.CONTINUOUS_FIELDS`.
 
+    With `observation="camera"`, `Box(0, 255, (84, 84, 3), uint8)` as in `NavigationEnv`. The dashboard shows
+    the instruction, the speed that the path allows instead of the cruise speed, and the steering wheel instead of the
+    lamps.
+
     ## Action Space
     `Box(-1, 1, (3,), float32)`: throttle, steer (positive right) and brake; negative throttle and brake count as 0.
     With `control="acceleration"`, `Box(-1, 1, (2,), float32)`: acceleration and steer; negative acceleration is
@@ -123,23 +129,27 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         patience: float = 60.0,
         decision_frequency: float = 10.0,
         control: str = "pedals",
+        observation: str = "vector",
+        camera: CameraConfig | None = None,
         render_mode: str | None = None,
         view: str = "role",
         render_view: str = "map",
     ) -> None:
         config = NavigationConfig(
             traffic=traffic, exceptions=exceptions, weights=weights_of(reward), max_seconds=max_seconds,
-            patience=patience, decision_frequency=decision_frequency,
+            patience=patience, decision_frequency=decision_frequency, observation=observation, camera=camera,
         )  # fmt: skip
         super().__init__(town, storyboard, config, render_mode, view, render_view, pedals=True)
-        self.action_space, self.observation_space = control_space(control), path_space()
+        self.action_space, self.observation_space = control_space(control), driver_space(config, path_space())
         self.control = control
 
-    def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
+    def reset(
+        self, *, seed: int | None = None, options: ResetOptions | None = None
+    ) -> tuple[DriverObservation, StepInfo]:
         """Begins a session; see `NavigationEnv.reset`."""
         return self._begin(seed, options)
 
-    def step(self, action: NDArray[np.float32]) -> tuple[Vector, float, bool, bool, StepInfo]:
+    def step(self, action: NDArray[np.float32]) -> tuple[DriverObservation, float, bool, bool, StepInfo]:
         """Plays one decision.
 
         Raises:

@@ -8,7 +8,9 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.envs.batched_env import Towns
+from dorothie_gym.envs.driving_cameras import driver_space
 from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.navigation_continuous_v0 import control_space, controls_of, path_space
@@ -19,7 +21,8 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
     """Vectorised `NavigationContinuousEnv`: observations, rewards and infos are those of single environments.
 
     ## Observation Space
-    `Box(-1, 1, (num_envs, n), float32)`, see `NavigationContinuousEnv`.
+    `Box(-1, 1, (num_envs, n), float32)`, see `NavigationContinuousEnv`; with `observation="camera"`
+    `Box(0, 255, (num_envs, 84, 84, 3), uint8)`, drawn on the threads.
 
     ## Action Space
     `Box(-1, 1, (num_envs, 3), float32)`: throttle, steer and brake of each environment; with `control="acceleration"`
@@ -49,6 +52,8 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
         patience: float = 60.0,
         decision_frequency: float = 10.0,
         control: str = "pedals",
+        observation: str = "vector",
+        camera: CameraConfig | None = None,
         render_mode: str | None = None,
         view: str = "role",
         threads: int | None = None,
@@ -56,11 +61,11 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
     ) -> None:
         config = NavigationConfig(
             traffic=traffic, exceptions=exceptions, weights=weights_of(reward), max_seconds=max_seconds,
-            patience=patience, decision_frequency=decision_frequency,
+            patience=patience, decision_frequency=decision_frequency, observation=observation, camera=camera,
         )  # fmt: skip
         super().__init__(
-            num_envs, town, storyboard, config, path_space(), control_space(control), render_mode, view, threads,
-            autoreset_mode, pedals=True,
+            num_envs, town, storyboard, config, driver_space(config, path_space()), control_space(control), render_mode,
+            view, threads, autoreset_mode, pedals=True,
         )  # fmt: skip
 
         self.control = control

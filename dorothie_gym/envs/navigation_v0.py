@@ -9,14 +9,16 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.action_values import whole_number
+from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.engine.scenario import ResetOptions
+from dorothie_gym.envs.driving_cameras import DriverObservation, driver_space
 from dorothie_gym.envs.driving_env import DrivingEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps import Town
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
-from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, Vector, navigation_space
+from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, navigation_space
 from dorothie_gym.spaces import StepInfo
 from dorothie_gym.tasks import StoryboardTemplate
 
@@ -33,6 +35,12 @@ class NavigationEnv(DrivingEnv[np.int64]):
     ## Observation Space
     `Box(-1, 1, (n,), float32)`: see `dorothie_gym.policies.navigation.FIELDS` and, for the slices, `layout()`.
     The vector depends only on the Co-Wizard's observation, the map, and the instructions.
+
+    With `observation="camera"`, `Box(0, 255, (84, 84, 3), uint8)`: what the car's camera sees, above a dashboard in the
+    lowest rows. From the left: icon of the instruction (an arrow into the sector of a turn, lane switch, U-turn, stop,
+    start), or needle to the goal that was named; icon of the manoeuvre that the car prepares, in green; distance to the
+    instruction's place on gauges of 112 m and 28 m (red behind it), or to the goal on one of 560 m; speed (white) and
+    cruise speed (blue) on gauges of 28 m/s, with red marks at the limit; lamps for a hazard ahead and the head lights.
 
     ## Action Space
     `Discrete(18)`: see `NavigationAction`. `info["action_mask"]` marks the feasible actions (int8, for
@@ -58,6 +66,8 @@ class NavigationEnv(DrivingEnv[np.int64]):
     - `exceptions`: average number of exceptions in a session, 0 to 4.
     - `reward`: "dense", "careful" (a collision counts three times as much), "sparse" or `NavigationWeights`.
     - `max_seconds`, `patience`: see above [s].
+    - `observation`: "vector" or "camera".
+    - `camera`: `CameraConfig` of the pictures that are observed; None for 84 x 84 pixels.
     - `render_mode`: None, `"rgb_array"` or `"human"`.
     - `view`: picture of `render()`: `"role"` (what the Co-Wizard observes, and the instructions) or `"session"`
       (everything).
@@ -83,19 +93,23 @@ class NavigationEnv(DrivingEnv[np.int64]):
         reward: str | NavigationWeights = "dense",
         max_seconds: float = 600.0,
         patience: float = 60.0,
+        observation: str = "vector",
+        camera: CameraConfig | None = None,
         render_mode: str | None = None,
         view: str = "role",
         render_view: str = "map",
     ) -> None:
         config = NavigationConfig(
             guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
-            max_seconds=max_seconds, patience=patience,
+            max_seconds=max_seconds, patience=patience, observation=observation, camera=camera,
         )  # fmt: skip
         super().__init__(town, storyboard, config, render_mode, view, render_view, pedals=False)
         self.action_space = spaces.Discrete(len(ACTIONS))
-        self.observation_space = navigation_space()
+        self.observation_space = driver_space(config, navigation_space())
 
-    def reset(self, *, seed: int | None = None, options: ResetOptions | None = None) -> tuple[Vector, StepInfo]:
+    def reset(
+        self, *, seed: int | None = None, options: ResetOptions | None = None
+    ) -> tuple[DriverObservation, StepInfo]:
         """Begins a session.
 
         Args:
@@ -104,7 +118,7 @@ class NavigationEnv(DrivingEnv[np.int64]):
         """
         return self._begin(seed, options)
 
-    def step(self, action: np.int64 | int) -> tuple[Vector, float, bool, bool, StepInfo]:
+    def step(self, action: np.int64 | int) -> tuple[DriverObservation, float, bool, bool, StepInfo]:
         """Plays one decision.
 
         Raises:

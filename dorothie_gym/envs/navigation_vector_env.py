@@ -12,8 +12,10 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from dorothie_gym.action_values import as_array
+from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.envs.batched_env import Towns
 from dorothie_gym.envs.driving_batch import DrivingBatch
+from dorothie_gym.envs.driving_cameras import driver_space
 from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.errors import short_repr
@@ -28,7 +30,8 @@ class NavigationVectorEnv(DrivingVectorEnv):
     """Vectorised `NavigationEnv`: observations, rewards, masks and infos are those of single environments.
 
     ## Observation Space
-    `Box(-1, 1, (num_envs, 161), float32)`, see `NavigationEnv`.
+    `Box(-1, 1, (num_envs, 161), float32)`, see `NavigationEnv`; with `observation="camera"`
+    `Box(0, 255, (num_envs, 84, 84, 3), uint8)`, drawn on the threads.
 
     ## Action Space
     `MultiDiscrete([18] * num_envs)`. `infos["action_mask"]` (num_envs, 18) marks the feasible actions, and so does
@@ -64,6 +67,8 @@ class NavigationVectorEnv(DrivingVectorEnv):
         reward: str | NavigationWeights = "dense",
         max_seconds: float = 600.0,
         patience: float = 60.0,
+        observation: str = "vector",
+        camera: CameraConfig | None = None,
         render_mode: str | None = None,
         view: str = "role",
         threads: int | None = None,
@@ -71,11 +76,11 @@ class NavigationVectorEnv(DrivingVectorEnv):
     ) -> None:
         config = NavigationConfig(
             guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
-            max_seconds=max_seconds, patience=patience,
+            max_seconds=max_seconds, patience=patience, observation=observation, camera=camera,
         )  # fmt: skip
         super().__init__(
-            num_envs, town, storyboard, config, navigation_space(), spaces.Discrete(len(ACTIONS)), render_mode, view,
-            threads, autoreset_mode, pedals=False,
+            num_envs, town, storyboard, config, driver_space(config, navigation_space()), spaces.Discrete(len(ACTIONS)),
+            render_mode, view, threads, autoreset_mode, pedals=False,
         )  # fmt: skip
         self._masks = np.zeros((num_envs, len(ACTIONS)), dtype=np.int8)
 

@@ -16,7 +16,7 @@ from dorothie_gym.camera.models.cyclists import PEDAL_CYCLE, PEDAL_PHASES, RIDER
 from dorothie_gym.camera.models.people import CYCLE, LOOKS, PHASES, POSES, STANDING, Outfit, dressed_person, person_form
 from dorothie_gym.camera.models.props import prop_model
 from dorothie_gym.camera.models.vehicles import PAINTS, Lamps, VehicleType, painted_vehicle, vehicle_form
-from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation import compiled, concurrent
 from dorothie_gym.compilation.records import Float, Int32, RecordArray
 from dorothie_gym.copying import shared
 from dorothie_gym.ontology.world_exceptions import PropKind
@@ -147,7 +147,7 @@ def prop_model_index(prop: PropRecord) -> int:
     return FIRST_PROP
 
 
-@compiled
+@concurrent
 def place_bodies(
     vehicles: RecordArray[VehicleRecord],
     pedestrians: RecordArray[PedestrianRecord],

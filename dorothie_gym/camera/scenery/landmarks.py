@@ -9,6 +9,7 @@ import enum
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -103,6 +104,7 @@ def build_landmarks(landmarks: Iterable[Landmark], lots: Sequence[Lot], ground: 
     return joined(parts)
 
 
+@lru_cache(maxsize=64)  # sessions of a town repeat them
 def landmark_form(name: LandmarkName, lot: Lot, ground: Heights) -> Mesh:
     """Returns the triangles of a landmark on a lot; none for a name without a building."""
     works = _Works(lot, ground)
