@@ -64,6 +64,10 @@ def train_rl(
             help="Argument of the environment (guidance=goals); repeatable.",
         ),
     ] = None,
+    observation: Annotated[
+        str | None,
+        typer.Option(metavar="KIND", help="What a driver of the navigation environments observes: vector or camera."),
+    ] = None,
     steps: Annotated[int | None, typer.Option(min=1, help="Steps of all environments; default: tuned.")] = None,
     environments: Annotated[
         int | None, typer.Option(min=1, max=4096, help="Parallel environments; default: tuned.")
@@ -97,7 +101,7 @@ def train_rl(
     evaluation, and the learning curve. Ctrl-C saves the run; the same command resumes it. selfplay trains all three
     roles at once, each in its own folder that rollout can play; --set shared=true gives them one network.
     """
-    given = _read_settings(setting or [])
+    given = _read_settings(setting or []) | ({} if observation is None else {"observation": observation})
     changes: Given = {
         "steps": steps, "environments": environments, "workers": workers, "seed": seed,
         "evaluate_every": evaluate_every, "episodes": episodes,

@@ -19,6 +19,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from dorothie_gym.baselines.rl.environments import make_env_of_model
 from dorothie_gym.baselines.rl.fine_inputs import FineInputs
+from dorothie_gym.baselines.rl.picture_features import PictureFeatures
 from dorothie_gym.baselines.rl.settings import (
     ALGORITHMS,
     FINAL_ENTROPY,
@@ -73,11 +74,19 @@ def make_model(settings: TrainingSettings, env: AnyEnv | VecEnv, device: str = "
     if last is not None:
         parameters["learning_rate"] = LinearSchedule(float(parameters["learning_rate"]), float(last))
     policy: dict[str, object] = {"net_arch": list(settings.network)}
-    if settings.fine_inputs:
+    if settings.sees:
+        policy["features_extractor_class"] = PictureFeatures
+        policy["features_extractor_kwargs"] = {"channels": settings.channels}
+    elif settings.fine_inputs:
         policy["features_extractor_class"] = FineInputs
     try:
         return getattr(import_module(package), name)(
-            "MlpPolicy", env, policy_kwargs=policy, seed=settings.seed, device=device, **parameters
+            "CnnPolicy" if settings.sees else "MlpPolicy",
+            env,
+            policy_kwargs=policy,
+            seed=settings.seed,
+            device=device,
+            **parameters,
         )
     except (AssertionError, TypeError, ValueError) as error:
         unfit = isinstance(error, AssertionError) and "as action spaces" in str(error)

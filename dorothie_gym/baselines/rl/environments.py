@@ -1,4 +1,4 @@
-"""Environments in the form that learners take: vectors as observations, discrete or continuous numbers as actions."""
+"""Environments in the form that learners take: vectors or pictures as observations, numbers as actions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _PLAIN = (spaces.Discrete, spaces.MultiDiscrete, spaces.Box)
 
 
 def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
-    """Makes an environment whose observations are vectors, of several towns in the first.
+    """Makes an environment whose observations are vectors or pictures, of several towns in the first.
 
     Environments with other spaces are flattened (`dorothie_gym.flatten`), and their observations squashed.
 
@@ -54,7 +54,7 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
     except (gym.error.Error, TypeError, ValueError) as error:
         raise SettingsError(f"env {name}: {error.__cause__ or error}") from error
     observed, acted = env.observation_space, env.action_space
-    if isinstance(observed, spaces.Box) and len(observed.shape) == 1 and isinstance(acted, _PLAIN):
+    if isinstance(observed, spaces.Box) and len(observed.shape) in (1, 3) and isinstance(acted, _PLAIN):
         return env
     return SquashedObservation(dorothie_gym.flatten(env))
 

@@ -221,6 +221,11 @@ def make_player(path: Path, limits: SpaceLimits) -> NavigationPolicy:
         raise SettingsError(
             f"{path}: was trained in {settings.env}; only models trained in {NAVIGATION} can play the co_wizard"
         )
+    if settings.sees:
+        raise SettingsError(
+            f"{path}: was trained on pictures, which the co_wizard of a rollout does not get; train with "
+            "--observation vector to play it"
+        )
     seconds = settings.env_settings.get("max_seconds", MAX_SECONDS)
     return NavigationPolicy(GreedyDriver(model, masked=settings.masked), limits, max_seconds=seconds)
 

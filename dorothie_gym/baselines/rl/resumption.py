@@ -19,7 +19,7 @@ import torch
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
-from stable_baselines3.common.vec_env import VecEnv, VecMonitor
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecTransposeImage
 
 from dorothie_gym.baselines.rl.checkpoint import Model, parameters_of, refusing_misfits, set_parameters
 from dorothie_gym.baselines.rl.repeatable_batch import Episode, RepeatableVecEnv
@@ -151,7 +151,9 @@ def restore_state(model: Model, checkpoint: Checkpoint) -> None:
         episodes = [
             (start, checkpoint.tensors[f"actions/{k}"].numpy()) for k, start in enumerate(checkpoint.page["episodes"])
         ]
-        repeated = _repeat(model.env, episodes)
+        repeated: Any = _repeat(model.env, episodes)
+        if isinstance(model.env, VecTransposeImage):  # stable-baselines3's own wrapper, for channels first
+            repeated = model.env.transpose_observations(np.asarray(repeated))
     if not np.array_equal(np.asarray(repeated, dtype=model._last_obs.dtype), model._last_obs, equal_nan=True):
         raise ModelFileError(
             f"{checkpoint.path}: the environments do not repeat their episodes exactly; they are of another version or "

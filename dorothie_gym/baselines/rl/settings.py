@@ -30,6 +30,9 @@ ALGORITHMS: Mapping[str, tuple[str, str]] = {
 ON_POLICY: Final = ("ppo", "maskable_ppo", "a2c")
 """Algorithms that learn from rollouts; they support a warm start by behaviour cloning."""
 
+CAMERA: Final = "camera"
+"""Observation of the navigation environments that consists of pictures; entry of a data file for these."""
+
 NAVIGATION: Final = "dorothie_gym/Navigation-v0"
 """Id of the environment whose policies can play the Co-Wizard."""
 
@@ -50,6 +53,9 @@ SHORTEST_ROLLOUT: Final = 8
 
 MAX_LAYERS, MAX_WIDTH = 16, 8192
 """Largest number of hidden layers, and of numbers in a layer."""
+
+MAX_CHANNELS: Final = 512
+"""Largest number of channels of a convolution."""
 
 MAX_PARAMETER: Final = 1e8
 """Largest number among an algorithm's parameters, such as the size of a replay buffer."""
@@ -103,7 +109,7 @@ class RunSettings:
 
     def as_json(self) -> Page:
         """Returns the settings in JSON types; the class accepts them as keyword arguments."""
-        return {**asdict(self), "network": list(self.network)}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
 
     def check_resumable(self, begun: Self, folder: object) -> None:
         """Raises `SettingsError` if a run in a folder was begun with other settings; `RESUMABLE` may differ."""
@@ -138,16 +144,25 @@ class TrainingSettings(RunSettings):
         env: id of the environment.
         env_settings: arguments of the environment.
         fine_inputs: whether networks get each input in two scales, see `FineInputs`.
+        channels: channels of the convolutions for pictures, see `PictureFeatures`.
     """
 
     algorithm: str
     env: str
     env_settings: Arguments = field(default_factory=dict)
     fine_inputs: bool = False
+    channels: tuple[int, ...] = (32, 64, 64)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
         _check_algorithm(self.algorithm)
         super().__post_init__()
+        if len(self.channels) != 3 or not all(type(n) is int and 1 <= n <= MAX_CHANNELS for n in self.channels):
+            raise SettingsError(
+                f"channels is {short_repr(self.channels)}; it must be three numbers in 1..{MAX_CHANNELS}"
+            )
+        if self.sees:
+            self._check_pictures()
         if FINAL_ENTROPY in self.parameters:
             self._check_entropy()
         if self.warm_start is not None and (self.algorithm not in ON_POLICY or self.env != NAVIGATION):
@@ -155,6 +170,16 @@ class TrainingSettings(RunSettings):
                 f"warm_start: {self.algorithm} on {self.env} cannot learn from a corpus; {', '.join(ON_POLICY)} "
                 f"on {NAVIGATION} can"
             )
+
+    def _check_pictures(self) -> None:
+        if self.algorithm not in ON_POLICY:
+            raise SettingsError(
+                f"observation=camera: {self.algorithm} would keep gigabytes of pictures; {', '.join(ON_POLICY)} do not"
+            )
+        if self.warm_start is not None:
+            raise SettingsError("warm_start: the sessions of a corpus have no pictures; choose observation=vector")
+        if self.fine_inputs:
+            raise SettingsError("fine_inputs is true; pictures have one scale only")
 
     def _check_entropy(self) -> None:
         entropy, final = self.parameters.get("ent_coef"), self.parameters[FINAL_ENTROPY]
@@ -165,6 +190,11 @@ class TrainingSettings(RunSettings):
             )
         if not isinstance(final, int | float):
             raise SettingsError(f"parameters.{FINAL_ENTROPY} is {short_repr(final)}; it must be a number")
+
+    @property
+    def sees(self) -> bool:
+        """Whether the observations are pictures."""
+        return bool(self.env_settings.get("observation") == CAMERA)
 
     @property
     def masked(self) -> bool:
@@ -188,9 +218,10 @@ def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSetti
     """
     _check_algorithm(algorithm)
     entries, given = _read_data(algorithm), _given(changes)
-    tuned = TrainingSettings(algorithm=algorithm, env=env, **entries[env if env in entries else DEFAULT])
-    changed = replace(tuned, **given)
-    changed = replace(changed, env_settings={**tuned.env_settings, **changed.env_settings})
+    asked = given.pop("env_settings", {})
+    entry = CAMERA if asked.get("observation") == CAMERA and CAMERA in entries else env
+    tuned = TrainingSettings(algorithm=algorithm, env=env, **entries[entry if entry in entries else DEFAULT])
+    changed = replace(tuned, **given, env_settings={**tuned.env_settings, **asked})
     on_policy = algorithm in ON_POLICY and "batch_size" in tuned.parameters
     if on_policy and "parameters" not in given:
         steps = max(tuned.parameters["n_steps"] * tuned.environments // changed.environments, SHORTEST_ROLLOUT)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import Protocol
 
 import numpy as np
@@ -11,7 +12,7 @@ from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.maps.model import Array
 
 
-class Heights(Protocol):
+class Heights(Hashable, Protocol):
     """Ground with heights."""
 
     def height_at(self, points: Array) -> Array:
