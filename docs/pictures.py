@@ -33,9 +33,11 @@ from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.cli.run import draw_session
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.maps import fold_of, load_town
-from dorothie_gym.ontology import AGENT_ROLES, LandmarkName, WeatherParameter
+from dorothie_gym.ontology import AGENT_ROLES, ActionValue, LandmarkName, WeatherParameter
 from dorothie_gym.policies import make_policy
+from dorothie_gym.policies.navigation import NavigationAction
 from dorothie_gym.rendering import town_picture
 from dorothie_gym.rollout import play_session
 from dorothie_gym.rollout.closed_loop.leaderboard import CHART_METRICS, PART_TITLES, ChartRow, draw_rows
@@ -113,6 +115,26 @@ def draw_camera(path: Path) -> None:
     rows = [np.concatenate(pictures[k : k + 2], axis=1) for k in (0, 2)]
     Image.fromarray(np.concatenate(rows)).save(path)
     _reduce(path)
+
+
+DASHBOARD_DECISIONS = (20, 44, 52, 66)
+
+
+def draw_dashboard(path: Path) -> None:
+    """Draws what a driver observes that carries out turns as it is told, three times as large."""
+    env = NavigationEnv(observation="camera", traffic="medium")
+    shown, _ = env.reset(seed=0)
+    shots = []
+    for decision in range(DASHBOARD_DECISIONS[-1] + 1):
+        if decision in DASHBOARD_DECISIONS:
+            shots += [shown.repeat(3, axis=0).repeat(3, axis=1), np.full((3 * len(shown), 6, 3), 255, np.uint8)]
+        said, action = env.batch.heard(0).instruction, NavigationAction.NOTHING
+        if said is not None and said.action is ActionValue.U_TURN:
+            action = NavigationAction.U_TURN
+        elif said is not None and said.action is ActionValue.J_TURN and said.sector is not None:
+            action = NavigationAction.turn(said.sector)
+        shown, *_ = env.step(int(action) if env.action_masks()[action] else 0)
+    Image.fromarray(np.concatenate(shots[:-1], axis=1)).save(path, optimize=True)
 
 
 def draw_corpus(path: Path, corpus: Path) -> None:
@@ -201,6 +223,7 @@ PICTURES: Final[Mapping[str, Callable[[Path], None]]] = {
     "session": draw_first_session,
     "midtown": draw_midtown,
     "camera": draw_camera,
+    "dashboard": draw_dashboard,
     "bench_world": draw_benchmark,
     "leaderboard": draw_leaderboard,
 }

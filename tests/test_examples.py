@@ -30,6 +30,7 @@ ARGUMENTS = {
     "own_town": "--out mill_end --seconds 10",
     "ppo": "--environments 4 --rollout 16 --steps 128 --batch 32",
     "rl_navigation": "--steps 64 --rollout 32 --rounds 2 --episodes 1 --max-seconds 10",
+    "rl_pictures": "--steps 64 --environments 2 --rollout 16 --frames 2 --rounds 2 --max-seconds 5",
     "torchrl_ppo": "--environments 2 --rollout 64 --steps 128",
 }
 PRINTED = {
@@ -40,6 +41,7 @@ PRINTED = {
     "own_town": "sites for landmarks",
     "ppo": "128 steps",
     "rl_navigation": "64 steps: success",
+    "rl_pictures": "64 steps: mean return",
     "torchrl_ppo": "128 steps: mean reward",
 }
 

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 DOCS = Path(__file__).parents[1] / "docs"
-DRAWN = ("session", "midtown", "camera")
+DRAWN = ("session", "midtown", "camera", "dashboard")
 """Pictures that are drawn again: the versions of pygame and Pillow draw nearly the same pixels."""
 
 DIFFERENT = 0.01
