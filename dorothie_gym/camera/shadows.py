@@ -40,6 +40,7 @@ _SIDE = _TILE * _TILES
 _WRAP = _SIDE - 1
 _BODIES = 512  # width of the map of bodies [squares]
 _NOTHING = -32768
+_LINE_BELOW = 10.0  # [1/50 m] by which the line of a narrow triangle lies below it: it lights the triangle itself
 _GROUND = int(Surface.GROUND)
 
 
@@ -194,6 +195,7 @@ def _cast(
 @inlined
 def _fill_heights(target: NDArray[np.int16], corners: Array, right: float, down: float) -> None:
     """Raises the squares whose centres lie in a triangle to its height there, which is affine."""
+    _fill_line(target, corners)
     size = float(target.shape[0])
     low = min(corners[0, 1], corners[1, 1], corners[2, 1])
     high = max(corners[0, 1], corners[1, 1], corners[2, 1])
@@ -209,6 +211,29 @@ def _fill_heights(target: NDArray[np.int16], corners: Array, right: float, down:
         for x in range(math.ceil(min(max(left - 0.5, 0.0), size)), math.ceil(min(max(end - 0.5, 0.0), size))):
             value = min(max(base + right * (x + 0.5) + down * middle, -32767.0), 32767.0)
             target[y, x] = max(target[y, x], np.int16(value))
+
+
+@inlined
+def _fill_line(target: NDArray[np.int16], corners: Array) -> None:
+    """Raises the squares along the longest edge of a triangle that is narrower than a square, such as one of a pole."""
+    longest, first = 0.0, 0
+    for j in range(3):
+        i = j + 1 if j < 2 else 0
+        across, down = abs(corners[i, 0] - corners[j, 0]), abs(corners[i, 1] - corners[j, 1])
+        if max(across, down) > longest:
+            longest, first = max(across, down), j
+    second, third = (first + 1) % 3, (first + 2) % 3
+    right, below = corners[second, 0] - corners[first, 0], corners[second, 1] - corners[first, 1]
+    aside = right * (corners[third, 1] - corners[first, 1]) - below * (corners[third, 0] - corners[first, 0])
+    if longest < 1.0 or abs(aside) >= math.sqrt(right * right + below * below):
+        return
+    size, steps = float(target.shape[0]), int(longest) + 1
+    for k in range(steps + 1):
+        share = k / steps
+        x, y = corners[first, 0] + share * right, corners[first, 1] + share * below
+        if 0.0 <= x < size and 0.0 <= y < size:
+            value = corners[first, 2] + share * (corners[second, 2] - corners[first, 2]) - _LINE_BELOW
+            target[int(y), int(x)] = max(target[int(y), int(x)], np.int16(min(max(value, -32767.0), 32767.0)))
 
 
 @inlined

@@ -29,6 +29,7 @@ from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
+from dorothie_gym.rendering.shapes import disc
 from dorothie_gym.sim.weather import Weather
 
 WHITE, GREY = (255, 255, 255), (128, 128, 128)
@@ -161,6 +162,29 @@ def test_the_shadow_of_a_near_wall_climbs_another_one() -> None:
     assert below.sum() > 5 and above.sum() > 5
     assert ratio[below].max() < 0.8
     assert ratio[above].min() > 0.95
+
+
+@pytest.mark.parametrize("azimuth", [100.0, 155.0, 180.0, 205.0, 250.0])
+def test_the_shadow_of_a_thin_pole_has_no_gaps(azimuth: float) -> None:
+    builder = MeshBuilder()
+    builder.prism(disc((16.0, 0.0), 0.06, 6), 0.0, 6.0, colour=GREY, kind=ObjectClass.POLE)
+    camera = FirstPersonCamera(scene(builder), replace(CONFIG, width=480, height=320, antialiasing=False))
+    sky = weather(sun_altitude_angle=45.0, sun_azimuth_angle=azimuth)
+    pose = CameraPose(16.0, 0.0, 12.0, 0.0, -math.pi / 2.0)
+    frame, plain = (other.render(pose, sky) for other in (camera, _without_shadows(camera)))
+    assert frame.rgb is not None and plain.rgb is not None and frame.depth is not None
+    dark = (plain.rgb.astype(int) - frame.rgb).max(axis=-1) > 10
+    places = frame.view.origin + frame.view.rays() * frame.depth[..., None]
+    away = -np.array([math.cos(math.radians(azimuth)), math.sin(math.radians(azimuth))])
+    along, aside = (places[..., :2] - (16.0, 0.0)) @ away, (places[..., :2] - (16.0, 0.0)) @ (-away[1], away[0])
+    for station in np.arange(0.8, 5.4, 0.2):
+        near = (np.abs(along - station) < 0.1) & (frame.semantic == ObjectClass.ROAD.value)
+        assert dark[near & (np.abs(aside) < 0.15)].any(), station
+        assert not dark[near & (np.abs(aside) > 0.5)].any(), station
+
+
+def _without_shadows(camera: FirstPersonCamera) -> FirstPersonCamera:
+    return FirstPersonCamera(camera.scene, replace(camera.config, shadows=False))
 
 
 def test_a_car_casts_a_shadow() -> None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.camera.cells import draw_cells, new_order, sorted_by_cell
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.camera.first_person_camera import FirstPersonCamera
 from dorothie_gym.camera.ground.cells import Painted
 from dorothie_gym.camera.ground.materials import LOOKS, Material
 from dorothie_gym.camera.ground.regions import polygons_of
@@ -35,10 +36,11 @@ from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.catalogue import town_names
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology import ObjectClass, WeatherParameter
 from dorothie_gym.rendering.levels import stretches
 from dorothie_gym.rendering.shapes import TownSamples
 from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.sim.weather import Weather
 from tests.maps.opendrive_text import shared_map
 
 WIDTH, HEIGHT = 240, 160
@@ -234,6 +236,28 @@ class Painting:
         point, polygon = self._tree.query(shapely.points(places), predicate="intersects")
         np.maximum.at(top, point, self._rows[polygon])
         return np.asarray(self._kinds[top])
+
+
+def test_the_sun_does_not_shine_into_the_middle_of_a_tunnel() -> None:
+    town, scene = stage_of("midtown").town, stage_of("midtown").camera.scene
+    part = max(
+        (row for row in stretches(town, TownSamples.of(town)) if row.level < 0), key=lambda row: row.end - row.start
+    )
+    lane, station = town.lanes[part.lane], (part.start + part.end) / 2.0
+    x, y = lane.position(station).tolist()
+    pose = CameraPose(x, y, lane.height_at(station) + 1.45, lane.heading_at(station), -math.pi / 2.0)
+    weather = Weather()
+    weather.set(WeatherParameter.SUN_ALTITUDE_ANGLE, 50.0)
+    for azimuth in range(0, 360, 45):
+        weather.set(WeatherParameter.SUN_AZIMUTH_ANGLE, float(azimuth))
+        shaded, lit = (
+            FirstPersonCamera(scene.camera_scene, CameraConfig(width=60, height=40, shadows=on), scene.overlay).render(
+                pose, weather
+            )
+            for on in (True, False)
+        )
+        assert shaded.rgb is not None and lit.rgb is not None
+        assert (shaded.rgb < 0.75 * lit.rgb).mean() > 0.98, azimuth
 
 
 def test_poses_are_on_bridges_in_tunnels_and_at_kerbs() -> None:

@@ -30,13 +30,19 @@ _RINGS = 4  # of country around the cells; each is twice as wide as the one insi
 
 
 class Area(enum.IntFlag):
-    """Kinds of areas of a sheet; `COVERED` is added to those above tunnels, `BELOW` to those below bridges."""
+    """Kinds of areas of a sheet; the others are added to the first three."""
 
     FLAT = 0
     RAISED = 1
     SLOPE = 2
     COVERED = 4
+    """Above tunnels."""
     BELOW = 8
+    """Below bridges."""
+    BENCH = 16
+    """Pavements in cuttings and on banks."""
+    BANK = 32
+    """These pavements with the slopes beside them, up or down to the land."""
 
 
 Cut = tuple[int, BaseGeometry]

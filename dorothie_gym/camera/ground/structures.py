@@ -28,6 +28,7 @@ COVER = 3.2
 
 _CELL = 8.0  # [m]
 _OVERLAP = 0.05  # [m] by which the floor of a tunnel continues in the open
+_LID = 0.15  # [m] below the ground over tunnels
 _SUNK = 0.005  # [m] of the floor there below the road
 _MOUTH = 16.0  # [m] of floor beyond the covered lanes, at most: up to the wall over the mouth
 _JOINT = 0.35  # [m] of floor beyond the lanes: the walls stand behind the edges of the mouth
@@ -74,6 +75,12 @@ def add_portals(builder: MeshBuilder, edges: Edges) -> None:
         _add_parapets(builder, line if which == 0 else line[:, ::-1])
 
 
+def add_lids(builder: MeshBuilder, triangles: GroundTriangles) -> None:
+    """Adds surfaces just below the ground above tunnels, which only the sun sees: the ground casts no shadows."""
+    covered = triangles.corners[triangles.areas & Area.COVERED != 0]
+    builder.triangles(covered - [0.0, 0.0, _LID], colour=_SHADED, kind=ObjectClass.WALL)
+
+
 def tunnel_floor(town: Town, sheets: Sequence[Sheet], cover: BaseGeometry) -> BaseGeometry:
     """Returns the area of the floors of tunnels below covered ground, up to slightly beyond their mouths."""
     flat, lanes = [], []
@@ -114,6 +121,8 @@ def add_tunnel(
     high = sides.copy()
     high[..., 2] += _headroom(field, high)
     _add_quads(builder, sides[:, ::-1], high[:, ::-1], _TILES, ObjectClass.WALL)
+    high[..., 2] += ROOF - _LID / 2.0  # up to the lid; in the ground, where only the sun sees it
+    _add_quads(builder, sides, high, _TILES, ObjectClass.WALL)
 
 
 def _headroom(field: HeightField, points: Array) -> Array:

@@ -14,10 +14,11 @@ from dorothie_gym.camera.ground.arrays import ground_arrays
 from dorothie_gym.camera.ground.heights import HeightField
 from dorothie_gym.camera.ground.lookup import GroundArrays
 from dorothie_gym.camera.ground.partition import Area, Cut, cut_ground
-from dorothie_gym.camera.ground.regions import GRID, Regions, find_regions, only_areas
+from dorothie_gym.camera.ground.regions import GRID, Regions, find_regions, only_areas, tidy
 from dorothie_gym.camera.ground.sheets import GROUND_SHEET, town_sheets
 from dorothie_gym.camera.ground.structures import (
     add_bridge,
+    add_lids,
     add_portals,
     add_tunnel,
     covered_ground,
@@ -83,7 +84,7 @@ def build_ground(town: Town) -> Ground:
     cover = covered_ground(town, stretches, ground)
     decks = [(sheet.level, deck_area(town, sheet)) for sheet in sheets if sheet.level > 0]
     regions = find_regions(ground.polygons)
-    areas = _faces(regions, cover, only_areas(shapely.union_all([deck for _, deck in decks])))
+    areas = _faces(regions, cover, only_areas(shapely.union_all([deck for _, deck in decks])), field)
     points, kinds = cut_ground(areas, ground.low, ground.high, None if field.flat else field.ground)
     triangles = lifted(points, kinds, field, decks, regions.median)
     edges = find_edges(triangles)
@@ -92,6 +93,7 @@ def build_ground(town: Town) -> Ground:
     tunnels = tunnel_floor(town, sheets, cover)
     add_faces(builder, edges, tunnels)
     add_portals(builder, edges)
+    add_lids(builder, triangles)
     for number, sheet in enumerate(sheets):
         if sheet.level > 0:
             add_bridge(builder, sheet, number, field, town, arrays)
@@ -100,9 +102,12 @@ def build_ground(town: Town) -> Ground:
     return Ground(builder.build(), arrays)
 
 
-def _faces(regions: Regions, cover: BaseGeometry, decks: BaseGeometry) -> list[Cut]:
+def _faces(regions: Regions, cover: BaseGeometry, decks: BaseGeometry, field: HeightField) -> list[Cut]:
     """Returns the areas of the ground that are not simply raised; neighbours share the corners on their edges."""
     shapes = {Area.FLAT: regions.flat, Area.SLOPE: regions.slope, Area.COVERED: cover, Area.BELOW: decks}
+    shapes |= {
+        flag: tidy(area) for flag, area in zip((Area.BENCH, Area.BANK), field.benches(), strict=True) if area.area > 0.0
+    }
     lines = shapely.union_all([shapely.boundary(shape) for shape in shapes.values()], grid_size=GRID)
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts([lines])))
     inside = shapely.point_on_surface(faces)
@@ -110,8 +115,9 @@ def _faces(regions: Regions, cover: BaseGeometry, decks: BaseGeometry) -> list[C
         shapely.prepare(shape)
     flags = np.where(shapely.contains(regions.slope, inside), int(Area.SLOPE), int(Area.RAISED))
     flags[shapely.contains(regions.flat, inside)] = int(Area.FLAT)
-    for flag in (Area.COVERED, Area.BELOW):
+    for flag in shapes.keys() - {Area.FLAT, Area.SLOPE}:
         flags[shapely.contains(shapes[flag], inside)] |= int(flag)
+    flags[flags & (Area.RAISED | Area.SLOPE) == 0] &= ~int(Area.BENCH | Area.BANK)
     _join_slivers(faces, flags)
     return [
         (flag, only_areas(shapely.union_all(faces[flags == flag])))

@@ -105,6 +105,23 @@ def test_pavements_stand_a_kerb_above_the_road() -> None:
     assert np.isclose(heights[flat], 0.0, atol=1e-3).mean() > 0.99
 
 
+def test_pavements_of_a_sunken_road_are_level() -> None:
+    ground, town = ground_of("midtown"), town_of("midtown")
+    sunken = 0
+    for walk in town.sidewalks:
+        way = np.diff(walk.points[:, :2], axis=0)
+        across = np.column_stack((-way[:, 1], way[:, 0])) / np.hypot(*way.T)[:, None]
+        middle = (walk.points[1:] + walk.points[:-1]) / 2.0
+        # below the open sky
+        chosen = (middle[:, 2] < -1.0) & (ground.height_at(middle[:, :2]) < -0.8)
+        middle, across = middle[chosen], across[chosen]
+        for side in (-0.8, 0.0, 0.8):
+            heights = ground.height_at(middle[:, :2] + side * across)
+            np.testing.assert_allclose(heights, middle[:, 2] + KERB_HEIGHT, atol=0.15)
+        sunken += len(middle)
+    assert sunken > 20
+
+
 def test_kerbs_face_the_road() -> None:
     ground = ground_of("brookside")
     faces = ground.mesh.part(ground.mesh.classes == ObjectClass.SIDE_WALK.value)
