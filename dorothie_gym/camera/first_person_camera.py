@@ -117,12 +117,13 @@ class FirstPersonCamera:
         self._labelled = any(output != CameraOutput.RGB for output in config.outputs)
         self._bodies = empty_mesh(_ROOM)
         self._box = np.zeros((2, 3))
+        self._samples = new_samples()
         self._keys = np.unique(self._overlay.instances[self._overlay.instances != TOWN])
         if self._draws_rgb:
             self._buffer = new_buffer(width * samples, height * samples)
             self._orders = self._new_orders(width * samples, height * samples)
             self._textures = textures_of(scene.atlas)
-            self._samples, self._face = new_samples(), new_face()
+            self._face = new_face()
             self._shadows = new_shadow_maps(enabled=config.shadows)
             self._scratch = np.zeros(max(width, height), np.uint8)
             self._light_key: tuple[float, ...] = ()
@@ -226,7 +227,16 @@ class FirstPersonCamera:
 
     def _write_labels(self, view: View, bodies: RecordArray[PlacementRecord]) -> dict[str, NDArray[np.generic] | Boxes]:
         labels, outputs = self._labels, self.config.outputs
-        write_labels(view, self._label_buffer, self.scene.town, self._overlay, self._bodies, self.scene.ground, labels)
+        write_labels(
+            view,
+            self._label_buffer,
+            self.scene.town,
+            self._overlay,
+            self._bodies,
+            self.scene.ground,
+            self._samples,
+            labels,
+        )
         found: dict[str, NDArray[np.generic] | Boxes] = {
             output.value: getattr(labels, output.value).copy()
             for output in (CameraOutput.DEPTH, CameraOutput.SEMANTIC, CameraOutput.INSTANCE)
@@ -243,9 +253,9 @@ class FirstPersonCamera:
     @property
     def nbytes(self) -> int:
         """Size of the buffers [bytes]."""
-        parts: list[tuple[object, ...]] = [self._bodies, self._overlay]
+        parts: list[tuple[object, ...]] = [self._bodies, self._overlay, self._samples]
         if self._draws_rgb:
-            parts += [self._buffer, *self._orders, self._samples, self._shadows]
+            parts += [self._buffer, *self._orders, self._shadows]
         if self._labelled:
             parts += [self._label_buffer, *self._label_orders, self._labels]
         return sum(array.nbytes for part in parts for array in part if isinstance(array, np.ndarray))

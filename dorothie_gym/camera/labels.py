@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.ground.lookup import GroundArrays, material_at
+from dorothie_gym.camera.ground.lookup import GroundArrays, material_of_part, part_of
 from dorothie_gym.camera.mesh import Mesh, Surface
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.rasterizer import SKY, VisibilityBuffer
+from dorothie_gym.camera.samples import FIRST, ROOM, Samples, X, Y
 from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.ontology import ObjectClass
@@ -44,8 +45,9 @@ def new_labels(width: int, height: int) -> Labels:
 
 @concurrent
 def write_labels(
-    view: View, buffer: VisibilityBuffer, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays, labels: Labels
-) -> None:
+    view: View, buffer: VisibilityBuffer, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays,
+    samples: Samples, labels: Labels,
+) -> None:  # fmt: skip
     """Writes the labels of the pixels of a buffer.
 
     Args:
@@ -55,33 +57,58 @@ def write_labels(
         overlay: what stands in this session.
         bodies: what moves.
         ground: materials of the ground.
+        samples: scratch space.
         labels: to be written.
     """
-    last, mesh, row, kind = SKY, town, 0, _SKY_CLASS
-    offset, nx, ny, nz = 0.0, 0.0, 0.0, 0.0
     for y in range(view.height):
-        for x in range(view.width):
-            number = buffer.triangles[y, x]
+        numbers, first = buffer.triangles[y], 0
+        depth, semantic, instance = labels.depth[y], labels.semantic[y], labels.instance[y]
+        while first < view.width:
+            number, last, most = numbers[first], first + 1, min(view.width, first + ROOM)
+            while last < most and numbers[last] == number:
+                last += 1
             if number == SKY:
-                labels.depth[y, x], labels.semantic[y, x], labels.instance[y, x] = np.inf, _SKY_CLASS, 0
-                continue
-            if number != last:
-                last, mesh, row = number, mesh_of(town, overlay, bodies, number), row_in(town, overlay, number)
-                offset, nx, ny, nz = plane_of(view, mesh, row)
-                kind = -1 if mesh.surfaces[row] & _GROUND else int(mesh.classes[row])
-            right, up = (x + 0.5 - 0.5 * view.width) / view.focal, (0.5 * view.height - y - 0.5) / view.focal
-            depth = offset / (nx * right + ny * up + nz)
-            labels.depth[y, x], labels.instance[y, x] = depth, mesh.instances[row]
-            labels.semantic[y, x] = kind if kind >= 0 else _ground_class(view, mesh, row, right, up, depth, ground)
+                depth[first:last], semantic[first:last], instance[first:last] = np.inf, _SKY_CLASS, 0
+            else:
+                mesh, row = mesh_of(town, overlay, bodies, number), row_in(town, overlay, number)
+                instance[first:last], semantic[first:last] = mesh.instances[row], mesh.classes[row]
+                _write_depths(view, mesh, row, first + 0.5, y + 0.5, depth[first:last])
+                if mesh.surfaces[row] & _GROUND:
+                    sheet = int(mesh.textures[row])
+                    _write_classes(
+                        view, sheet, first + 0.5, y + 0.5, depth[first:last], ground, samples, semantic[first:last]
+                    )
+            first = last
 
 
 @inlined
-def _ground_class(view: View, mesh: Mesh, row: int, right: float, up: float, depth: float, ground: GroundArrays) -> int:
-    """Returns the class of the ground at a depth [m] in a direction (right, up, 1)."""
-    axes, origin = view.axes, view.origin
-    x = origin[0] + depth * (axes[2, 0] + right * axes[0, 0] + up * axes[1, 0])
-    y = origin[1] + depth * (axes[2, 1] + right * axes[0, 1] + up * axes[1, 1])
-    return int(ground.classes[material_at(ground, int(mesh.textures[row]), x, y)])
+def _write_depths(view: View, mesh: Mesh, row: int, x: float, y: float, depth: NDArray[np.float32]) -> None:
+    """Writes the depths of neighbours in a row, of which the first is at (x, y) [pixels]."""
+    offset, nx, ny, nz = plane_of(view, mesh, row)
+    left, up, focal = x - 0.5 * view.width, (0.5 * view.height - y) / view.focal, view.focal
+    for k in range(len(depth)):
+        depth[k] = offset / (nx * ((left + k) / focal) + ny * up + nz)
+
+
+@inlined
+def _write_classes(
+    view: View, sheet: int, x: float, y: float, depth: NDArray[np.float32], ground: GroundArrays, samples: Samples,
+    semantic: NDArray[np.uint8],
+) -> None:  # fmt: skip
+    """Writes the classes of neighbours in a row that see the ground, of which the first is at (x, y) [pixels]."""
+    values, parts, axes = samples.values, samples.indices, view.axes
+    x0, y0, rightward, downward = view.origin[0], view.origin[1], axes[0, 0], axes[0, 1]
+    left, up, focal = x - 0.5 * view.width, (0.5 * view.height - y) / view.focal, view.focal
+    ahead_x, ahead_y = axes[2, 0] + up * axes[1, 0], axes[2, 1] + up * axes[1, 1]
+    low_x, low_y, inverse = ground.origins[sheet, 0], ground.origins[sheet, 1], 1.0 / ground.size[0]
+    columns, rows = ground.shapes[sheet, 0], ground.shapes[sheet, 1]
+    for k in range(len(depth)):
+        right, away = (left + k) / focal, float(depth[k])
+        at_x, at_y = x0 + away * (ahead_x + right * rightward), y0 + away * (ahead_y + right * downward)
+        values[X + k], values[Y + k] = at_x, at_y
+        parts[FIRST + k] = part_of(low_x, low_y, inverse, columns, rows, at_x, at_y)
+    for k in range(len(depth)):
+        semantic[k] = ground.classes[material_of_part(ground, sheet, parts[FIRST + k], values[X + k], values[Y + k])]
 
 
 @inlined
@@ -129,22 +156,24 @@ def find_boxes(instance: NDArray[np.int32], keys: NDArray[np.int32], boxes: NDAr
 
     Args:
         instance: (h, w).
-        keys: (n,) ascending; others are left out.
+        keys: (n,) ascending; others, and 0, are left out.
         boxes: (n, 5): left, top, right, bottom (behind the last pixel) [pixels], number of pixels; zeros if unseen.
     """
     height, width = instance.shape
     for k in range(len(keys)):
         boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3], boxes[k, 4] = width, height, 0, 0, 0
-    last, row = 0, -1
     for y in range(height):
-        for x in range(width):
-            key = instance[y, x]
-            if key != last:
-                last, row = key, _row_of(keys, key)
+        line, first = instance[y], 0
+        while first < width:
+            key, last = line[first], first + 1
+            while last < width and line[last] == key:
+                last += 1
+            row = _row_of(keys, key) if key != 0 else -1
             if row >= 0:
-                boxes[row, 0], boxes[row, 2] = min(boxes[row, 0], x), max(boxes[row, 2], x + 1)
+                boxes[row, 0], boxes[row, 2] = min(boxes[row, 0], first), max(boxes[row, 2], last)
                 boxes[row, 1], boxes[row, 3] = min(boxes[row, 1], y), y + 1
-                boxes[row, 4] += 1
+                boxes[row, 4] += last - first
+            first = last
     for k in range(len(keys)):
         if boxes[k, 4] == 0:
             boxes[k] = 0

@@ -19,7 +19,7 @@ from dorothie_gym.camera.ground.colours import (
     noise_place,
     patch_weight,
 )  # fmt: skip
-from dorothie_gym.camera.ground.lookup import SEVERAL, SQUARES, GroundArrays
+from dorothie_gym.camera.ground.lookup import PARTS, SEVERAL, GroundArrays, part_of
 from dorothie_gym.camera.mesh import Surface
 from dorothie_gym.camera.optics import Optics
 from dorothie_gym.camera.samples import (
@@ -50,7 +50,6 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 
 _GROUND = int(Surface.GROUND)
-_PARTS = SQUARES * SQUARES
 
 
 @compiled
@@ -64,9 +63,9 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
     for k in range(count):
         width, place, material = values[ONE + k], places[FIRST + k], outside
         if place >= 0:
-            material = int(cells[place // _PARTS])
+            material = int(cells[place // PARTS])
             if material < 0:
-                material = int(squares[-1 - material, place % _PARTS]) if width <= SHARP else SEVERAL
+                material = int(squares[-1 - material, place % PARTS]) if width <= SHARP else SEVERAL
         if material != SEVERAL and width <= BLENDED:
             fine, coarse = places[SECOND + k], places[THIRD + k]
             grain = noise_at(noise, fine) * values[TWO + k] + noise_at(noise, coarse) * values[THREE + k]
@@ -100,11 +99,7 @@ def _place_ground(
         values[DEPTH + k], values[SLANT + k], values[X + k], values[Y + k] = depth, -toward, x, y
         values[ONE + k] = width
         values[TWO + k], values[THREE + k] = grain_weight(width), patch_weight(width)
-        across, down = (x - left) * inverse, (y - top) * inverse
-        column, row = math.floor(across), math.floor(down)
-        square = int((down - row) * SQUARES) * SQUARES + int((across - column) * SQUARES)
-        inside = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
-        places[FIRST + k] = (row * columns + column) * _PARTS + square if inside else -1
+        places[FIRST + k] = part_of(left, top, inverse, columns, rows, x, y)
         places[SECOND + k], places[THIRD + k] = noise_place(x, y, GRAINS), noise_place(x, y, PATCHES)
     for k in range(count):
         values[OWN + k], values[BRIGHT + k], values[LAMP + k] = 0.0, 0.0, 1.0

@@ -20,6 +20,7 @@ from dorothie_gym.camera.labels import find_boxes, new_labels, write_labels
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, empty_mesh
 from dorothie_gym.camera.pose import CameraPose, View, view_from
 from dorothie_gym.camera.rasterizer import NEAR, SKY, VisibilityBuffer, clear, draw_triangles, new_buffer
+from dorothie_gym.camera.samples import new_samples
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass
 
@@ -86,7 +87,7 @@ def test_pixels_see_what_rays_hit(seed: int) -> None:
     pose = CameraPose(x, y, z, heading, pitch)
     view = view_from(pose, 240, 160, 90.0)
     labels, buffer = new_labels(240, 160), seen(view, mesh)
-    write_labels(view, buffer, mesh, empty_mesh(), empty_mesh(), GROUND, labels)
+    write_labels(view, buffer, mesh, empty_mesh(), empty_mesh(), GROUND, new_samples(), labels)
     depth, hit = rays_hit(view, mesh)
     same = buffer.triangles == hit
     assert same.mean() >= 0.999

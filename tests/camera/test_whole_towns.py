@@ -27,6 +27,7 @@ from dorothie_gym.camera.labels import new_labels, write_labels
 from dorothie_gym.camera.mesh import Mesh, Surface, empty_mesh, joined
 from dorothie_gym.camera.pose import CameraPose, View, view_from
 from dorothie_gym.camera.rasterizer import NEAR, SKY, clear, new_buffer
+from dorothie_gym.camera.samples import new_samples
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
@@ -134,7 +135,7 @@ def numbers_and_depth(stage: Stage, view: View) -> tuple[NDArray[np.int32], NDAr
     clear(buffer)
     draw_cells(view, buffer, town, cells, new_order(cells, WIDTH, HEIGHT), 0)
     draw_cells(view, buffer, overlay, overlay_cells, new_order(overlay_cells, WIDTH, HEIGHT), town.size)
-    write_labels(view, buffer, town, overlay, empty_mesh(), scene.town.ground.arrays, labels)
+    write_labels(view, buffer, town, overlay, empty_mesh(), scene.town.ground.arrays, new_samples(), labels)
     return buffer.triangles.copy(), labels.depth, joined([town, overlay])
 
 

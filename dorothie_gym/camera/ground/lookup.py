@@ -13,13 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
 
 SQUARES = 8
 """Squares along each side of a mixed cell."""
+
+PARTS = SQUARES * SQUARES
+"""Squares of a mixed cell."""
 
 SEVERAL = 255
 """Material of squares that edges touch."""
@@ -115,20 +118,46 @@ def material_in(ground: GroundArrays, sheet: int, mixed: int, x: float, y: float
     return int(ground.bases[mixed])
 
 
+@inlined
+def part_of(left: float, top: float, inverse: float, columns: int, rows: int, x: float, y: float) -> int:
+    """Returns the number of the square, `PARTS` for each cell, at a position; -1 outside of the grid.
+
+    Args:
+        left: first x of the grid [m].
+        top: first y of the grid [m].
+        inverse: of the width of a cell [1/m].
+        columns: of cells.
+        rows: of cells.
+        x: [m].
+        y: [m].
+    """
+    across, down = (x - left) * inverse, (y - top) * inverse
+    column, row = math.floor(across), math.floor(down)
+    square = int((down - row) * SQUARES) * SQUARES + int((across - column) * SQUARES)
+    inside = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+    return (row * columns + column) * PARTS + square if inside else -1
+
+
+@inlined
+def material_of_part(ground: GroundArrays, sheet: int, part: int, x: float, y: float) -> int:
+    """Returns the material at a position [m] whose square is known from `part_of`."""
+    if part < 0:
+        return int(ground.outside[sheet])
+    value = int(ground.cells[ground.firsts[sheet] + part // PARTS])
+    if value >= 0:
+        return value
+    material = int(ground.squares[-1 - value, part % PARTS])
+    return material if material != SEVERAL else material_in(ground, sheet, -1 - value, x, y)
+
+
 @compiled
 def material_at(ground: GroundArrays, sheet: int, x: float, y: float) -> int:
     """Returns the material of a sheet at a position [m]: of the top-most polygon that contains it."""
-    size = ground.size[0]
-    across, down = (x - ground.origins[sheet, 0]) / size, (y - ground.origins[sheet, 1]) / size
-    column, row = math.floor(across), math.floor(down)
-    if column < 0 or row < 0 or column >= ground.shapes[sheet, 0] or row >= ground.shapes[sheet, 1]:
-        return int(ground.outside[sheet])
-    value = int(ground.cells[ground.firsts[sheet] + row * ground.shapes[sheet, 0] + column])
-    if value >= 0:
-        return value
-    square = int((down - row) * SQUARES) * SQUARES + int((across - column) * SQUARES)
-    material = int(ground.squares[-1 - value, square])
-    return material if material != SEVERAL else material_in(ground, sheet, -1 - value, x, y)
+    part = part_of(
+        ground.origins[sheet, 0], ground.origins[sheet, 1], 1.0 / ground.size[0], ground.shapes[sheet, 0],
+        ground.shapes[sheet, 1], x, y,
+    )  # fmt: skip
+    return material_of_part(ground, sheet, part, x, y)
 
 
 @compiled
