@@ -9,12 +9,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_radians
+from dorothie_gym.camera.body_snapshots import BodySnapshot
 from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.pose import CameraPose
@@ -46,14 +46,6 @@ _KINDS = {ActorKind.VEHICLE: Kind.CAR, ActorKind.CYCLIST: Kind.CYCLIST}
 _NO_BODY = -1
 _SAME_PLACE = 1.0  # [m] between a recorded landmark and its site
 _OWN_LOT = 6.0, 5.0  # [m] length and depth of the lot of a landmark that stands at no site of the town
-
-
-class RecordedBodies(NamedTuple):
-    """Bodies at a frame; a record of each kind and no free rows."""
-
-    vehicles: RecordArray[VehicleRecord]
-    pedestrians: RecordArray[PedestrianRecord]
-    props: RecordArray[PropRecord]
 
 
 class RecordedPictures:
@@ -153,7 +145,7 @@ class RecordedPictures:
                     continue
         return self._weathers[key]
 
-    def bodies(self, frame: int) -> RecordedBodies:
+    def bodies(self, frame: int) -> BodySnapshot:
         """Returns the bodies at a frame."""
         moment = self._tracks.at(frame)
         actors, kinds = self._tracks.actors(moment), self._tracks.table.rows["kind"][moment.rows]
@@ -174,7 +166,7 @@ class RecordedPictures:
         plain(pedestrians)["state"] = int(Walk.WALKING)
         props = _records(PropRecord, columns, standing)
         plain(props)["present"] = True
-        return RecordedBodies(vehicles, pedestrians, props)
+        return BodySnapshot(vehicles, pedestrians, props)
 
     def _traffic_lights(self, frame: int) -> Mapping[int, LightColour] | None:
         """Returns the recorded states of the traffic lights; None where none are recorded."""

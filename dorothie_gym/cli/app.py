@@ -20,7 +20,7 @@ from dorothie_gym.cli.options import PictureCommand
 from dorothie_gym.cli.output import exit_interrupted
 from dorothie_gym.cli.rollout import leaderboard, rollout
 from dorothie_gym.cli.run import run
-from dorothie_gym.cli.sessions import compare, replay, show
+from dorothie_gym.cli.sessions import compare, film, replay, show
 from dorothie_gym.cli.stats import stats
 from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl
@@ -61,6 +61,7 @@ app.command()(generate)
 app.command()(rollout)
 app.command()(leaderboard)
 app.command()(replay)
+app.command()(film)
 app.command()(compare)
 app.command()(show)
 app.command("train-rl")(train_rl)

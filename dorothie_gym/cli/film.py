@@ -1,23 +1,29 @@
-"""Video of a session: the view that follows the car, ten frames per second."""
+"""Video of a session while it is played: windscreen and map, ten frames per second."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.cli.output import VideoWriter, video_writer
+from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_scene import scene_of
 from dorothie_gym.recording import FRAME_RATE
-from dorothie_gym.rendering.frames import SceneRenderer
-from dorothie_gym.rendering.scene import Actor, Scene
+from dorothie_gym.render_view import RenderView
+from dorothie_gym.rendering.scene import Actor, Scene, SpokenLine
+from dorothie_gym.rendering.session_views import SessionRenderer
+
+if TYPE_CHECKING:
+    from dorothie_gym.camera.body_snapshots import BodySnapshot
 
 FRAMES_PER_SECOND = 10
 """Frame rate of the video."""
@@ -37,15 +43,17 @@ class Film:
 
     Args:
         path: file to write; its suffix chooses the format.
+        view: what it shows.
 
     Raises:
         ImportError: the extra `video` is not installed.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, view: RenderView = RenderView.BOTH) -> None:
         self.frames, self.seconds = 0, 0.0
-        self._renderer = SceneRenderer()
+        self._renderer = SessionRenderer(view)
         self._writer: VideoWriter = video_writer(path, FRAMES_PER_SECOND)
+        self._windscreen: _Windscreen | None = None
         self._last: Scene | None = None
 
     def __enter__(self) -> Self:
@@ -65,36 +73,94 @@ class Film:
         self.seconds += time.perf_counter() - begun
 
     def _append_decision(self, engine: SessionEngine) -> None:
-        scene = scene_of(engine.session)
-        if self._last is None:
-            self._append(scene)
-        else:
-            for between in _in_between(self._last, scene, engine):
-                self._append(between)
+        session, size = engine.session, self._renderer.windscreen
+        if self._windscreen is None and size is not None:
+            self._windscreen = _Windscreen(session, size)
+        scene = scene_of(session)
+        if self._last is not None:
+            for share, between in _in_between(self._last, scene, engine):
+                self._append(between, None if self._windscreen is None else self._windscreen.between(between, share))
+        self._append(scene, None if self._windscreen is None else self._windscreen.now())
         self._last = scene
 
-    def _append(self, scene: Scene) -> None:
-        self._writer.append_data(self._renderer.draw(scene))
+    def _append(self, scene: Scene, picture: NDArray[np.uint8] | None) -> None:
+        self._writer.append_data(self._renderer.draw(scene, picture))
         self.frames += 1
 
 
-def _in_between(before: Scene, after: Scene, engine: SessionEngine) -> list[Scene]:
-    """Returns the scenes of a decision, ten per second; texts and tasks change with the last."""
+class _Moment(NamedTuple):
+    """Bodies and height of the car [m] at a decision."""
+
+    bodies: BodySnapshot
+    height: float
+
+
+class _Windscreen:
+    """Camera on the car of a session in progress, at its decisions and between them."""
+
+    def __init__(self, session: LiveSession, size: tuple[int, int]) -> None:
+        from dorothie_gym.engine.pictures import windscreen_camera
+
+        self._world = session.world
+        self._camera = windscreen_camera(session.world.town, session.scenario, session.config, size)
+        self._last = self._moment()
+
+    def now(self) -> NDArray[np.uint8] | None:
+        """Returns the picture of the present decision, and keeps what the next pictures need."""
+        self._last = self._moment()
+        return self._camera.render(self._world).rgb
+
+    def between(self, scene: Scene, share: float) -> NDArray[np.uint8] | None:
+        """Returns the picture at a share of the time between the last decision and the present one.
+
+        Args:
+            scene: of that time, with the pose of the car.
+            share: of the time.
+        """
+        from dorothie_gym.camera.body_snapshots import bodies_between
+
+        world, now = self._world, self._moment()
+        height = self._last.height + share * (now.height - self._last.height)
+        return self._camera.render_from(
+            self._camera.config.pose_on(scene.car.x, scene.car.y, height, scene.car.heading),
+            bodies_between(self._last.bodies, now.bodies, share),
+            world.weather,
+            time=scene.time,
+            head_lights=world.ego.lights,
+            faults=world.faults,
+        ).rgb
+
+    def _moment(self) -> _Moment:
+        from dorothie_gym.camera.body_snapshots import snapshot_of
+
+        return _Moment(snapshot_of(self._world.actors.arrays), float(self._world.car.height))
+
+
+def _in_between(before: Scene, after: Scene, engine: SessionEngine) -> Iterator[tuple[float, Scene]]:
+    """Yields the scenes between two decisions, ten per second, and their shares of time; tasks change afterwards."""
     rows = engine.last_frames
     step = FRAME_RATE // FRAMES_PER_SECOND
-    scenes = []
     for k in range(step - 1, len(rows) - 1, step):
         _, x, y, heading, speed, *_ = rows[k].tolist()
         share = (k + 1) / len(rows)
-        scenes.append(
+        now = before.time + share * (after.time - before.time)
+        yield (
+            share,
             replace(
                 before,
-                time=before.time + share * (after.time - before.time),
+                time=now,
                 car=replace(after.car, x=x, y=y, heading=heading, speed=speed),
                 others=_moved(before.others, after.others, share, after.time - before.time),
-            )
+                speaking=_spoken_at(now, after),
+                weather=after.weather,
+            ),
         )
-    return [*scenes, after]
+
+
+def _spoken_at(now: float, after: Scene) -> list[SpokenLine]:
+    """Returns the utterances in progress at a time [s] shortly before a scene."""
+    lines = (*after.utterances, *after.speaking)
+    return [line for line in lines if line.start is not None and line.start <= now < line.time]
 
 
 def _moved(before: Sequence[Actor], after: Sequence[Actor], share: float, seconds: float) -> list[Actor]:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 from typer.core import TyperCommand
 
-from dorothie_gym.cli.completion import complete_policy
+from dorothie_gym.cli.completion import complete_policy, complete_town
 from dorothie_gym.cli.output import fail
 from dorothie_gym.engine.perception_model import PerceptionModel
+from dorothie_gym.render_view import RenderView
 
 if TYPE_CHECKING:
     from dorothie_gym.engine.config import EnvConfig
@@ -27,6 +28,15 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and 
 
 Maps = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder with maps of towns that are not shipped (Town01.xodr).")
+]
+
+SessionTown = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="Town of the session, if it is not shipped (.xodr, .yaml).",
+        autocompletion=complete_town,
+    ),
 ]
 
 Players = Annotated[int | None, typer.Option(min=1, help="Number of worker processes; default one per processor.")]
@@ -77,6 +87,10 @@ Perception = Annotated[
     typer.Option(
         help="What participant and Co-Wizard see: all bodies that are near enough, or those in the car's camera.",
     ),
+]
+
+View = Annotated[
+    RenderView, typer.Option(help="What the video shows: the map, the windscreen (camera), or both side by side.")
 ]
 
 Ray = Annotated[

@@ -18,6 +18,7 @@ from dorothie_gym.cli.options import (
     CoWizard,
     Participant,
     Perception,
+    View,
     WordErrors,
     env_config,
     find_cast,
@@ -35,6 +36,7 @@ from dorothie_gym.cli.output import (
 )
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.engine.perception_model import PerceptionModel
+from dorothie_gym.render_view import RenderView
 
 if TYPE_CHECKING:
     from dorothie_gym.cli.film import Film
@@ -56,6 +58,7 @@ class _Plan:
     out: Path | None
     picture: Path | None
     video: Path | None
+    view: RenderView
     players: tuple[str, str, str]
     max_seconds: float | None
     word_errors: float
@@ -88,6 +91,7 @@ def run(
     video: Annotated[
         Path | None, typer.Option(metavar="V.mp4", help=f"Write a video of the session ({needs('video')}).")
     ] = None,
+    view: View = RenderView.BOTH,
     participant: Participant = "scripted",
     co_wizard: CoWizard = "scripted",
     ad_wizard: AdWizard = "scripted",
@@ -120,6 +124,7 @@ def run(
         out=out,
         picture=picture if picture or no_picture or as_json else PICTURE,
         video=video,
+        view=view,
         players=(participant, co_wizard, ad_wizard),
         max_seconds=max_seconds,
         word_errors=word_errors,
@@ -152,7 +157,7 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
     from dorothie_gym.rollout import play_session
 
     cast = find_cast(*plan.players)
-    compile_first()
+    compile_first(pictures=plan.video is not None and plan.view is not RenderView.MAP)
     config = env_config(plan.max_seconds, plan.word_errors, plan.perception)
     engine = SessionEngine(plan.town, plan.storyboard, config=config)
     engine.reset(seed=plan.seed)
@@ -190,7 +195,7 @@ def _watchers(
     if plan.video is not None:
         from dorothie_gym.cli.film import Film
 
-        film = stack.enter_context(Film(plan.video))
+        film = stack.enter_context(Film(plan.video, plan.view))
         watchers.append(film)
     if plan.speed is not None:
         from dorothie_gym.cli.live import Pace

@@ -1,16 +1,17 @@
-"""`dorothie-gym replay`, `compare` and `show`: playback, comparison and transcripts of recorded sessions."""
+"""`dorothie-gym replay`, `film`, `compare` and `show`: playback, films, comparison, transcripts of sessions."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.completion import complete_town
-from dorothie_gym.cli.options import AsJson, Maps, Players, needs
+from dorothie_gym.cli.options import AsJson, Maps, Players, SessionTown, View, needs
 from dorothie_gym.cli.output import (
+    Facts,
     check_video,
     fail,
     print_json,
@@ -20,8 +21,12 @@ from dorothie_gym.cli.output import (
     video_writer,
 )
 from dorothie_gym.processors import available_processors
+from dorothie_gym.render_view import RenderView
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from dorothie_gym.recording import Difference
     from dorothie_gym.rendering.playback import Playback
     from dorothie_gym.rollout.replay import ReplayCheck, ReplaySources
@@ -46,14 +51,7 @@ def replay(
         bool,
         typer.Option("--check", help="Simulate the session again from seed and actions; compare all frames."),
     ] = False,
-    town: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="Town of the session, if it is not shipped (.xodr, .yaml).",
-            autocompletion=complete_town,
-        ),
-    ] = None,
+    town: SessionTown = None,
     maps: Maps = None,
     storyboard: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Storyboard of the session, if it is not shipped (.json).")
@@ -140,22 +138,31 @@ def _play_back(path: Path, sources: ReplaySources, fps: float, video: Path | Non
 
 
 def _write_video(playback: Playback, fps: float, video: Path) -> int:
-    from rich.progress import track
-
     from dorothie_gym.rendering.frames import SceneRenderer
 
-    renderer, console, shown = SceneRenderer(), stderr(), 0
-    writer = video_writer(video, fps)
+    renderer = SceneRenderer()
+    return _write(video, fps, (renderer.draw(scene) for scene in playback.scenes(fps)), playback.count(fps))
+
+
+def _write(video: Path, fps: float, frames: Iterable[NDArray[np.uint8]], count: int) -> int:
+    """Writes frames as a video, which appears when it is complete; returns their number."""
+    from rich.progress import track
+
+    console, shown = stderr(), 0
+    part = video.with_name(f".{video.stem}.part{video.suffix}")
     try:
-        scenes = track(
-            playback.scenes(fps), "Writing video", total=playback.count(fps), console=console, transient=True,
-            disable=not console.is_terminal,
-        )  # fmt: skip
-        for scene in scenes:
-            writer.append_data(renderer.draw(scene))
-            shown += 1
+        writer = video_writer(part, fps)
+        try:
+            for frame in track(
+                frames, "Writing video", total=count, console=console, transient=True, disable=not console.is_terminal
+            ):
+                writer.append_data(frame)
+                shown += 1
+        finally:
+            writer.close()
+        part.replace(video)
     finally:
-        writer.close()
+        part.unlink(missing_ok=True)
     return shown
 
 
@@ -186,6 +193,62 @@ def _is_window_invisible() -> bool:
     import pygame
 
     return pygame.display.get_driver() in ("offscreen", "dummy") and "SDL_VIDEODRIVER" not in os.environ
+
+
+# --- Films ------------------------------------------------------------------------------------------------------------
+
+
+def film(
+    path: Annotated[Path, typer.Argument(metavar="SESSION", help="A session of any layout, with its surroundings.")],
+    out: Annotated[Path, typer.Option("--out", metavar="V.mp4", help=f"Video to write ({needs('video')}).")],
+    view: View = RenderView.BOTH,
+    fps: Annotated[float, typer.Option(min=0.5, max=30.0, help="Frames per second.")] = 10.0,
+    town: SessionTown = None,
+    maps: Maps = None,
+    as_json: AsJson = False,
+) -> None:
+    """Film a recorded session through the windscreen, beside its map, with the talk as subtitles."""
+    check_video(out)
+    from dorothie_gym.rollout.replay import ReplaySources
+
+    with reporting_errors():
+        facts = _film(path, ReplaySources(town=town, maps=maps), out, view, fps)
+    if as_json:
+        print_json(facts)
+    else:
+        line = f"{facts['session']}: {facts['seconds']:.0f} s, {facts['pictures']} pictures: {out}"
+        stdout().print(line, markup=False, soft_wrap=True)
+
+
+def _film(path: Path, sources: ReplaySources, out: Path, view: RenderView, fps: float) -> Facts:
+    from dorothie_gym.cli.warm_up import compile_first
+    from dorothie_gym.recording import read_session
+    from dorothie_gym.rendering.playback import Playback
+    from dorothie_gym.rendering.session_views import SessionRenderer
+
+    session = read_session(path, maps=sources.maps)
+    town, renderer = sources.town_of(session), SessionRenderer(view)
+    playback, size = Playback(session, town), renderer.windscreen
+    if size is None:
+        frames: Iterable[NDArray[np.uint8]] = (renderer.draw(scene) for scene in playback.scenes(fps))
+        count = playback.count(fps)
+    else:
+        from dorothie_gym.camera.config import CameraConfig
+        from dorothie_gym.camera.recorded_pictures import RecordedPictures
+
+        compile_first(pictures=True)
+        pictures = RecordedPictures(session, town, CameraConfig(width=size[0], height=size[1]))
+        frames = (renderer.draw(playback.scene(frame), taken.rgb) for frame, taken in pictures.pictures(fps))
+        count = len(pictures.frames(fps))
+    shown = _write(out, fps, frames, count)
+    return {
+        "session": session.name,
+        "town": session.header.town,
+        "seconds": round(session.duration, 3),
+        "view": view.value,
+        "pictures": shown,
+        "video": str(out),
+    }
 
 
 # --- Comparison -------------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
@@ -11,6 +12,7 @@ from gymnasium import spaces
 
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.copying import Lookups
+from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
@@ -56,6 +58,12 @@ def camera_of(town: Town, scenario: Scenario, config: CameraConfig) -> SessionCa
     return SessionCamera(SessionScene(town_scene(town), names, scenario.storyboard.landmarks), config)
 
 
+def windscreen_camera(town: Town, scenario: Scenario, config: EnvConfig, size: tuple[int, int]) -> SessionCamera:
+    """Returns a camera for spectators: of a width and height [px], otherwise with the settings of the session's."""
+    own = config.camera or CameraConfig()
+    return camera_of(town, scenario, replace(own, width=size[0], height=size[1], outputs=(CameraOutput.RGB,)))
+
+
 class SessionPictures(Lookups):
     """Pictures of a session; each is drawn when it is first asked for.
 
@@ -78,10 +86,6 @@ class SessionPictures(Lookups):
         if self._taken is None or self._taken[0] != decision:
             self._taken = decision, self._camera.render(self._world)
         return self._taken[1]
-
-    def draw(self) -> CameraFrame:
-        """Returns the picture of the world as it is now."""
-        return self._camera.render(self._world)
 
     def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
         """Adds the pictures of the present decision to the observations of the roles that see them."""

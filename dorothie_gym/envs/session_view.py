@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
@@ -12,10 +11,11 @@ from numpy.typing import NDArray
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.ontology import Role
+from dorothie_gym.render_view import RenderView, checked_view
 from dorothie_gym.spaces import Observation
 
 if TYPE_CHECKING:
-    from dorothie_gym.engine.pictures import SessionPictures
+    from dorothie_gym.camera.session_camera import SessionCamera
     from dorothie_gym.engine.role_scene import RoleView
     from dorothie_gym.rendering.frames import HumanWindow
     from dorothie_gym.rendering.scene import Scene, SpokenLine
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 RENDER_MODES: Final[tuple[str, ...]] = ("human", "rgb_array")
 """Render modes of the environments that play sessions."""
-
-_MAP: Final = "map"
 
 VIEWS: Final[tuple[str, ...]] = ("role", "session")
 """Views of the environments of one role: what the role observes, or the whole session."""
@@ -53,29 +51,30 @@ class SessionView(Lookups):
         ValueError: the render mode or view is unknown.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_renderer", "_pictures", "_window")
+    LOOKED_UP: ClassVar[Sequence[str]] = ("_renderer", "_camera", "_window")
 
     _renderer: SessionRenderer | None = None
-    _pictures: tuple[LiveSession, SessionPictures] | None = None
+    _camera: tuple[LiveSession, SessionCamera] | None = None
     _window: HumanWindow | None = None
 
     def __init__(
-        self, render_mode: str | None, *, frames_per_second: float, role: Role | None = None, render_view: str = _MAP
+        self,
+        render_mode: str | None,
+        *,
+        frames_per_second: float,
+        role: Role | None = None,
+        render_view: str = RenderView.MAP,
     ) -> None:
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or one of {', '.join(RENDER_MODES)}")
-        if render_view != _MAP:
-            from dorothie_gym.rendering.session_views import checked_view
-
-            checked_view(render_view)
-        self._view = render_view
+        self._view = checked_view(render_view)
         self._mode, self._rate, self._role = render_mode, frames_per_second, role
         self._seen: RoleView | None = None
         self._heard: list[SpokenLine] = []
 
     @classmethod
     def of_role(
-        cls, role: Role, view: str, render_mode: str | None, frames_per_second: float, render_view: str = _MAP
+        cls, role: Role, view: str, render_mode: str | None, frames_per_second: float, render_view: str = RenderView.MAP
     ) -> SessionView:
         """Returns the view of an environment of one role; raises `ValueError` if `view` is not one of `VIEWS`."""
         if view not in VIEWS:
@@ -124,9 +123,9 @@ class SessionView(Lookups):
             raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
         if self._renderer is None:
             # Imported here: pygame's fonts and surfaces are slow to import, and most sessions are never drawn.
-            from dorothie_gym.rendering.session_views import SessionRenderer, checked_view
+            from dorothie_gym.rendering.session_views import SessionRenderer
 
-            self._renderer = SessionRenderer(checked_view(self._view))
+            self._renderer = SessionRenderer(self._view)
         size = self._renderer.windscreen
         frame = self._renderer.draw(self._scene(session), None if size is None else self._windscreen(session, size))
         if self._mode != "human":
@@ -141,14 +140,11 @@ class SessionView(Lookups):
 
     def _windscreen(self, session: LiveSession, size: tuple[int, int]) -> NDArray[np.uint8] | None:
         """Returns what a camera of this width and height sees [px], otherwise with the settings of the session's."""
-        if self._pictures is None or self._pictures[0] is not session:
-            from dorothie_gym.camera.config import CameraConfig, CameraOutput
-            from dorothie_gym.engine.pictures import SessionPictures
+        if self._camera is None or self._camera[0] is not session:
+            from dorothie_gym.engine.pictures import windscreen_camera
 
-            own = session.config.camera or CameraConfig()
-            config = replace(own, width=size[0], height=size[1], outputs=(CameraOutput.RGB,))
-            self._pictures = session, SessionPictures(session.world, session.scenario, config)
-        return self._pictures[1].draw().rgb
+            self._camera = session, windscreen_camera(session.world.town, session.scenario, session.config, size)
+        return self._camera[1].render(session.world).rgb
 
     def _scene(self, session: LiveSession) -> Scene:
         from dorothie_gym.engine.session_scene import scene_of, utterances_of
@@ -163,4 +159,4 @@ class SessionView(Lookups):
         if self._window is not None:
             self._window.close()
             self._window = None
-        self._renderer = self._pictures = None
+        self._renderer = self._camera = None

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.render_view import RenderView
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.aerial import AerialView
 from dorothie_gym.rendering.frames import SceneRenderer
@@ -17,28 +17,6 @@ from dorothie_gym.rendering.subtitles import Subtitles
 
 if TYPE_CHECKING:
     import pygame
-
-
-class RenderView(StrEnum):
-    """View of a session."""
-
-    MAP = "map"
-    """Map around the car, with tasks and talk (800, 1280, 3)."""
-    CAMERA = "camera"
-    """Picture of the camera behind the windscreen (720, 1280, 3)."""
-    BOTH = "both"
-    """Windscreen, subtitles, map and tasks (720, 1280, 3)."""
-
-
-def checked_view(name: str) -> RenderView:
-    """Returns the view of a name.
-
-    Raises:
-        ValueError: there is no such view; lists them.
-    """
-    if name not in [view.value for view in RenderView]:
-        raise ValueError(f"render_view is {name!r}; it must be one of {', '.join(RenderView)}")
-    return RenderView(name)
 
 
 _SIZE = 1280, 720
