@@ -274,3 +274,26 @@ def test_environments_take_it_by_name() -> None:
     observations, _ = env.reset(seed=1)
     for agent in env.possible_agents:
         assert env.observation_space(agent).contains(observations[agent])
+
+
+def test_the_co_wizard_drives_by_itself_to_a_goal_that_it_recognises() -> None:
+    engine, taken = SessionEngine(TOWN, config=EnvConfig(perception=PerceptionModel.CAMERA)), 0
+    engine.reset(4)
+    policies = {role: make_policy("scripted", role, engine.limits) for role in AGENT_ROLES}
+    states: dict[Role, Any] = {role: policy.initial_state(4, engine.town) for role, policy in policies.items()}
+    while not engine.over:
+        hidden = {mark.position for mark in engine.scenario.storyboard.landmarks if mark.hidden}
+        actions, observation = {}, dict(engine.observations)
+        before = states[Role.CO_WIZARD].beliefs
+        for role, policy in policies.items():
+            actions[str(role)], states[role] = policy.step(observation[str(role)], states[role])
+        after = states[Role.CO_WIZARD].beliefs
+        if after.exact and not before.exact and after.goal is before.goal:
+            marks = read_landmarks(observation["co_wizard"], engine.town)
+            (goal,) = (mark for mark in marks if mark.place == after.place)
+            assert observation["co_wizard"]["landmarks_in_view"][goal.row]
+            assert (goal.x, goal.y) in hidden
+            taken += 1
+        engine.step(actions)
+    assert taken
+    assert engine.summary()["success"]

@@ -21,7 +21,7 @@ from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.observation_parser import SeenLandmark
+from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
 from dorothie_gym.policies.route_progress import RouteProgress, streets_named
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import LanePosition, Mental
@@ -255,6 +255,16 @@ def search_on(state: CoWizardState, view: CoWizardView) -> None:
     progress = state.route.progress
     if progress is not None and not state.beliefs.exact and progress.left(view.station) < state.config.search_radius:
         state.route = state.route.with_progress(None)
+
+
+def recognise_goal(state: CoWizardState, view: CoWizardView) -> None:
+    """Takes up the place of a goal that is not on the map when the camera shows it nearby, and no other of its name."""
+    goal, shown = state.beliefs.goal, landmarks_in_view(view.raw, view.landmarks)
+    if goal is None or state.beliefs.exact or state.intentions.arrived or not shown:
+        return
+    known = [mark for mark in view.landmarks if mark.name is goal and mark.place not in state.beliefs.ruled_out]
+    if len(known) == 1 and nearest_landmark(view.raw, known, *view.position) is not None:
+        aim(state, view, known[0])
 
 
 def abandon(state: CoWizardState, name: LandmarkName | None) -> None:

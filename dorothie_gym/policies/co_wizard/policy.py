@@ -11,7 +11,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ObjectClass, Role
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, rest
-from dorothie_gym.policies.co_wizard.goals import note_plan, search_on
+from dorothie_gym.policies.co_wizard.goals import note_plan, recognise_goal, search_on
 from dorothie_gym.policies.co_wizard.initiative import announce_action, scene_of, take_initiative
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
@@ -90,6 +90,7 @@ def attend(observation: ObservationMapping, state: CoWizardState) -> PendingDeci
     listen(updated, view, rng)
     watch_road(updated, view, rng)
     search_on(updated, view)
+    recognise_goal(updated, view)
     creep(updated, view)
     return PendingDecision(updated, view, rng)
 
