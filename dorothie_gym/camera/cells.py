@@ -24,6 +24,7 @@ TILE = 16
 
 _RINGS = 128  # distances at which cells are sorted
 _RING = 8.0  # [m]
+_FIRST_RING, _FARTHER = 2, 4  # rings before which hidden tiles are found: 2, 8, 32
 
 
 @by_reference
@@ -93,26 +94,51 @@ def draw_cells(
 
     Args:
         view: projection.
-        buffer: to be drawn to.
+        buffer: to be drawn to, empty.
         mesh: sorted by cell.
         cells: of the mesh.
         scratch: from `new_order`; its tiles remain those of the buffer.
         number: of the first triangle of the mesh.
     """
     _sort_cells(view, cells, scratch)
-    drawn, ring, due = 0, 0, 1
+    drawn, ring, due = 0, 0, _FIRST_RING
+    scratch.tiles[:] = 0.0
     while ring < _RINGS:
-        if ring == due:  # three times as far as the last time
+        if ring == due:
             find_tiles(view, buffer, scratch)
-            due *= 3
-        for k in range(scratch.rings[ring], scratch.rings[ring + 1]):
-            cell = scratch.order[k]
-            if ring == 0 or not is_hidden(view, scratch.tiles, cells.low[cell], cells.high[cell]):
-                first, last = cells.ranges[cell, 0], cells.ranges[cell, 1]
-                draw_triangles(view, buffer, mesh, first, last, number + first)
-                drawn += last - first
+            due *= _FARTHER
+        drawn += _draw_ring(view, buffer, mesh, cells, scratch, scratch.tiles, ring, number)
         ring += 1
     find_tiles(view, buffer, scratch)
+    return drawn
+
+
+@concurrent
+def draw_more_cells(
+    view: View, buffer: VisibilityBuffer, mesh: Mesh, cells: CellTable, scratch: CellOrder,
+    tiles: NDArray[np.float32], number: int,
+) -> int:  # fmt: skip
+    """Draws the cells of a smaller mesh to a buffer whose tiles are known; otherwise as `draw_cells`."""
+    _sort_cells(view, cells, scratch)
+    drawn = 0
+    for ring in range(_RINGS):
+        drawn += _draw_ring(view, buffer, mesh, cells, scratch, tiles, ring, number)
+    return drawn
+
+
+@compiled
+def _draw_ring(
+    view: View, buffer: VisibilityBuffer, mesh: Mesh, cells: CellTable, scratch: CellOrder,
+    tiles: NDArray[np.float32], ring: int, number: int,
+) -> int:  # fmt: skip
+    """Draws the cells of one distance."""
+    drawn = 0
+    for k in range(scratch.rings[ring], scratch.rings[ring + 1]):
+        cell = scratch.order[k]
+        if not is_hidden(view, tiles, cells.low[cell], cells.high[cell]):
+            first, last = cells.ranges[cell, 0], cells.ranges[cell, 1]
+            draw_triangles(view, buffer, mesh, first, last, number + first)
+            drawn += last - first
     return drawn
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.camera.atlas import AtlasArrays
 from dorothie_gym.camera.bodies import copy_bodies
-from dorothie_gym.camera.cells import CellOrder, CellTable, draw_cells, new_order, sorted_by_cell
+from dorothie_gym.camera.cells import CellOrder, CellTable, draw_cells, draw_more_cells, new_order, sorted_by_cell
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.daylight import Daylight, daylight_of
 from dorothie_gym.camera.faces import new_face
@@ -127,6 +127,7 @@ class FirstPersonCamera:
             self._shadows = new_shadow_maps(enabled=config.shadows)
             self._scratch = np.zeros(max(width, height), np.uint8)
             self._light_key: tuple[float, ...] = ()
+            self._casts_shadows = False
         if self._labelled:
             self._label_buffer = new_buffer(width, height)
             self._label_orders = self._new_orders(width, height)
@@ -172,7 +173,8 @@ class FirstPersonCamera:
         if self._draws_rgb:
             light = self._daylight(weather, head_lights)
             placed = self._draw(view.scaled(config.samples), self._buffer, self._orders, bodies, placed)
-            self._cast_shadows(pose, light, bodies)
+            if self._casts_shadows:
+                self._draw_shadows(pose, bodies)
             picture = np.empty((config.height, config.width, 3), np.uint8)
             shade(
                 view, optics_of(view, light, self._shadows), self._buffer, config.samples, self.scene.town,
@@ -189,10 +191,11 @@ class FirstPersonCamera:
         return CameraFrame(view, **frame)  # type: ignore[arg-type]  # by the names of the outputs
 
     def _daylight(self, weather: Weather, head_lights: bool) -> Daylight:
-        """Returns the light of a weather, computed once as long as it stays."""
+        """Returns the light of a weather, and turns the maps of shadows, once as long as it stays."""
         key = *weather.values.values(), head_lights
         if key != self._light_key:
             self._light_key, self._light = key, daylight_of(weather, head_lights=head_lights)
+            self._casts_shadows = turn_sun(self._shadows, self._light.sun, float(self._light.sunshine.max()))
         return self._light
 
     def _draw(
@@ -208,7 +211,8 @@ class FirstPersonCamera:
         clear(buffer)
         draw_cells(view, buffer, scene.town, scene.cells, orders[0], 0)
         if self._overlay.size:
-            draw_cells(view, buffer, self._overlay, self._overlay_cells, orders[1], first)
+            tiles = orders[0].tiles
+            draw_more_cells(view, buffer, self._overlay, self._overlay_cells, orders[1], tiles, first)
         if placed < 0 and len(bodies):
             bank, tiles = scene.bank, orders[0].tiles
             placed = copy_bodies(view, tiles, bank.mesh, bank.ranges, bank.boxes, bodies, self._box, self._bodies)
@@ -218,12 +222,11 @@ class FirstPersonCamera:
         draw_triangles(view, buffer, self._bodies, 0, max(placed, 0), first + self._overlay.size)
         return placed
 
-    def _cast_shadows(self, pose: CameraPose, light: Daylight, bodies: RecordArray[PlacementRecord]) -> None:
+    def _draw_shadows(self, pose: CameraPose, bodies: RecordArray[PlacementRecord]) -> None:
         """Draws the maps of shadows."""
         scene, maps = self.scene, self._shadows
-        if turn_sun(maps, light.sun, float(light.sunshine.max())):
-            draw_town_shadows(maps, scene.town, scene.cells, self._overlay, self._overlay_cells, pose.x, pose.y, pose.z)
-            draw_body_shadows(maps, scene.bank.mesh, scene.bank.ranges, bodies)
+        draw_town_shadows(maps, scene.town, scene.cells, self._overlay, self._overlay_cells, pose.x, pose.y, pose.z)
+        draw_body_shadows(maps, scene.bank.mesh, scene.bank.ranges, bodies)
 
     def _write_labels(self, view: View, bodies: RecordArray[PlacementRecord]) -> dict[str, NDArray[np.generic] | Boxes]:
         labels, outputs = self._labels, self.config.outputs

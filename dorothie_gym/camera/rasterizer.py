@@ -25,6 +25,8 @@ SKY = -1
 NEAR = 0.05
 """Depth of the near plane [m]."""
 
+_MARGIN = 0.5 + 1e-6  # [samples] from the left side of a sample to its middle, and a little more
+
 
 @by_reference
 class VisibilityBuffer(NamedTuple):
@@ -33,7 +35,7 @@ class VisibilityBuffer(NamedTuple):
     Attributes:
         nearness: (h, w) float32 inverse depth [1/m], 0 for the sky.
         triangles: (h, w) int32 number of the triangle, `SKY` for none.
-        corners: (3, 3) scratch: a triangle's corners to the right, up and forward of the camera.
+        corners: (3, 3) scratch: a triangle's corners to the right and up, times the focal length, and forward.
         cut: (4, 2) scratch: the picture coordinates of what the near plane leaves of a triangle.
     """
 
@@ -63,90 +65,79 @@ def draw_triangles(
     view: View, buffer: VisibilityBuffer, mesh: Mesh, first: int, last: int, number: int
 ) -> None:  # fmt: skip
     """Draws a range of a mesh's triangles, of which the first has a number."""
-    origin, axes = view.origin, view.axes
+    origin, axes, focal = view.origin, view.axes, view.focal
+    x0, y0, z0 = origin[0], origin[1], origin[2]
+    rx, ry, rz = focal * axes[0, 0], focal * axes[0, 1], focal * axes[0, 2]
+    ux, uy, uz = focal * axes[1, 0], focal * axes[1, 1], focal * axes[1, 2]
+    fx, fy, fz = axes[2, 0], axes[2, 1], axes[2, 2]
+    wide, high, inverse = 0.5 * view.width, 0.5 * view.height, 1.0 / focal
     for k in range(first, last):
         # 1 / depth is affine in the picture: normal . ray / (normal . (corner - origin))
         nx, ny, nz = float(mesh.normals[k, 0]), float(mesh.normals[k, 1]), float(mesh.normals[k, 2])
-        offset = (
-            nx * (mesh.corners[k, 0, 0] - origin[0]) + ny * (mesh.corners[k, 0, 1] - origin[1])
-            + nz * (mesh.corners[k, 0, 2] - origin[2])
-        )  # fmt: skip
+        x, y, z = mesh.corners[k, 0, 0] - x0, mesh.corners[k, 0, 1] - y0, mesh.corners[k, 0, 2] - z0
+        offset = nx * x + ny * y + nz * z
         if offset >= -1e-7:
             continue  # seen from behind, or edge-on
-        behind = _to_camera(view, mesh, k, buffer.corners)
-        if behind == 3 or _is_outside(view, buffer.corners):
-            continue
+        a_right, a_up, a = x * rx + y * ry + z * rz, x * ux + y * uy + z * uz, x * fx + y * fy + z * fz
+        x, y, z = mesh.corners[k, 1, 0] - x0, mesh.corners[k, 1, 1] - y0, mesh.corners[k, 1, 2] - z0
+        b_right, b_up, b = x * rx + y * ry + z * rz, x * ux + y * uy + z * uz, x * fx + y * fy + z * fz
+        x, y, z = mesh.corners[k, 2, 0] - x0, mesh.corners[k, 2, 1] - y0, mesh.corners[k, 2, 2] - z0
+        c_right, c_up, c = x * rx + y * ry + z * rz, x * ux + y * uy + z * uz, x * fx + y * fy + z * fz
+        if (
+            ((a < NEAR) & (b < NEAR) & (c < NEAR))
+            | ((a_right < -wide * a) & (b_right < -wide * b) & (c_right < -wide * c))
+            | ((a_right > wide * a) & (b_right > wide * b) & (c_right > wide * c))
+            | ((a_up < -high * a) & (b_up < -high * b) & (c_up < -high * c))
+            | ((a_up > high * a) & (b_up > high * b) & (c_up > high * c))
+        ):
+            continue  # all corners lie on the outer side of one edge of the picture
+        in_front, ax, ay, bx, by, cx, cy = (a >= NEAR) & (b >= NEAR) & (c >= NEAR), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        if in_front:
+            scale_a, scale_b, scale_c = 1.0 / a, 1.0 / b, 1.0 / c
+            ax, bx, cx = wide + a_right * scale_a, wide + b_right * scale_b, wide + c_right * scale_c
+            ay, by, cy = high - a_up * scale_a, high - b_up * scale_b, high - c_up * scale_c
+            if _row(min(ay, by, cy), view.height) == _row(max(ay, by, cy), view.height):
+                continue
+            if math.ceil(min(ax, bx, cx) - _MARGIN) == math.ceil(max(ax, bx, cx) - (1.0 - _MARGIN)):
+                continue  # it lies between two samples of each row
         scale = 1.0 / offset
-        right = (nx * axes[0, 0] + ny * axes[0, 1] + nz * axes[0, 2]) * scale / view.focal
-        down = -(nx * axes[1, 0] + ny * axes[1, 1] + nz * axes[1, 2]) * scale / view.focal
-        ahead = (nx * axes[2, 0] + ny * axes[2, 1] + nz * axes[2, 2]) * scale
-        middle = ahead - right * 0.5 * view.width - down * 0.5 * view.height
-        if behind == 0:
-            _project(view, buffer.corners, buffer.cut)
-            _fill(buffer, 1, 2, middle, right, down, number + k - first)
+        step = scale * inverse
+        right = (nx * axes[0, 0] + ny * axes[0, 1] + nz * axes[0, 2]) * step
+        down = -(nx * axes[1, 0] + ny * axes[1, 1] + nz * axes[1, 2]) * step
+        middle = (nx * fx + ny * fy + nz * fz) * scale - right * wide - down * high
+        if in_front:
+            _fill(buffer, ax, ay, bx, by, cx, cy, middle, right, down, number + k - first)
         else:
-            corners = _cut_off(view, buffer.corners, buffer.cut)
-            for j in range(1, corners - 1):
-                _fill(buffer, j, j + 1, middle, right, down, number + k - first)
-
-
-@inlined
-def _to_camera(view: View, mesh: Mesh, k: int, corners: Array) -> int:
-    """Writes the corners of a triangle relative to the camera; returns how many lie before the near plane."""
-    origin, axes, behind = view.origin, view.axes, 0
-    for j in range(3):
-        x, y, z = (
-            mesh.corners[k, j, 0] - origin[0], mesh.corners[k, j, 1] - origin[1], mesh.corners[k, j, 2] - origin[2],
-        )  # fmt: skip
-        corners[j, 0] = x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2]
-        corners[j, 1] = x * axes[1, 0] + y * axes[1, 1] + z * axes[1, 2]
-        depth = x * axes[2, 0] + y * axes[2, 1] + z * axes[2, 2]
-        corners[j, 2] = depth
-        behind += depth < NEAR
-    return behind
-
-
-@inlined
-def _is_outside(view: View, corners: Array) -> bool:
-    """Returns whether all corners lie on the outer side of one edge of the picture."""
-    wide, high = 0.5 * view.width / view.focal, 0.5 * view.height / view.focal
-    left, right, top, bottom = True, True, True, True
-    for j in range(3):
-        x, y, depth = corners[j, 0], corners[j, 1], corners[j, 2]
-        left &= x < -wide * depth
-        right &= x > wide * depth
-        bottom &= y < -high * depth
-        top &= y > high * depth
-    return left or right or top or bottom
-
-
-@inlined
-def _project(view: View, corners: Array, cut: Array) -> None:
-    for j in range(3):
-        scale = view.focal / corners[j, 2]
-        cut[j, 0] = 0.5 * view.width + corners[j, 0] * scale
-        cut[j, 1] = 0.5 * view.height - corners[j, 1] * scale
+            corners, cut = buffer.corners, buffer.cut
+            corners[0, 0], corners[0, 1], corners[0, 2] = a_right, a_up, a
+            corners[1, 0], corners[1, 1], corners[1, 2] = b_right, b_up, b
+            corners[2, 0], corners[2, 1], corners[2, 2] = c_right, c_up, c
+            for j in range(1, _cut_off(wide, high, corners, cut) - 1):
+                _fill(
+                    buffer, cut[0, 0], cut[0, 1], cut[j, 0], cut[j, 1], cut[j + 1, 0], cut[j + 1, 1], middle, right,
+                    down, number + k - first,
+                )  # fmt: skip
 
 
 @compiled
-def _cut_off(view: View, corners: Array, cut: Array) -> int:
+def _cut_off(wide: float, high: float, corners: Array, cut: Array) -> int:
     """Projects what the near plane leaves of a triangle: three or four corners; returns their number."""
     count = 0
     for j in range(3):
         k = j + 1 if j < 2 else 0
         here, there = corners[j, 2] - NEAR, corners[k, 2] - NEAR
         if here >= 0.0:
-            scale = view.focal / corners[j, 2]
-            cut[count, 0] = 0.5 * view.width + corners[j, 0] * scale
-            cut[count, 1] = 0.5 * view.height - corners[j, 1] * scale
+            scale = 1.0 / corners[j, 2]
+            cut[count, 0] = wide + corners[j, 0] * scale
+            cut[count, 1] = high - corners[j, 1] * scale
             count += 1
         if (here >= 0.0) != (there >= 0.0):
             a, b = (j, k) if here >= 0.0 else (k, j)  # the neighbour cuts from the same end
             share = (corners[a, 2] - NEAR) / (corners[a, 2] - corners[b, 2])
             x = corners[a, 0] + share * (corners[b, 0] - corners[a, 0])
             y = corners[a, 1] + share * (corners[b, 1] - corners[a, 1])
-            cut[count, 0] = 0.5 * view.width + view.focal * x / NEAR
-            cut[count, 1] = 0.5 * view.height - view.focal * y / NEAR
+            cut[count, 0] = wide + x / NEAR
+            cut[count, 1] = high - y / NEAR
             count += 1
     return count
 
@@ -157,15 +148,13 @@ def _row(y: float, height: int) -> int:
     return math.ceil(min(max(y - 0.5, 0.0), float(height)))
 
 
-@inlined
+@compiled
 def _fill(
-    buffer: VisibilityBuffer, second: int, third: int, middle: float, right: float, down: float, number: int
-) -> None:
-    """Draws the triangle of the first and two other corners of `cut`, whose nearness is affine in the picture."""
-    height = buffer.nearness.shape[0]
-    ax, ay = buffer.cut[0, 0], buffer.cut[0, 1]
-    bx, by = buffer.cut[second, 0], buffer.cut[second, 1]
-    cx, cy = buffer.cut[third, 0], buffer.cut[third, 1]
+    buffer: VisibilityBuffer, ax: float, ay: float, bx: float, by: float, cx: float, cy: float, middle: float,
+    right: float, down: float, number: int,
+) -> None:  # fmt: skip
+    """Draws a triangle of corners in the picture [samples], whose nearness is affine there."""
+    height, width = buffer.nearness.shape[0], float(buffer.nearness.shape[1])
     if (bx - ax) * (cy - ay) <= (by - ay) * (cx - ax):
         return  # edge-on: rounded, it is seen from behind, and its neighbours cover its samples
     if ay > by:
@@ -177,33 +166,19 @@ def _fill(
     top, turn, bottom = _row(ay, height), _row(by, height), _row(cy, height)
     if top == bottom:
         return
-    long = (cx - ax) / (cy - ay)
+    along = (cx - ax) / (cy - ay)
     is_right = (bx - ax) * (cy - ay) > (by - ay) * (cx - ax)  # whether the middle corner is right of the long edge
-    if top < turn:
-        _fill_rows(
-            buffer, top, turn, ax, ay, long, ax, ay, (bx - ax) / (by - ay), is_right, middle, right, down, number
-        )
-    if turn < bottom:
-        _fill_rows(
-            buffer, turn, bottom, ax, ay, long, bx, by, (cx - bx) / (cy - by), is_right, middle, right, down, number
-        )
-
-
-@inlined
-def _fill_rows(
-    buffer: VisibilityBuffer, top: int, bottom: int, ax: float, ay: float, along: float, bx: float, by: float,
-    other: float, is_right: bool, middle: float, right: float, down: float, number: int,
-) -> None:  # fmt: skip
-    """Draws rows between the long edge from (ax, ay) and another one from (bx, by), with their steps in x per row."""
-    width = float(buffer.nearness.shape[1])
-    for y in range(top, bottom):
-        one, two = ax + (y + 0.5 - ay) * along, bx + (y + 0.5 - by) * other
+    x, y, step = ax, ay, (bx - ax) / (by - ay) if top < turn else 0.0
+    for row in range(top, bottom):
+        if row == turn:
+            x, y, step = bx, by, (cx - bx) / (cy - by)
+        one, two = ax + (row + 0.5 - ay) * along, x + (row + 0.5 - y) * step
         start, end = (one, two) if is_right else (two, one)
         first = math.ceil(min(max(start - 0.5, 0.0), width))
         last = math.ceil(min(max(end - 0.5, 0.0), width))
         if first < last:
-            nearness = middle + right * (first + 0.5) + down * (y + 0.5)
-            _fill_span(buffer.nearness[y, first:last], buffer.triangles[y, first:last], nearness, right, number)
+            nearness = middle + right * (first + 0.5) + down * (row + 0.5)
+            _fill_span(buffer.nearness[row, first:last], buffer.triangles[row, first:last], nearness, right, number)
 
 
 @inlined

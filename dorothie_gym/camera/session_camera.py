@@ -19,7 +19,7 @@ from dorothie_gym.camera.scenery.signals import LENS_OFF, LENS_ON
 from dorothie_gym.camera.town_scene import SessionScene, lens_rows
 from dorothie_gym.compilation import concurrent
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records
-from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.maps.traffic_lights import LightColour, LightPhase
 from dorothie_gym.ontology import Sensor, WeatherParameter
 from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Colour
@@ -72,6 +72,7 @@ class SessionCamera:
         self.camera = FirstPersonCamera(scene.camera_scene, config, scene.overlay)
         self._placed = empty_records(PlacementRecord, 256)
         self._shown: NDArray[np.int64] | None = None
+        self._phases: list[LightPhase] | None = None  # that the lenses show, if those of the programmes
 
     def render(self, world: World) -> CameraFrame:
         """Returns the picture that the camera takes of a world."""
@@ -106,7 +107,10 @@ class SessionCamera:
             own: key of the vehicle that carries the camera, which it does not see.
             traffic_lights: their states by signal, dark where missing; by default those of their programmes.
         """
-        self._show_lights(self._programmed_lights(time) if traffic_lights is None else traffic_lights)
+        if traffic_lights is None:
+            self._show_programmes(time)
+        else:
+            self._show_lights(traffic_lights)
         placed = self.placed(pose, bodies, weather, own=own)
         return self.camera.render(
             pose, weather, bodies=placed, time=time, head_lights=head_lights, faults=frozenset(faults)
@@ -125,18 +129,24 @@ class SessionCamera:
             np.array([pose.x, pose.y]), REACH, own, drives_with_lights(weather), placed,
         )  # fmt: skip
         _lift(self.scene.town.ground.arrays, placed, count)
-        return self._placed[:count]
+        return placed[:count]
 
-    def _programmed_lights(self, time: float) -> dict[int, LightColour]:
-        return {
-            signal: programme.colour(signal, time)
-            for programme in self.scene.town.programmes
-            for signal in programme.signals
-        }
+    def _show_programmes(self, time: float) -> None:
+        """Paints the lenses in the colours that the programmes of the lights have at a time."""
+        phases = [programme.phase_at(time) for programme in self.scene.town.programmes]
+        if phases != self._phases:
+            self._show_lights(
+                {
+                    signal: phase.colour(signal)
+                    for programme, phase in zip(self.scene.town.programmes, phases, strict=True)
+                    for signal in programme.signals
+                }
+            )
+            self._phases = phases
 
     def _show_lights(self, states: Mapping[int, LightColour]) -> None:
         """Paints the lenses in the colours of the traffic lights, if one has changed."""
-        lenses = self.scene.town.lenses
+        lenses, self._phases = self.scene.town.lenses, None
         if not len(lenses.signals):
             return
         colours = {signal: int(_COLOURS[state]) for signal, state in states.items()}
