@@ -21,6 +21,7 @@ from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.scenery.clearance import Lot
 from dorothie_gym.camera.session_camera import SessionCamera
+from dorothie_gym.camera.solid_boxes import SolidBoxes, solid_boxes
 from dorothie_gym.camera.town_scene import SessionScene, TownScene
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.records import Record, RecordArray, empty_records, plain
@@ -90,8 +91,10 @@ class RecordedPictures:
         self.camera = SessionCamera(SessionScene(lots, names, landmarks), config)
 
     def frames(self, rate: float) -> range:
-        """Returns the frames of pictures at a rate, at most 30 [1/s]; the rate is rounded to whole frames between."""
-        return range(self.first_frame, self.last_frame + 1, max(round(FRAME_RATE / rate), 1))
+        """Returns the frames of pictures at a rate, at most 30 [1/s]: multiples of a whole number, as decisions are."""
+        step = max(round(FRAME_RATE / rate), 1)
+        first = -(-self.first_frame // step) * step
+        return range(first if first <= self.last_frame else self.first_frame, self.last_frame + 1, step)
 
     def pictures(self, rate: float) -> Iterator[tuple[int, CameraFrame]]:
         """Yields the frames at a rate [1/s] with their pictures."""
@@ -114,6 +117,11 @@ class RecordedPictures:
             own=_NO_BODY,
             traffic_lights=self._traffic_lights(frame),
         )
+
+    def solid_boxes(self, frame: int) -> SolidBoxes:
+        """Returns the 3D boxes of the bodies near the car at a frame, hidden ones included."""
+        placed = self.camera.placed(self.pose(frame), self.bodies(frame), self.weather(frame), own=_NO_BODY)
+        return solid_boxes(self.camera.scene.camera_scene.bank, placed)
 
     def pose(self, frame: int) -> CameraPose:
         """Returns the pose of the camera at a frame."""

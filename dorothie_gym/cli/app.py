@@ -14,6 +14,7 @@ from dorothie_gym._version import __version__
 from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
+from dorothie_gym.cli.frames import frames
 from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.listings import envs, policies, storyboards, towns
 from dorothie_gym.cli.options import PictureCommand
@@ -62,6 +63,7 @@ app.command()(rollout)
 app.command()(leaderboard)
 app.command()(replay)
 app.command()(film)
+app.command()(frames)
 app.command()(compare)
 app.command()(show)
 app.command("train-rl")(train_rl)
