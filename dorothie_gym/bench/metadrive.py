@@ -21,9 +21,22 @@ SETTINGS: Final = {"use_render": False, "log_level": LOG_LEVEL, "map": 3, "traff
 class MetaDriveReference:
     """Environment of MetaDrive that is driven straight on."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, picture: tuple[int, int] | None = None) -> None:
+        """Makes the environment.
+
+        Args:
+            seed: seed of the road and its traffic.
+            picture: width and height of the pictures that are observed; None for rays.
+        """
         environment: Any = import_module("metadrive").MetaDriveEnv
-        self._env = environment({**SETTINGS, "start_seed": seed, "num_scenarios": 1})
+        settings: dict[str, object] = {**SETTINGS, "start_seed": seed, "num_scenarios": 1}
+        if picture is not None:
+            camera: Any = import_module("metadrive.component.sensors.rgb_camera").RGBCamera
+            settings |= {
+                "image_observation": True, "stack_size": 1, "sensors": {"rgb_camera": (camera, *picture)},
+                "vehicle_config": {"image_source": "rgb_camera"},
+            }  # fmt: skip
+        self._env = environment(settings)
         self._over = True
 
     def prepare(self) -> None:
@@ -42,8 +55,13 @@ class MetaDriveReference:
         self._env.close()
 
 
-def metadrive_reference(seed: int) -> MetaDriveReference | None:
-    """Returns the environment of MetaDrive; None if the package or, with a warning, its assets are not installed."""
+def metadrive_reference(seed: int, picture: tuple[int, int] | None = None) -> MetaDriveReference | None:
+    """Returns the environment of MetaDrive; None if the package or, with a warning, its assets are not installed.
+
+    Args:
+        seed: seed of the road and its traffic.
+        picture: width and height of the pictures that are observed; None for rays.
+    """
     found = find_spec("metadrive")
     if found is None or found.origin is None:
         return None
@@ -53,4 +71,4 @@ def metadrive_reference(seed: int) -> MetaDriveReference | None:
             stacklevel=2,
         )
         return None
-    return MetaDriveReference(seed)
+    return MetaDriveReference(seed, picture)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.bench.timing import Figures
+from dorothie_gym.camera.config import CameraOutput
 from dorothie_gym.rendering.charts import GRID, INK, SHEET, SOFT, hexadecimal
 from dorothie_gym.rendering.palette import CAR, LIGHT_RED, ROAD
 from dorothie_gym.sim.config import FRAME_RATE
@@ -225,6 +226,48 @@ def rl_report(figures: Figures) -> Report:
         notes=tuple(notes),
         machine=machine_line(figures["machine"]),
     )
+
+
+def camera_report(figures: Figures) -> Report:
+    """Returns the summary of `bench.camera.measure`."""
+    rows = []
+    if figures["metadrive"] is not None:
+        value = 1000.0 / figures["metadrive"]["milliseconds"]
+        rows.append(Measurement(label="MetaDrive, images\n480 x 320", value=value, reference=True))
+    if figures["opengl"] is not None:
+        value = 1000.0 / figures["opengl"]["milliseconds"]
+        rows.append(Measurement(label="OpenGL, plain triangles\n480 x 320", value=value, reference=True))
+    for row in figures["rows"]:
+        parts = "everything" if len(row["outputs"]) == len(CameraOutput) else ", ".join(row["outputs"])
+        smooth = "" if row["antialias"] else ", not smoothed"
+        label = f"{row['width']} x {row['height']}, {parts}{smooth}\n{number(row['milliseconds'])} ms"
+        rows.append(Measurement(label=f"{label}, p99 {number(row['milliseconds_p99'])}", value=_rate(row)))
+    first = figures["rows"][0]
+    cold = figures["cold_picture_seconds"]
+    notes = [
+        f"first picture: {number(figures['first_picture_seconds'])} s from caches"
+        + ("" if cold is None else f", {number(cold)} s without"),
+        f"memory: town {figures['town_bytes'] / 1e6:.1f} MB, camera {figures['camera_bytes'] / 1e6:.1f} MB",
+        f"p99: along a drive of {_count(figures['drive_pictures'], 'picture')}",
+    ]
+    if figures["opengl"] is not None:
+        notes.append(f"OpenGL: {figures['opengl']['renderer']}, without textures, shadows and bodies")
+    if figures["metadrive"] is None:
+        notes.append("MetaDrive or its assets are not installed")
+    return Report(
+        title="First-person camera",
+        setting=f"{figures['town']}: {_count(figures['vehicles'], 'vehicle')}, "
+        f"{_count(figures['pedestrians'], 'pedestrian')}, mean over {_count(figures['places'], 'place')}; one core",
+        headline=f"{number(_rate(first))} pictures of {first['width']} x {first['height']} per second",
+        unit="pictures per second",
+        rows=tuple(rows),
+        notes=tuple(notes),
+        machine=machine_line(figures["machine"]),
+    )
+
+
+def _rate(row: Figures) -> float:
+    return float(1000.0 / row["milliseconds"])
 
 
 def train_report(figures: Figures) -> Report:

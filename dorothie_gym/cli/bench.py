@@ -1,4 +1,4 @@
-"""`dorothie-gym bench world|env|vector|rl|train|import`: speed measurements, each with its reference."""
+"""`dorothie-gym bench world|env|vector|camera|rl|train|import`: speed measurements, each with its reference."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ if TYPE_CHECKING:
 
     from dorothie_gym.bench.report import Report
     from dorothie_gym.bench.timing import Figures, Progress
+    from dorothie_gym.camera.config import CameraOutput
 
 Measure: TypeAlias = "Callable[[Progress], Figures]"
 """Measurement; takes a callback for its progress."""
 
-SIMULATING: Final = ("world", "env", "vector", "rl")
+SIMULATING: Final = ("world", "env", "vector", "camera", "rl")
 """Measurements of the simulation, which is compiled first."""
 
 
@@ -43,7 +44,7 @@ class BenchCommand(PictureCommand):
 
 bench = typer.Typer(
     help="Measure speeds, each with a reference in the same run: world, environment of three agents, "
-    "batches of worlds, training, and import time.",
+    "batches of worlds, camera, training, and import time.",
     no_args_is_help=True,
 )
 
@@ -122,6 +123,69 @@ def vector(
         )  # fmt: skip
 
     _bench("vector", measured, picture, as_json)
+
+
+@bench.command(cls=BenchCommand)
+def camera(
+    town: Town = "midtown",
+    size: Annotated[
+        list[str] | None, typer.Option(metavar="WxH", help="Size of the pictures; repeatable. Default: four.")
+    ] = None,
+    outputs: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAMES", help="all, or of rgb,depth,semantic,instance,boxes; repeatable."),
+    ] = None,
+    vehicles: Vehicles = 60,
+    pedestrians: Pedestrians = 60,
+    seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Length of the drive [s].")] = 30.0,
+    cold: Annotated[
+        bool, typer.Option("--cold", help="Measure the first picture without caches, too; takes minutes.")
+    ] = False,
+    seed: Seed = 0,
+    repeats: Repeats = 5,
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Pictures per second of the first-person camera by size and outputs, on one core, beside OpenGL and MetaDrive."""
+    sizes, parts = [_size(text) for text in size or ()], [_outputs(text) for text in outputs or ()]
+
+    def measured(progress: Progress) -> Figures:
+        from dorothie_gym.bench.camera import EVERYTHING, RGB, SIZES, measure
+
+        return measure(
+            town, sizes=sizes or SIZES, outputs=parts or (RGB, EVERYTHING), vehicles=vehicles, pedestrians=pedestrians,
+            seconds=seconds, cold=cold, seed=seed, repeats=repeats, progress=progress,
+        )  # fmt: skip
+
+    _bench("camera", measured, picture, as_json)
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Returns width and height, as "480x320"; exits with code 2 for another text."""
+    width, separator, height = text.partition("x")
+    if not (separator and width.isdecimal() and height.isdecimal()):
+        fail(f"--size {text}: give it as WIDTHxHEIGHT in pixels, for instance 480x320")
+    from dorothie_gym.camera.config import CameraConfig
+
+    try:
+        config = CameraConfig(width=int(width), height=int(height))
+    except ValueError as error:
+        fail(f"--size {text}: {error}")
+    return config.width, config.height
+
+
+def _outputs(text: str) -> tuple[CameraOutput, ...]:
+    """Returns the outputs of a list of names; exits with code 2 for another name."""
+    from dorothie_gym.camera.config import CameraOutput
+
+    if text == "all":
+        return tuple(CameraOutput)
+    names = text.split(",")
+    known = [output.value for output in CameraOutput]
+    for name in names:
+        if name not in known or names.count(name) > 1:
+            fail(f"--outputs {text}: give all, or different ones of {','.join(known)}")
+    return tuple(CameraOutput(name) for name in names)
 
 
 @bench.command(cls=BenchCommand)
