@@ -53,7 +53,8 @@ def _surround(body: PlacementRecord, model: NDArray[np.float32], box: Array) -> 
     radius = math.sqrt(x * x + y * y)
     box[0, 0], box[1, 0] = body.x - radius, body.x + radius
     box[0, 1], box[1, 1] = body.y - radius, body.y + radius
-    box[0, 2], box[1, 2] = body.z + model[0, 2], body.z + model[1, 2]
+    tilt = abs(body.rise) * x
+    box[0, 2], box[1, 2] = body.z + model[0, 2] - tilt, body.z + model[1, 2] + tilt
 
 
 @inlined
@@ -63,11 +64,13 @@ def _copy(bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) ->
         x, y = bank.corners[row, j, 0], bank.corners[row, j, 1]
         target.corners[at, j, 0] = body.x + x * c - y * s
         target.corners[at, j, 1] = body.y + x * s + y * c
-        target.corners[at, j, 2] = body.z + bank.corners[row, j, 2]
-    _turn(bank.normals[row], c, s, target.normals[at])
+        target.corners[at, j, 2] = body.z + bank.corners[row, j, 2] + x * body.rise
+    _turn(bank.normals[row], c, s, body.rise, target.normals[at])
+    if body.rise != 0.0:
+        _shorten(target.normals[at])
     if bank.textures[row] != PLAIN:
-        _turn(bank.u_axes[row], c, s, target.u_axes[at])
-        _turn(bank.v_axes[row], c, s, target.v_axes[at])
+        _turn(bank.u_axes[row], c, s, body.rise, target.u_axes[at])
+        _turn(bank.v_axes[row], c, s, body.rise, target.v_axes[at])
         target.u_axes[at, 3], target.v_axes[at, 3] = bank.u_axes[row, 3], bank.v_axes[row, 3]
     for j in range(3):
         target.colours[at, j] = bank.colours[row, j]
@@ -76,5 +79,15 @@ def _copy(bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) ->
 
 
 @inlined
-def _turn(vector: NDArray[np.float32], c: float, s: float, out: NDArray[np.float32]) -> None:
-    out[0], out[1], out[2] = vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c, vector[2]
+def _turn(vector: NDArray[np.float32], c: float, s: float, rise: float, out: NDArray[np.float32]) -> None:
+    """Writes the gradient (3,) of a function on a body that is sheared upwards along x and turned."""
+    x = vector[0] - rise * vector[2]
+    out[0], out[1], out[2] = x * c - vector[1] * s, x * s + vector[1] * c, vector[2]
+
+
+@inlined
+def _shorten(vector: NDArray[np.float32]) -> None:
+    """Gives a vector (3,) the length 1."""
+    scale = 1.0 / math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+    for k in range(3):
+        vector[k] *= scale

@@ -28,6 +28,7 @@ _NOON_TINT, _WARM_TINT, _SHADE_TINT = (1.0, 0.98, 0.94), (1.12, 0.88, 0.70), (0.
 _SUNSHINE = 0.78  # factor of direct light of a clear sky
 _AMBIENT, _OVERCAST_AMBIENT = 0.50, 0.70  # factors of the light of the sky
 _NIGHT_AMBIENT = 0.07
+_HAZE = 2.0  # share of the sun's direct light that fog takes, per share of the thickest fog
 _TWILIGHT = -6.0, 8.0  # altitudes of the sun between which night becomes day [degrees]
 _LAMPS_ON, _LAMPS_OFF = 0.0, 8.0  # altitudes between which street lamps fade [degrees]
 
@@ -91,11 +92,12 @@ def daylight_of(weather: Weather, *, head_lights: bool) -> Daylight:
     bright = day * (1.0 - 0.3 * rainfall)
     horizon = _between(_sky(_CLEAR_HORIZON, _WARM_HORIZON, _GREY_HORIZON, warm, clouds), _NIGHT_HORIZON, 1.0 - bright)
     zenith = _between(_sky(_CLEAR_ZENITH, _WARM_ZENITH, _GREY_ZENITH, warm, clouds), _NIGHT_ZENITH, 1.0 - bright)
-    sunshine = _SUNSHINE * (1.0 - 0.9 * clouds**2) * _share(altitude, -1.0, 5.0)
-    tint = _between(_NOON_TINT, _WARM_TINT, warm) if sunshine > 0.02 else np.array(_SHADE_TINT)
-    daily = (_AMBIENT + (_OVERCAST_AMBIENT - _AMBIENT) * clouds) * (1.0 - 0.35 * rainfall)
-    visibility = weather.visibility(lights=False)
     fogginess = weather.above_clear(WeatherParameter.FOG_DENSITY)
+    haze = min(1.0, _HAZE * fogginess)  # takes the sun's direct light, and scatters a part of it
+    sunshine = _SUNSHINE * (1.0 - 0.9 * clouds**2) * _share(altitude, -1.0, 5.0) * (1.0 - haze)
+    tint = _between(_NOON_TINT, _WARM_TINT, warm) if sunshine > 0.02 else np.array(_SHADE_TINT)
+    daily = (_AMBIENT + (_OVERCAST_AMBIENT - _AMBIENT) * max(clouds, haze)) * (1.0 - 0.35 * rainfall)
+    visibility = weather.visibility(lights=False)
     air = np.array(_FOG) * (0.1 + 0.9 * day) if visibility.fog > 0.0 else horizon
     seen = (1.0 - clouds) if altitude > -1.0 else 0.0
     return Daylight(

@@ -20,6 +20,7 @@ from dorothie_gym.camera.ground.lookup import GroundArrays
 from dorothie_gym.camera.ground.town_ground import Ground
 from dorothie_gym.camera.lighting import LampMap
 from dorothie_gym.camera.mesh import Mesh
+from dorothie_gym.camera.road_slopes import RoadSlopes
 from dorothie_gym.camera.scenery.clearance import Lot
 from dorothie_gym.camera.scenery.signals import Lenses
 from dorothie_gym.camera.town_scene import TownScene, build_town_scene
@@ -57,6 +58,7 @@ def pack_scene(scene: TownScene) -> bytes:
     arrays = {
         **_columns("mesh", scene.mesh), **_columns("cells", scene.cells), **_columns("ground", scene.ground.arrays),
         **_columns("signals", scene.signals), **_columns("lenses", scene.lenses), **_columns("lamps", scene.lamps),
+        **_columns("slopes", scene.slopes),
     }  # fmt: skip
     lots = [(lot.site, *lot.place, lot.heading, *lot.front, lot.length, lot.depth) for lot in scene.lots]
     buffer = io.BytesIO()
@@ -84,6 +86,7 @@ def unpack_scene(data: bytes, town: Town) -> TownScene:
         signals=_table(arrays, "signals", Mesh),
         lenses=_table(arrays, "lenses", Lenses),
         lamps=_table(arrays, "lamps", LampMap),
+        slopes=_table(arrays, "slopes", RoadSlopes),
         lots=lots,
         programmes=tuple(town.programmes),
     )

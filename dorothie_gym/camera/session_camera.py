@@ -15,6 +15,7 @@ from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material, R
 from dorothie_gym.camera.ground.sheets import GROUND_SHEET
 from dorothie_gym.camera.models.model_bank import FIRST_PERSON, FIRST_PROP, PlacementRecord, place_bodies
 from dorothie_gym.camera.pose import CameraPose
+from dorothie_gym.camera.road_slopes import RoadSlopes, rise_at
 from dorothie_gym.camera.scenery.signals import LENS_OFF, LENS_ON
 from dorothie_gym.camera.town_scene import SessionScene, lens_rows
 from dorothie_gym.compilation import concurrent
@@ -128,7 +129,7 @@ class SessionCamera:
             argument(bodies.vehicles), argument(bodies.pedestrians), argument(bodies.props),
             np.array([pose.x, pose.y]), REACH, own, drives_with_lights(weather), placed,
         )  # fmt: skip
-        _lift(self.scene.town.ground.arrays, placed, count)
+        _lift(self.scene.town.ground.arrays, self.scene.town.slopes, placed, count)
         return placed[:count]
 
     def _show_programmes(self, time: float) -> None:
@@ -171,13 +172,19 @@ def drives_with_lights(weather: Weather) -> bool:
 
 
 @concurrent
-def _lift(ground: GroundArrays, placed: RecordArray[PlacementRecord], count: int) -> None:
-    """Puts people on pavements and lawns on top of the kerb; the simulation has the height of the road for them."""
+def _lift(ground: GroundArrays, slopes: RoadSlopes, placed: RecordArray[PlacementRecord], count: int) -> None:
+    """Puts people on pavements and lawns on top of the kerb, and vehicles with all wheels on the road.
+
+    The simulation has the height of the road for people.
+    """
     for k in range(count):
         body = placed[k]
+        if body.model < _FIRST_LIFTED:
+            body.rise = rise_at(slopes, body.x, body.y, body.z, body.cos, body.sin)
         if _FIRST_LIFTED <= body.model < _FIRST_LEFT and _RAISED[material_at(ground, GROUND_SHEET, body.x, body.y)]:
             covered = False  # by a bridge, on which there are no kerbs
             for sheet in range(1, len(ground.outside)):
-                covered |= material_at(ground, sheet, body.x, body.y) != _NOTHING
+                if ground.outside[sheet] == _NOTHING:  # no tunnel
+                    covered |= material_at(ground, sheet, body.x, body.y) != _NOTHING
             if not covered:
                 body.z += KERB_HEIGHT

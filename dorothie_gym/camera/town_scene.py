@@ -16,6 +16,7 @@ from dorothie_gym.camera.ground.town_ground import Ground, build_ground
 from dorothie_gym.camera.lighting import LampMap, lamp_map
 from dorothie_gym.camera.mesh import Mesh, joined
 from dorothie_gym.camera.models.model_bank import model_bank
+from dorothie_gym.camera.road_slopes import RoadSlopes, road_slopes
 from dorothie_gym.camera.scenery.clearance import Lot
 from dorothie_gym.camera.scenery.landmarks import build_landmarks
 from dorothie_gym.camera.scenery.signals import Lenses
@@ -39,6 +40,7 @@ class TownScene:
         signals: lights and signs; the lenses show another state in each session.
         lenses: triangles of `signals` that show the state of traffic lights.
         lamps: light of street lamps.
+        slopes: of the roads.
         lots: ground reserved for the landmarks of the sites, by their ids.
         programmes: of the traffic lights.
     """
@@ -49,13 +51,14 @@ class TownScene:
     signals: Mesh
     lenses: Lenses
     lamps: LampMap
+    slopes: RoadSlopes
     lots: tuple[Lot, ...]
     programmes: tuple[LightProgramme, ...]
 
     @property
     def nbytes(self) -> int:
         """Size of all arrays [bytes]."""
-        parts = (self.mesh, self.cells, self.ground.arrays, self.signals, self.lenses, self.lamps)
+        parts = (self.mesh, self.cells, self.ground.arrays, self.signals, self.lenses, self.lamps, self.slopes)
         return sum(array.nbytes for part in parts for array in part)
 
 
@@ -71,6 +74,7 @@ def build_town_scene(town: Town) -> TownScene:
         signals=scenery.signals,
         lenses=scenery.lenses,
         lamps=lamp_map(scenery.lights.astype(np.float64)),
+        slopes=road_slopes(town),
         lots=scenery.lots,
         programmes=tuple(town.programmes),
     )

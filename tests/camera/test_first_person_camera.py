@@ -77,7 +77,7 @@ def placed(*places: tuple[float, float, float]) -> RecordArray[PlacementRecord]:
     """Returns cars at positions with headings, with the keys 1, 2, ..."""
     bodies = empty_records(PlacementRecord, len(places))
     for k, (x, y, heading) in enumerate(places):
-        bodies[k] = (x, y, 0.0, math.cos(heading), math.sin(heading), 0, k + 1)
+        bodies[k] = (x, y, 0.0, math.cos(heading), math.sin(heading), 0, k + 1, 0.0)
     return bodies
 
 

@@ -147,7 +147,7 @@ def bodies_of(stage: Stage, pose: CameraPose) -> Mesh:
     for body in placed:
         model = bank.mesh.part(slice(*bank.ranges[int(body["model"])].tolist()))
         c, s = float(body["cos"]), float(body["sin"])
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [float(body["rise"]), 0.0, 1.0]])
         corners = model.corners.astype(np.float64) @ turn.T + (body["x"], body["y"], body["z"])
         keys = np.full(model.size, body["key"], np.int32)
         parts.append(model._replace(corners=corners.astype(np.float32), instances=keys))

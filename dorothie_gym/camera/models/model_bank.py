@@ -95,6 +95,7 @@ class PlacementRecord:
     sin: Float
     model: Int32  # index of the model
     key: Int32  # of the body
+    rise: Float  # of the body per metre forward: on a slope
 
 
 @compiled
@@ -200,4 +201,4 @@ def place_bodies(
 def _place(placed: PlacementRecord, body: VehicleRecord | PedestrianRecord | PropRecord, model: int) -> None:
     placed.x, placed.y, placed.z = body.x, body.y, body.height
     placed.cos, placed.sin = body.cos, body.sin
-    placed.model, placed.key = model, body.key
+    placed.model, placed.key, placed.rise = model, body.key, 0.0
