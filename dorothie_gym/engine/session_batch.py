@@ -1,4 +1,7 @@
-"""Sessions of one town that are played together: talk in Python, worlds and observations in one call for all."""
+"""Sessions of one town that are played together: talk in Python, worlds and observations in one call for all.
+
+Pictures of cameras are drawn on the same threads.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.pictures import FIELDS, picture_spaces
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.engine.session_engine import SessionEngine, StepOutcome
 from dorothie_gym.engine.view_arrays import RoleArrays, turn_options
@@ -37,6 +41,7 @@ class SessionBatch(Lookups):
         numbers: number of each session, for messages.
         engines: engine of each session; an engine of a batch is not stepped by itself.
         views: observations and masks of all sessions.
+        pictures: (sessions, ...) fields of the observations that the cameras of all sessions give.
     """
 
     LOOKED_UP: ClassVar[Sequence[str]] = ("_worlds",)
@@ -61,6 +66,10 @@ class SessionBatch(Lookups):
             SessionEngine(town, storyboard, config=config, max_cycles=max_cycles, limits=limits) for _ in numbers
         ]
         self.views = RoleArrays(limits, config.observe_acts, len(numbers))
+        self.pictures: dict[str, NDArray[np.generic]] = {
+            name: np.zeros((len(numbers), *box.shape), box.dtype)
+            for name, box in ({} if config.camera is None else picture_spaces(config.camera)).items()
+        }
         self._frames, self._threads = config.frames, max(1, min(threads, len(numbers)))
 
     @property
@@ -140,12 +149,34 @@ class SessionBatch(Lookups):
         if rows is not None:
             for row in rows:
                 self.engines[row].session.observe()
+            self._draw(rows)
             return
         for engine in self.engines:
             if engine.has_begun:
                 engine.session.write_views()
         town = town_arrays(network_of(self.town)), turn_options(self.town)
         self._worlds.share(_observe_share, *town, self._worlds.arrays, *self.views.written, EVERYTHING)
+        self._draw([row for row, engine in enumerate(self.engines) if engine.has_begun])
+
+    def _draw(self, rows: Sequence[int]) -> None:
+        """Draws the pictures of some sessions, if they have cameras."""
+        if not self.pictures or not rows:
+            return
+        self._show(rows[0])  # here: threads would compile one after another
+        jobs = iter(rows[1:])  # `next` of a list's iterator is atomic
+
+        def work(_turns: NDArray[np.int64], _home: int) -> None:
+            for row in jobs:
+                self._show(row)
+
+        self._worlds.share(work)
+
+    def _show(self, row: int) -> None:
+        picture = self.engines[row].session.picture
+        assert picture is not None  # the sessions have cameras
+        for output, name in FIELDS.items():
+            if name in self.pictures:
+                self.pictures[name][row] = getattr(picture, output.value)
 
     @property
     def infractions(self) -> NDArray[np.int64]:

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.perception_model import PerceptionModel
+from dorothie_gym.engine.pictures import OBSERVERS, picture_spaces
 from dorothie_gym.engine.scenario import Scenario, scenario_option
 from dorothie_gym.engine.session_batch import SessionBatch
 from dorothie_gym.engine.session_engine import SessionEngine, StepOutcome
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.errors import short_repr
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.spaces import ActionMapping, SpaceLimits, action_space, observation_space
 from dorothie_gym.tasks import StoryboardTemplate
@@ -87,7 +88,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
             num_envs: number of environments.
             town: a town as in `DuoWizardEnv`, or several that the environments play in turn.
             storyboard: as in `DuoWizardEnv`.
-            config: as in `DuoWizardEnv`, without a camera, with symbolic perception.
+            config: as in `DuoWizardEnv`, with symbolic perception. Pictures of a camera are drawn on the threads.
             render_mode: None or "rgb_array".
             max_cycles: as in `DuoWizardEnv`.
             threads: number of threads; None for one per processor.
@@ -96,17 +97,15 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         Raises:
             ValueError: an argument is out of its range.
         """
-        if config is not None and config.camera is not None:
-            raise ValueError("config.camera is set; batches have no cameras: make single environments for them")
         if config is not None and config.perception is PerceptionModel.CAMERA:
-            raise ValueError('config.perception is "camera"; batches have no cameras: make single environments for it')
+            raise ValueError('config.perception is "camera"; batches do not perceive by it: make single environments')
         super().__init__(num_envs, town, config or EnvConfig(), render_mode, threads, autoreset_mode)
         rate = self.config.decision_frequency
         self.metadata = {**self.metadata, "render_fps": metadata_at(rate)["render_fps"]}
         self.limits = SpaceLimits.for_towns(self.towns)
         self.possible_agents = list(_AGENTS)
         self.single_observation_spaces, self.observation_spaces = self._spaces(
-            {agent: observation_space(role, self.limits, self.config.observe_acts) for agent, role in _AGENTS.items()}
+            {agent: self._observed(role) for agent, role in _AGENTS.items()}
         )
         self.single_action_spaces, self.action_spaces = self._spaces(
             {agent: action_space(role, self.limits) for agent, role in _AGENTS.items()}
@@ -122,6 +121,13 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         self._over = np.zeros(num_envs, dtype=np.bool_)
         views = num_envs if render_mode is not None else 0
         self._views = [SessionView(render_mode, frames_per_second=rate) for _ in range(views)]
+
+    def _observed(self, role: Role) -> spaces.Dict:
+        """Returns the observation space of a role in one environment, with the pictures of its camera."""
+        space, camera = observation_space(role, self.limits, self.config.observe_acts), self.config.camera
+        if camera is None or role not in OBSERVERS:
+            return space
+        return spaces.Dict({**space.spaces, **picture_spaces(camera)})
 
     def _spaces(self, single: Mapping[str, spaces.Dict]) -> tuple[dict[str, spaces.Dict], dict[str, spaces.Dict]]:
         """Returns spaces of one environment, and those of all, by agent."""
@@ -276,6 +282,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
                     for number, text in zip(batch.numbers, batch.views.texts[role][name], strict=True):
                         texts[number] = text
                 own[name] = tuple(texts)
+            if role in OBSERVERS:
+                own |= self._gathered([_copies_of(batch.pictures) for batch in self.batches])
         return found
 
     def _gathered(self, parts: Sequence[Mapping[str, NDArray[Any]]]) -> Stacked:
@@ -313,6 +321,10 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
                 table[rows] = [[*outcomes[number].reward_terms[role].values()] for number in rows]
                 info["reward_terms"], info["_reward_terms"] = _columns(names, table, stepped), stepped.copy()
         return infos
+
+
+def _copies_of(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    return {name: array.copy() for name, array in arrays.items()}
 
 
 def _columns(names: Sequence[str], table: NDArray[np.generic], mask: Flags) -> Infos:

@@ -14,7 +14,6 @@ from gymnasium.utils.env_checker import check_env
 
 from dorothie_gym import DuoWizardEnv, EnvConfig
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
-from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv
 from dorothie_gym.ontology import Sensor
 
 with warnings.catch_warnings():
@@ -104,11 +103,6 @@ def test_a_faulty_view_blackens_the_picture_of_the_co_wizard() -> None:
     agents = {agent: env.action_space(agent).sample() for agent in env.agents}
     dark = env.step(agents)[0]["co_wizard"]["camera"]
     assert not dark.any()
-
-
-def test_batches_refuse_a_camera() -> None:
-    with pytest.raises(ValueError, match=r"config\.camera is set; batches have no cameras"):
-        DuoWizardVectorEnv(2, config=CONFIG)
 
 
 def test_a_camera_that_is_none_is_refused_with_its_type() -> None:

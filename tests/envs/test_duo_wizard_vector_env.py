@@ -15,10 +15,11 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 
+from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv
-from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind
+from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.sim.config import WorldConfig
@@ -194,6 +195,43 @@ def test_towns_take_turns_and_worlds_may_grow() -> None:
     towns = ("brookside", "midtown")
     batch, singles = make_both(5, AutoresetMode.SAME_STEP, towns=towns, config=config, max_cycles=60)
     assert play_both(batch, singles, Single.disturbing, 70) == 5
+
+
+TINY = CameraConfig(width=24, height=16, outputs=tuple(CameraOutput))
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_pictures_are_those_of_single_environments(mode: AutoresetMode) -> None:
+    batch, singles = make_both(3, mode, towns=("brookside", "midtown"), config=EnvConfig(camera=TINY), max_cycles=8)
+    assert batch.single_observation_spaces["co_wizard"]["camera"].shape == (16, 24, 3)
+    assert batch.observation_spaces["participant"]["depth"].shape == (3, 16, 24)
+    assert "camera" not in batch.single_observation_spaces["ad_wizard"].spaces
+    assert play_both(batch, singles, Single.disturbing, 20) >= 6
+
+
+def test_number_of_threads_changes_no_byte_of_pictures() -> None:
+    one, two = (DuoWizardVectorEnv(5, config=EnvConfig(camera=TINY), threads=threads) for threads in (1, 2))
+    check_equal(one.reset(seed=2), two.reset(seed=2))
+    for _ in range(6):
+        actions = [{agent: noop(Role(agent), one.limits) for agent in AGENTS} for _ in range(5)]
+        observations, *_ = outcome = one.step(actions)
+        check_equal(outcome, two.step(actions))
+    pictures = observations["co_wizard"]["camera"]
+    assert len({picture.tobytes() for picture in pictures}) == 5
+    pictures[:] = 0
+    assert one.batches[0].pictures["camera"].any()  # the caller owns what is handed out
+
+
+def test_copies_and_states_continue_with_equal_pictures() -> None:
+    batch = DuoWizardVectorEnv(2, config=EnvConfig(camera=TINY))
+    batch.reset(seed=1)
+    actions = [{agent: noop(Role(agent), batch.limits) for agent in AGENTS} for _ in range(2)]
+    batch.step(actions)
+    state, twin = batch.clone_state(), copy.deepcopy(batch)
+    expected = [batch.step(actions) for _ in range(3)]
+    check_equal([twin.step(actions) for _ in range(3)], expected)
+    batch.restore_state(state)
+    check_equal([batch.step(actions) for _ in range(3)], expected)
 
 
 @pytest.mark.parametrize("frequency", [0.2, 30.0])  # several calls of the physics a decision below 2 Hz
