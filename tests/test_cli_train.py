@@ -19,6 +19,12 @@ runner = CliRunner()
         (["train", "gpt"], "there is no model 'gpt'; choose from toto, toto-belief"),
         (["train", "hubert"], "no audio"),
         (["table", "--models", "toto,gpt"], "there is no model 'gpt'"),
+        (["train", "bert", "--device", "cpu"], "--device is for segformer and detr only"),
+        (["train", "segformer", "--inputs", "true"], "--inputs is for detr only"),
+        (["train", "segformer", "--config", "huge"], "there is no config 'huge'; choose from small, paper"),
+        (["train", "segformer", "--device", "abacus"], "the device 'abacus' cannot be used"),
+        (["train", "detr", "--inputs", "guessed"], "there are no inputs 'guessed'; choose from predicted, true"),
+        (["train", "detr"], "run first: dorothie-gym train segformer"),
     ],
 )
 def test_unknown_and_untrainable_models_are_reported(arguments, message, tmp_path):
@@ -100,3 +106,18 @@ def test_training_speed_is_compared_with_the_published_loop(corpus):
     assert 92e6 < figures["published_parameters"] < 95e6
     assert figures["points_per_second"] > 0 and 0 < figures["matrix_share"] < 1.5
     assert figures["flops_per_point"] > 2e9
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_vision_models_are_trained_one_on_the_other_and_then_read(corpus, tmp_path):
+    pytest.importorskip("transformers")
+    places = ["--corpus", str(corpus), "--out", str(tmp_path), "--epochs", "1", "--device", "cpu", "--json"]
+    seen = json.loads(runner.invoke(app, ["train", "segformer", *places], catch_exceptions=False).stdout)["runs"][0]
+    assert 0.0 < seen["test"]["unseen"]["miou"] < 1.0 and seen["paper"]["miou"] == 0.656
+    found = json.loads(runner.invoke(app, ["train", "detr", *places], catch_exceptions=False).stdout)["runs"][0]
+    assert 0.0 <= found["test"]["seen"]["ap50"] <= 1.0 and found["inputs"] == "predicted"
+    again = json.loads(runner.invoke(app, ["train", "segformer", *places], catch_exceptions=False).stdout)["runs"][0]
+    assert again == seen
+    printed = runner.invoke(app, ["train", "segformer", *places[:-1]], catch_exceptions=False).stdout
+    assert "mIoU" in printed and "65.6 %" in printed

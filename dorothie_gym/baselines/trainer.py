@@ -139,11 +139,11 @@ def train(
         OSError: the folder cannot be written.
     """
     run = _Run(model, folder, seed, about)
-    with _DeterministicAlgorithms(run.device):
+    with DeterministicAlgorithms(run.device):
         epochs = run.resume()
         while not _finished(epochs, model.config):
             number = len(epochs) + 1
-            torch.manual_seed(_mixed(seed, number))  # dropout does not depend on earlier epochs
+            torch.manual_seed(mixed_seed(seed, number))  # dropout does not depend on earlier epochs
             loss = run.epoch(training, number)
             found = run.evaluate(validation)
             before = epochs[-1] if epochs else None
@@ -219,7 +219,7 @@ class _Run:
         """Trains on every point once; returns the mean loss."""
         self.model.train()
         total = torch.zeros((), device=self.device)
-        for rows in batches(examples, self.model.config.batch_size, _mixed(self.seed, number)):
+        for rows in batches(examples, self.model.config.batch_size, mixed_seed(self.seed, number)):
             inputs, labels = examples.take(rows, self.device)
             self.optimiser.zero_grad(set_to_none=True)
             with self.autocast:
@@ -260,7 +260,7 @@ def _finished(epochs: list[Epoch], config: Schedule) -> bool:
     return done >= config.min_epochs and done - epochs[-1].best >= config.patience
 
 
-def _mixed(seed: int, number: int) -> int:
+def mixed_seed(seed: int, number: int) -> int:
     """Returns the seed of an epoch, uncorrelated with those of other epochs."""
     return int.from_bytes(hashlib.sha256(f"{seed}/{number}".encode()).digest()[:7], "little")
 
@@ -274,7 +274,7 @@ class _MemorySetting(Protocol):
 _MEMORY: Final = cast(_MemorySetting, torch.utils.deterministic)
 
 
-class _DeterministicAlgorithms:
+class DeterministicAlgorithms:
     """Context in which torch uses deterministic algorithms, so that results do not depend on thread timing."""
 
     def __init__(self, where: torch.device):

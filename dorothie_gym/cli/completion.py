@@ -50,7 +50,9 @@ def complete_model(incomplete: str) -> list[str]:
         from dorothie_gym.baselines.model_zoo import ROWS
     except ImportError:
         return []
-    return _names(incomplete, (row.command for row in ROWS))
+    from dorothie_gym.cli.train_vision import VISION_MODELS
+
+    return _names(incomplete, (*(row.command for row in ROWS), *VISION_MODELS))
 
 
 def complete_algorithm(incomplete: str) -> list[str]:

@@ -23,6 +23,7 @@ from dorothie_gym.cli.output import (
     stdout,
     wide_stdout,
 )
+from dorothie_gym.cli.train_vision import VISION_MODELS, train_vision
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.experiment import Experiment
@@ -36,8 +37,22 @@ CorpusOption = Annotated[
     Path | None,
     typer.Option("--corpus", metavar="DIR", help="Folder of the corpus; default: a small corpus, generated once."),
 ]
-Size = Annotated[str, typer.Option("--config", help="small (two cores) or paper (the published sizes).")]
+Size = Annotated[str, typer.Option("--config", "--size", help="small (two cores) or paper (the published sizes).")]
 Seeds = Annotated[int, typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...")]
+SomeSeeds = Annotated[
+    int | None,
+    typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...; default 5, of segformer and detr 1."),
+]
+Device = Annotated[
+    str | None, typer.Option(help="segformer and detr: cpu, cuda, ...; default the GPU where there is one.")
+]
+PixelSource = Annotated[
+    str | None,
+    typer.Option("--inputs", help="detr: classes and depths that it reads, predicted (by the SegFormer) or true."),
+]
+Epochs = Annotated[
+    int | None, typer.Option(min=1, max=10_000, help="segformer and detr: number of epochs; default that of the size.")
+]
 Encoder = Annotated[
     str, typer.Option(help="Text encoder: auto (minilm if installed, else hashing), hashing, minilm, bert.")
 ]
@@ -56,22 +71,40 @@ def train(
     model: Annotated[
         str,
         typer.Argument(
-            metavar="MODEL", help="toto, toto-belief, bert, ...; see `table`.", autocompletion=complete_model
+            metavar="MODEL",
+            help="toto, toto-belief, bert, ... (see `table`); segformer, detr.",
+            autocompletion=complete_model,
         ),
     ],
     corpus: CorpusOption = None,
     size: Size = "small",
-    seeds: Seeds = 5,
+    seeds: SomeSeeds = None,
     encoder: Encoder = "auto",
     out: Out = None,
     workers: Workers = None,
     strict: Strict = False,
+    device: Device = None,
+    inputs: PixelSource = None,
+    epochs: Epochs = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a model with several seeds, test it, and print its scores.
 
-    An interrupted run is resumed by the same command.
+    An interrupted run is resumed by the same command. The vision models, segformer and detr, learn from pictures of the
+    recorded sessions.
     """
+    if model in VISION_MODELS:
+        with _reporting_errors():
+            folder, where = _places(corpus, out)
+            train_vision(
+                model, folder, where, size=size, seeds=seeds or 1, device=device, inputs=inputs, epochs=epochs,
+                workers=workers, as_json=as_json,
+            )  # fmt: skip
+        return
+    for option, given in (("--device", device), ("--inputs", inputs), ("--epochs", epochs)):
+        if given is not None:
+            fail(f"{option} is for {' and '.join(VISION_MODELS)} only")
+    seeds = seeds or 5
     with _reporting_errors():
         from dorothie_gym.baselines.experiment import gather_table, table_experiments
         from dorothie_gym.baselines.model_zoo import find_row

@@ -1,0 +1,22 @@
+"""Import of `transformers`, which only the vision models need."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from dorothie_gym.errors import EncoderError
+
+
+def transformers() -> Any:
+    """Returns the module `transformers`.
+
+    Raises:
+        EncoderError: it is not installed; the message names the extra.
+    """
+    try:
+        return importlib.import_module("transformers")
+    except ImportError as error:
+        raise EncoderError(
+            f"vision models need transformers ({error}); run: pip install 'dorothie-gym[vision]'"
+        ) from None

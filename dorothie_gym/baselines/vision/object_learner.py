@@ -1,0 +1,185 @@
+"""Training and tests of a Deformable DETR on labelled pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from dorothie_gym.baselines.vision.detector import KINDS, Detector, DetectorConfig
+from dorothie_gym.baselines.vision.frames import FrameSet, Pictures
+from dorothie_gym.baselines.vision.metrics import PictureBoxes, average_precisions
+from dorothie_gym.baselines.vision.pixel_learner import labelled
+from dorothie_gym.baselines.vision.training import Learner
+
+LEAST_PIXELS: Final = 64
+"""Visible pixels from which on an object has to be found in tests; others are ignored."""
+
+VALIDATED: Final = 150
+"""Largest number of validation pictures after an epoch, evenly chosen."""
+
+_TESTED: Final = 8  # pictures at once
+_LEAST_SHARE: Final = 0.4  # of an object's box that an enlarged part of a picture must hold
+
+
+class ObjectLearner(Learner):
+    """Deformable DETR with its pictures; it reads their classes and depths, whether true or predicted."""
+
+    clip: ClassVar[float] = 0.1
+
+    def __init__(
+        self, config: DetectorConfig, training: FrameSet, validation: FrameSet, seed: int, device: torch.device
+    ) -> None:
+        torch.manual_seed(seed)
+        self.config: DetectorConfig = config
+        self.model: Detector = Detector(config)
+        self.model.to(device)
+        self.device = device
+        self._training, self._validation = training, validation
+
+    @property
+    def pictures(self) -> int:
+        """Number of training pictures."""
+        return len(self._training)
+
+    def groups(self) -> list[tuple[list[nn.Parameter], float]]:
+        """Returns the parameters of the backbone and all others, with the factors of their learning rates."""
+        backbone = list(self.model.detr.model.backbone.parameters())
+        inside = {id(parameter) for parameter in backbone}
+        others = [parameter for parameter in self.model.parameters() if id(parameter) not in inside]
+        return [(others, 1.0), (backbone, self.config.backbone_rate)]
+
+    def loss(self, rows: Sequence[int], epoch: int) -> Tensor:
+        """Returns the mean loss of some training pictures, half of them mirrored, enlarged parts of the whole."""
+        pictures = self._training.take(rows)
+        rgb, depth, semantic = inputs(pictures, self.device)
+        images, wanted, labels = [], list[Tensor](), list[Tensor]()
+        for k, boxes in enumerate(pictures.boxes):
+            true, kinds = targets(boxes, self.config.least_pixels, rgb.shape[-1], rgb.shape[-2])
+            window = _window(self.config.zoom)
+            true, kinds = _boxes_in(true, kinds, window)
+            part = _part(rgb[k], depth[k], semantic[k], window)
+            if float(torch.rand(())) < 0.5:
+                part = tuple(image.flip(-1) for image in part)
+                true = torch.cat((1.0 - true[:, :1], true[:, 1:]), 1)
+            images.append(part)
+            wanted.append(true.to(self.device))
+            labels.append(kinds.to(self.device))
+        colours, depths, classes = (torch.stack(column) for column in zip(*images, strict=True))
+        return self.model.loss(colours, depths, classes, wanted, labels)
+
+    def validate(self) -> Mapping[str, float]:
+        """Returns figures of the validation pictures; the score is AP50."""
+        figures = object_figures(detected_boxes(self.model, self._validation, most=VALIDATED))
+        return {**figures, "score": 0.0 if np.isnan(figures["ap50"]) else figures["ap50"]}
+
+
+def inputs(pictures: Pictures, device: torch.device) -> tuple[Tensor, Tensor, Tensor]:
+    """Returns RGB (b, 3, h, w) in [-1, 1], depths (b, h, w) [m] and classes (b, h, w) as tensors."""
+    rgb, semantic, depth = labelled(pictures, device)
+    return rgb, depth, semantic
+
+
+def kinds_of(boxes: NDArray[np.void]) -> NDArray[np.int64]:
+    """Returns the rows of `KINDS` of boxes (n,) of `BOX_DTYPE`; all props are of the last."""
+    table = {kind.value: number for number, kind in enumerate(KINDS)}
+    return np.array([table.get(kind, len(KINDS) - 1) for kind in boxes["kind"].tolist()], dtype=np.int64)
+
+
+def targets(boxes: NDArray[np.void], least: int, width: int, height: int) -> tuple[Tensor, Tensor]:
+    """Returns the boxes (n, 4) with so many visible pixels, as of `Detections`, and their kinds (n,)."""
+    chosen = boxes[boxes["pixels"] >= least]
+    left, top, right, bottom = (chosen[name].astype(np.float32) for name in ("left", "top", "right", "bottom"))
+    columns = (left + right) / 2 / width, (top + bottom) / 2 / height, (right - left) / width, (bottom - top) / height
+    return torch.from_numpy(np.stack(columns, axis=1)), torch.from_numpy(kinds_of(chosen))
+
+
+def _window(zoom: float) -> tuple[float, float, float]:
+    """Returns left and top of a random part of a picture, and its size, in shares of the picture."""
+    if float(torch.rand(())) < 0.3:
+        return 0.0, 0.0, 1.0
+    size = zoom + (1.0 - zoom) * float(torch.rand(()))
+    left, top = ((1.0 - size) * torch.rand(2)).tolist()
+    return left, top, size
+
+
+def _part(rgb: Tensor, depth: Tensor, semantic: Tensor, window: tuple[float, float, float]) -> tuple[Tensor, ...]:
+    """Returns a part of a picture (3, h, w), its depths (h, w) and classes (h, w), enlarged to the whole size."""
+    left, top, size = window
+    if size == 1.0:
+        return rgb, depth, semantic
+    height, width = depth.shape
+    rows = ((torch.arange(height) + 0.5) * size + top * height).long().clamp(0, height - 1).to(rgb.device)
+    columns = ((torch.arange(width) + 0.5) * size + left * width).long().clamp(0, width - 1).to(rgb.device)
+    pixels = rows[:, None] * width + columns  # the nearest, also in RGB
+    return rgb.flatten(1)[:, pixels], depth.flatten()[pixels] * size, semantic.flatten()[pixels]
+
+
+def _boxes_in(boxes: Tensor, kinds: Tensor, window: tuple[float, float, float]) -> tuple[Tensor, Tensor]:
+    """Returns the boxes (n, 4) of a picture in an enlarged part of it, without those that lie mostly outside."""
+    left, top, size = window
+    corner = torch.tensor((left, top))
+    low = (boxes[:, :2] - boxes[:, 2:] / 2 - corner) / size
+    high = (boxes[:, :2] + boxes[:, 2:] / 2 - corner) / size
+    whole = (high - low).prod(1)
+    low, high = low.clamp(0.0, 1.0), high.clamp(0.0, 1.0)
+    kept = (high - low).prod(1) > _LEAST_SHARE * whole
+    return torch.cat(((low + high) / 2, high - low), 1)[kept], kinds[kept]
+
+
+# --- Tests ------------------------------------------------------------------------------------------------------------
+
+
+def detected_boxes(model: Detector, pictures: FrameSet, *, most: int | None = None) -> list[PictureBoxes]:
+    """Returns the true and the detected boxes of pictures, or of at most so many, evenly chosen."""
+    model.eval()
+    where = next(model.parameters()).device
+    count = min(len(pictures), most or len(pictures))
+    rows = (np.arange(count) * len(pictures) // max(count, 1)).tolist()
+    found = []
+    for start in range(0, count, _TESTED):
+        batch = pictures.take(rows[start : start + _TESTED])
+        with torch.inference_mode():
+            detections = model(*inputs(batch, where))
+        height, width = batch.semantic.shape[1:]
+        scale = np.array((width, height, width, height), dtype=np.float64)
+        for boxes, centred, scores in zip(
+            batch.boxes, detections.boxes.cpu().numpy(), detections.scores.cpu().numpy(), strict=True
+        ):
+            corners = np.concatenate((centred[:, :2] - centred[:, 2:] / 2, centred[:, :2] + centred[:, 2:] / 2), axis=1)
+            true = np.stack([boxes[name] for name in ("left", "top", "right", "bottom")], axis=1).astype(np.float64)
+            found.append(
+                PictureBoxes(
+                    true=true,
+                    kinds=kinds_of(boxes),
+                    ignored=boxes["pixels"] < LEAST_PIXELS,
+                    detected=np.repeat(corners * scale, len(KINDS), axis=0),  # each query may be of any kind
+                    detected_kinds=np.tile(np.arange(len(KINDS)), len(corners)),
+                    scores=scores.astype(np.float64).ravel(),
+                )
+            )
+    return found
+
+
+def object_figures(pictures: Sequence[PictureBoxes]) -> dict[str, float]:
+    """Returns AP50 and AP50:95 over the kinds with a true box, AP50 of each kind, and the number of true boxes."""
+    precisions = average_precisions(pictures)
+    figures = {"ap50": float(precisions[0]), "ap50_95": float(precisions.mean())}
+    for number, kind in enumerate(KINDS):
+        single = [_only(picture, number) for picture in pictures]
+        figures[f"ap50_{kind.name.lower()}"] = float(average_precisions(single, (0.5,))[0])
+        figures[f"boxes_{kind.name.lower()}"] = float(sum(int((~picture.ignored).sum()) for picture in single))
+    return figures
+
+
+def _only(picture: PictureBoxes, kind: int) -> PictureBoxes:
+    """Returns the boxes of one kind."""
+    true, found = picture.kinds == kind, picture.detected_kinds == kind
+    return PictureBoxes(
+        picture.true[true], picture.kinds[true], picture.ignored[true], picture.detected[found],
+        picture.detected_kinds[found], picture.scores[found],
+    )  # fmt: skip

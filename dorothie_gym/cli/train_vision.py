@@ -1,0 +1,108 @@
+"""`dorothie-gym train segformer|detr`: training of the vision models on pictures of recorded sessions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from dorothie_gym.cli.output import Facts, exit_interrupted, fail, print_json, stderr, stdout, wide_stdout
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.vision.experiment import OnStage
+
+VISION_MODELS: Final = ("segformer", "detr")
+"""Commands of the vision models."""
+
+_FIGURES: Final[Mapping[str, Mapping[str, str]]] = {
+    "segformer": {"miou": "mIoU", "macc": "mAcc", "aacc": "aAcc", "depth_error": "depth error"},
+    "detr": {"ap50": "AP50", "ap50_95": "AP50:95"},
+}
+_MEANINGS: Final[Mapping[str, str]] = {
+    "segformer": "Means over the classes that occur in the fold; depth error: mean relative error up to 80 m.",
+    "detr": "Objects with at least 64 visible pixels; means over the kinds that occur in the fold.",
+}
+
+
+def train_vision(
+    model: str,
+    corpus: Path,
+    out: Path,
+    *,
+    size: str,
+    seeds: int,
+    device: str | None,
+    inputs: str | None,
+    epochs: int | None,
+    workers: int | None,
+    as_json: bool,
+) -> None:
+    """Trains a vision model with several seeds, tests it, and prints its figures beside the paper's."""
+    from dorothie_gym.baselines.trainer import device as best_device
+    from dorothie_gym.baselines.vision.experiment import VisionExperiment, check_experiment, run_vision_experiment
+    from dorothie_gym.processors import available_processors
+
+    if inputs is not None and model != "detr":
+        fail("--inputs is for detr only")
+    results: list[Facts] = []
+    try:
+        with _progress(quiet=as_json) as on_stage:
+            for seed in range(seeds):
+                job = VisionExperiment(
+                    corpus=corpus, model=model, size=size, seed=seed, out=out, epochs=epochs,  # type: ignore[arg-type]
+                    inputs=inputs or "predicted", device=device or str(best_device()),  # type: ignore[arg-type]
+                )  # fmt: skip
+                check_experiment(job)
+                results.append(run_vision_experiment(job, workers=workers or available_processors(), on_stage=on_stage))
+    except KeyboardInterrupt:
+        exit_interrupted(
+            f"Interrupted with {len(results)} of {seeds} trainings finished; resume with the same command."
+        )
+    if as_json:
+        print_json({"model": model, "corpus": str(corpus), "runs": results})
+        return
+    _show(model, results)
+
+
+@contextmanager
+def _progress(*, quiet: bool) -> Iterator[OnStage]:
+    """Shows a progress bar on a terminal."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = stderr()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("")
+
+        def on_stage(stage: str, done: int, planned: int) -> None:
+            progress.update(bar, description=stage.capitalize(), completed=done, total=planned)
+
+        yield on_stage
+
+
+def _show(model: str, results: Sequence[Mapping[str, Any]]) -> None:
+    from rich.table import Table
+
+    names = _FIGURES[model]
+    table = Table(box=None, header_style="bold")
+    table.add_column("")
+    for title in names.values():
+        table.add_column(title, justify="right")
+    for result in results:
+        for towns, figures in result["test"].items():
+            label = f"{towns} towns" + (f", seed {result['seed']}" if len(results) > 1 else "")
+            table.add_row(label, *(_percent(figures[name]) for name in names))
+    table.add_row("paper", *(_percent(results[0]["paper"].get(name)) for name in names), style="dim")
+    wide_stdout().print(table)
+    stdout().print(_MEANINGS[model], style="dim", markup=False, soft_wrap=True)
+    for result in results:
+        stdout().print(
+            f"Seed {result['seed']}: best epoch {result['best_epoch']} of {len(result['epochs'])}, "
+            f"{result['processor_seconds']:.0f} s of processor time; {result['folder']}",
+            style="dim", markup=False, soft_wrap=True,
+        )  # fmt: skip
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100.0 * value:.1f} %"

@@ -1,0 +1,125 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+pytest.importorskip("transformers")
+
+from dorothie_gym.baselines import checkpoints
+from dorothie_gym.baselines.vision import object_learner
+from dorothie_gym.baselines.vision.detector import Detector, DetectorConfig
+from dorothie_gym.baselines.vision.metrics import average_precisions
+from dorothie_gym.baselines.vision.object_learner import ObjectLearner, detected_boxes, object_figures, targets
+from dorothie_gym.baselines.vision.training import train_learner
+from tests.baselines.vision.pictures import frame_set, session_frames
+
+TINY = DetectorConfig(
+    width=128, height=64, queries=5, encoder_layers=1, decoder_layers=2, size=32, feed_forward=32, heads=1, encoded=4,
+    backbone_sizes=(8, 16, 16, 16), epochs=2, batch_size=4, learning_rate=2e-3,
+)  # fmt: skip
+CPU = torch.device("cpu")
+
+
+def learner(config=TINY, seed=0):
+    return ObjectLearner(config, frame_set(0, 1), frame_set(2, count=4), seed, CPU)
+
+
+def run(folder, config=TINY, interrupt=None):
+    trained = learner(config)
+
+    def on_step(done, planned, loss):
+        if done == interrupt:
+            raise KeyboardInterrupt
+
+    epochs = train_learner(trained, folder, seed=0, about={}, clock=iter(range(1000)).__next__, on_step=on_step)
+    return trained, epochs
+
+
+def weights(model):
+    return torch.cat([value.flatten().float() for value in model.state_dict().values()])
+
+
+def test_training_finds_cars(tmp_path):
+    pictures = frame_set(3, 4)
+    trained, epochs = run(tmp_path, replace(TINY, epochs=40, learning_rate=4e-3, zoom=1.0))
+    found, guessed = (
+        average_precisions(detected_boxes(model, pictures), (0.2,))[0] for model in (trained.model, learner().model)
+    )
+    assert epochs[-1].loss < 0.5 * epochs[0].loss
+    assert found > 0.3 and guessed < 0.1
+
+
+def test_figures_are_of_each_kind_and_count_the_boxes():
+    figures = object_figures(detected_boxes(Detector(TINY), frame_set(3)))
+    assert figures["boxes_vehicles"] == 8 and figures["boxes_pedestrian"] == 0
+    assert np.isnan(figures["ap50_pedestrian"]) and 0.0 <= figures["ap50"] == figures["ap50_vehicles"]
+
+
+@pytest.mark.parametrize("two_stage", [True, False])
+def test_interrupted_training_resumes_to_equal_weights(tmp_path, two_stage):
+    config = replace(TINY, two_stage=two_stage)
+    whole, _ = run(tmp_path / "whole", config)
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path / "parts", config, interrupt=6)  # in the second epoch
+    resumed, _ = run(tmp_path / "parts", config)
+    assert torch.equal(weights(whole.model), weights(resumed.model))
+
+
+@pytest.mark.parametrize("two_stage", [True, False])
+def test_saved_weights_give_equal_detections(tmp_path, two_stage):
+    config = replace(TINY, two_stage=two_stage)
+    model, other = Detector(config).eval(), Detector(config).eval()
+    checkpoints.save(tmp_path / "weights", model, {})
+    checkpoints.restore(tmp_path / "weights", other)
+    pictures = frame_set(0, count=2)
+    for here, there in zip(detected_boxes(model, pictures), detected_boxes(other, pictures), strict=True):
+        assert np.array_equal(here.detected, there.detected) and np.array_equal(here.scores, there.scores)
+
+
+def test_all_five_channels_are_read():
+    torch.manual_seed(0)
+    model = Detector(TINY).eval()
+    rgb, depth, kinds = torch.zeros(1, 3, 64, 128), torch.full((1, 64, 128), 9.0), torch.zeros(1, 64, 128).long()
+    before = model.encoded(rgb, depth, kinds)
+    for changed in ((rgb + 0.5, depth, kinds), (rgb, 2.0 * depth, kinds), (rgb, depth, kinds + 1)):
+        assert not torch.equal(model.encoded(*changed), before)
+    sky = torch.full_like(depth, torch.inf)
+    assert model.encoded(rgb, sky, kinds).isfinite().all()
+
+
+def test_queries_have_the_size_of_the_config():
+    found = Detector(TINY).eval()(
+        torch.zeros(2, 3, 64, 128), torch.ones(2, 64, 128), torch.zeros(2, 64, 128, dtype=torch.int64)
+    )
+    assert found.queries.shape == (2, 5, 32) and found.boxes.shape == (2, 5, 4) and found.scores.shape == (2, 5, 3)
+
+
+def test_targets_are_middles_and_sizes_and_leave_out_small_objects():
+    session = session_frames(1)
+    box = session.boxes_of(0)
+    found, kinds = targets(box, 1, 128, 64)
+    left, top = int(box["left"][0]), int(box["top"][0])
+    assert found[0].tolist() == pytest.approx([(left + 12) / 128, (top + 8) / 64, 24 / 128, 16 / 64])
+    assert kinds.tolist() == [0]
+    assert len(targets(box, 24 * 16 + 1, 128, 64)[0]) == 0
+
+
+def test_enlarged_part_moves_boxes_with_the_pixels():
+    session = session_frames(1, seed=5)
+    box = session.boxes_of(0)
+    window = (0.1, 0.2, 0.7)
+    _, _, semantic = object_learner._part(
+        torch.zeros(3, 64, 128), torch.zeros(64, 128), torch.from_numpy(session.semantic[0].astype(np.int64)), window
+    )
+    true, kinds = targets(box, 1, 128, 64)
+    moved, _ = object_learner._boxes_in(true, kinds, window)
+    rows, columns = np.nonzero(semantic.numpy() == box["kind"][0])
+    drawn = [(columns.min() + columns.max() + 1) / 256, (rows.min() + rows.max() + 1) / 128]
+    assert moved[0, :2].tolist() == pytest.approx(drawn, abs=0.02)
+
+
+def test_published_config_has_the_published_sizes():
+    config = DetectorConfig.paper()
+    assert (config.queries, config.size, config.learning_rate) == (300, 256, 2e-4)
+    assert config.learning_rate * config.backbone_rate == pytest.approx(2e-5) and config.weight_decay == 1e-4

@@ -1,0 +1,116 @@
+"""Labelled pictures of recorded sessions: chosen places, no faulty camera, kept between runs."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dorothie_gym.baselines.vision import frames
+from dorothie_gym.baselines.vision.frames import FrameSampling, load_frames
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.errors import SessionError
+from dorothie_gym.ontology import ObjectClass, Role
+from dorothie_gym.recording import Corpus, EventType, Session
+from dorothie_gym.recording.events import Event
+from dorothie_gym.rollout import generate_corpus
+from dorothie_gym.sim.config import WorldConfig
+
+SMALL = FrameSampling(width=96, height=64, spacing=6.0, wait=3.0, most=5)
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two sessions of 15 seconds in the training fold."""
+    made, folder = tmp_path_factory.mktemp("made"), tmp_path_factory.mktemp("corpus")
+    config = EnvConfig(max_seconds=15.0, world=WorldConfig(vehicles=40, pedestrians=40))
+    generate_corpus(made, sessions=2, seed=5, config=config)
+    for place, session in enumerate(sorted(made.rglob("session.json"))):
+        shutil.copytree(session.parent, folder / "train" / f"{place}")
+    return folder
+
+
+def places(session: Session, chosen: np.ndarray) -> np.ndarray:
+    rows = session.trajectory[np.searchsorted(session.trajectory["frame"], chosen)]
+    return np.stack([rows["x"], rows["y"]], axis=1)
+
+
+def test_pictures_are_apart_in_place_or_time(corpus):
+    session = Corpus.load(corpus).entries[0].load()
+    chosen = SMALL.candidates(session)
+    away = np.linalg.norm(np.diff(places(session, chosen), axis=0), axis=1)
+    assert len(chosen) > 2 and ((away >= 6.0) | (np.diff(chosen) >= 3.0 * 30)).all()
+
+
+def test_pictures_of_a_faulty_camera_are_left_out(corpus):
+    session = Corpus.load(corpus).entries[0].load()
+    chosen = SMALL.candidates(session)
+    first, last = int(chosen[1]), int(chosen[2])
+    faults = [
+        Event(
+            frame=frame,
+            type=EventType.EXCEPTION,
+            source=Role.AD_WIZARD,
+            data={"kind": "SENSOR_FAULT", "sensor": "blur", "on": on},
+        )
+        for frame, on in ((first - 1, True), (last + 1, False))
+    ]
+    broken = replace(session, events=(*session.events, *faults))
+    left = SMALL.candidates(broken)
+    assert len(left) and not ((left >= first) & (left <= last)).any()
+
+
+def test_labels_belong_to_the_pictures(corpus, tmp_path):
+    pictures = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path)["train"]
+    batch = pictures.take(range(len(pictures)))
+    assert 4 <= len(pictures) <= 10
+    assert batch.rgb.shape == (len(pictures), 64, 96, 3) and batch.rgb.std() > 20.0
+    sky = batch.semantic == ObjectClass.SKY.value
+    assert sky.any() and np.isinf(batch.depth[sky]).all() and np.isfinite(batch.depth[~sky]).all()
+    assert pictures.pixel_counts.sum() == batch.semantic.size
+    for boxes, semantic in zip(batch.boxes, batch.semantic, strict=True):
+        for box in boxes:
+            inside = semantic[box["top"] : box["bottom"], box["left"] : box["right"]]
+            assert (inside == box["kind"]).sum() >= box["pixels"] // 2
+
+
+def test_pictures_are_drawn_once_and_equal_in_other_processes(corpus, tmp_path, monkeypatch):
+    here = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path / "here")["train"]
+    there = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path / "there", workers=2)["train"]
+    assert here.key == there.key
+    for first, second in zip(here.sessions, there.sessions, strict=True):
+        assert np.array_equal(first.rgb, second.rgb) and np.array_equal(first.boxes, second.boxes)
+    monkeypatch.setattr(frames, "_write", None)  # would fail
+    again = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path / "here")["train"]
+    assert np.array_equal(again.take([1]).rgb, here.take([1]).rgb)
+
+
+def test_damaged_pictures_are_drawn_again(corpus, tmp_path):
+    before = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path)["train"]
+    damaged = tmp_path / before.sessions[0].key / "depth.npy"
+    content = np.array(before.sessions[0].depth)
+    damaged.write_bytes(b"nothing")
+    after = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path)["train"]
+    assert np.array_equal(after.sessions[0].depth, content)
+
+
+def test_pictures_with_objects_only(corpus, tmp_path):
+    sampling = replace(SMALL, spacing=2.0, wait=0.5, pixels=12)
+    pictures = load_frames(Corpus.load(corpus), sampling, folder=tmp_path)["train"]
+    assert len(pictures)
+    assert all(boxes["pixels"].max() >= 12 for boxes in pictures.take(range(len(pictures))).boxes)
+
+
+def test_cache_that_is_switched_off_is_reported(corpus, monkeypatch):
+    monkeypatch.setenv("DOROTHIE_GYM_CACHE", "")
+    with pytest.raises(SessionError, match="DOROTHIE_GYM_CACHE"):
+        load_frames(Corpus.load(corpus), SMALL)
+
+
+@pytest.mark.parametrize("change", [{"width": 100}, {"most": 0}, {"spacing": 0.0}, {"pixels": -1}])
+def test_settings_out_of_range_are_refused(change):
+    with pytest.raises(ValueError, match="FrameSampling"):
+        replace(SMALL, **change)
