@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.camera.atlas import AtlasArrays
-from dorothie_gym.camera.bodies import copy_bodies
-from dorothie_gym.camera.cells import CellOrder, CellTable, draw_cells, draw_more_cells, new_order, sorted_by_cell
+from dorothie_gym.camera.cells import CellOrder, CellTable, new_order, sorted_by_cell
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.daylight import Daylight, daylight_of
 from dorothie_gym.camera.faces import new_face
@@ -21,11 +20,12 @@ from dorothie_gym.camera.mesh import TOWN, Mesh, empty_mesh
 from dorothie_gym.camera.models.model_bank import ModelBank, PlacementRecord
 from dorothie_gym.camera.optics import optics_of
 from dorothie_gym.camera.pose import CameraPose, View, view_from
-from dorothie_gym.camera.rasterizer import VisibilityBuffer, clear, draw_triangles, new_buffer
+from dorothie_gym.camera.rasterizer import VisibilityBuffer, new_buffer
 from dorothie_gym.camera.samples import new_samples
+from dorothie_gym.camera.scene_drawing import draw_scene
 from dorothie_gym.camera.sensor_faults import apply_faults
 from dorothie_gym.camera.shading import shade
-from dorothie_gym.camera.shadows import draw_body_shadows, draw_town_shadows, new_shadow_maps, turn_sun
+from dorothie_gym.camera.shadows import draw_shadows, new_shadow_maps, turn_sun
 from dorothie_gym.camera.sky import sky_noise
 from dorothie_gym.camera.texturing import textures_of
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records, plain
@@ -174,7 +174,10 @@ class FirstPersonCamera:
             light = self._daylight(weather, head_lights)
             placed = self._draw(view.scaled(config.samples), self._buffer, self._orders, bodies, placed)
             if self._casts_shadows:
-                self._draw_shadows(pose, bodies)
+                draw_shadows(
+                    self._shadows, self.scene.town, self.scene.cells, self._overlay, self._overlay_cells, pose.x,
+                    pose.y, pose.z, self.scene.bank.mesh, self.scene.bank.ranges, bodies,
+                )  # fmt: skip
             picture = np.empty((config.height, config.width, 3), np.uint8)
             shade(
                 view, optics_of(view, light, self._shadows), self._buffer, config.samples, self.scene.town,
@@ -207,26 +210,15 @@ class FirstPersonCamera:
         placed: int,
     ) -> int:
         """Draws all triangles; copies those of bodies first if `placed` is negative, and returns their number."""
-        scene, first = self.scene, self.scene.town.size
-        clear(buffer)
-        draw_cells(view, buffer, scene.town, scene.cells, orders[0], 0)
-        if self._overlay.size:
-            tiles = orders[0].tiles
-            draw_more_cells(view, buffer, self._overlay, self._overlay_cells, orders[1], tiles, first)
-        if placed < 0 and len(bodies):
-            bank, tiles = scene.bank, orders[0].tiles
-            placed = copy_bodies(view, tiles, bank.mesh, bank.ranges, bank.boxes, bodies, self._box, self._bodies)
-            if placed > self._bodies.size:
-                self._bodies = empty_mesh(2 * placed)
-                copy_bodies(view, tiles, bank.mesh, bank.ranges, bank.boxes, bodies, self._box, self._bodies)
-        draw_triangles(view, buffer, self._bodies, 0, max(placed, 0), first + self._overlay.size)
-        return placed
-
-    def _draw_shadows(self, pose: CameraPose, bodies: RecordArray[PlacementRecord]) -> None:
-        """Draws the maps of shadows."""
-        scene, maps = self.scene, self._shadows
-        draw_town_shadows(maps, scene.town, scene.cells, self._overlay, self._overlay_cells, pose.x, pose.y, pose.z)
-        draw_body_shadows(maps, scene.bank.mesh, scene.bank.ranges, bodies)
+        scene, bank = self.scene, self.scene.bank
+        while True:
+            count = draw_scene(
+                view, buffer, scene.town, scene.cells, orders[0], self._overlay, self._overlay_cells, orders[1],
+                bank.mesh, bank.ranges, bank.boxes, bodies, self._box, self._bodies, placed,
+            )  # fmt: skip
+            if count <= self._bodies.size:
+                return count
+            self._bodies = empty_mesh(2 * count)
 
     def _write_labels(self, view: View, bodies: RecordArray[PlacementRecord]) -> dict[str, NDArray[np.generic] | Boxes]:
         labels, outputs = self._labels, self.config.outputs

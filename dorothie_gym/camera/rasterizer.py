@@ -96,9 +96,9 @@ def draw_triangles(
             scale_a, scale_b, scale_c = 1.0 / a, 1.0 / b, 1.0 / c
             ax, bx, cx = wide + a_right * scale_a, wide + b_right * scale_b, wide + c_right * scale_c
             ay, by, cy = high - a_up * scale_a, high - b_up * scale_b, high - c_up * scale_c
-            if _row(min(ay, by, cy), view.height) == _row(max(ay, by, cy), view.height):
+            if _row(min(min(ay, by), cy), view.height) == _row(max(max(ay, by), cy), view.height):
                 continue
-            if math.ceil(min(ax, bx, cx) - _MARGIN) == math.ceil(max(ax, bx, cx) - (1.0 - _MARGIN)):
+            if math.ceil(min(min(ax, bx), cx) - _MARGIN) == math.ceil(max(max(ax, bx), cx) - (1.0 - _MARGIN)):
                 continue  # it lies between two samples of each row
         scale = 1.0 / offset
         step = scale * inverse

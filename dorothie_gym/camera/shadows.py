@@ -90,11 +90,11 @@ def turn_sun(maps: ShadowMaps, sun: Array, strength: float) -> bool:
 
 
 @concurrent
-def draw_town_shadows(
+def draw_shadows(
     maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable, x: float, y: float,
-    z: float,
+    z: float, bank: Mesh, ranges: NDArray[np.int32], bodies: RecordArray[PlacementRecord],
 ) -> None:  # fmt: skip
-    """Draws the tiles around a position [m] that the map does not hold.
+    """Draws the tiles around a position [m] that the map does not hold, and the map of bodies.
 
     Args:
         maps: to be drawn to.
@@ -105,7 +105,19 @@ def draw_town_shadows(
         x: [m].
         y: [m].
         z: [m].
+        bank: triangles of all models.
+        ranges: of `ModelBank`.
+        bodies: models and places.
     """
+    _draw_tiles(maps, town, town_cells, overlay, overlay_cells, x, y, z)
+    _draw_bodies(maps, bank, ranges, bodies)
+
+
+@compiled
+def _draw_tiles(
+    maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable, x: float, y: float,
+    z: float,
+) -> None:  # fmt: skip
     width = _TILE * TEXEL
     for axis in range(2):
         centre = (x if axis == 0 else y) - maps.slope[axis] * z
@@ -147,19 +159,11 @@ def _shades(maps: ShadowMaps, low: Array, high: Array, column: int, row: int) ->
     return True
 
 
-@concurrent
-def draw_body_shadows(
-    maps: ShadowMaps, bank: Mesh, ranges: NDArray[np.int32], bodies: RecordArray[PlacementRecord]
-) -> None:
-    """Draws the map of bodies, those near its middle.
-
-    Args:
-        maps: to be drawn to, after `draw_town_shadows`.
-        bank: triangles of all models.
-        ranges: of `ModelBank`.
-        bodies: models and places.
-    """
-    squares, first, reach = maps.bodies, maps.window, 0.5 * _BODIES * TEXEL
+@compiled
+def _draw_bodies(maps: ShadowMaps, bank: Mesh, ranges: NDArray[np.int32], bodies: RecordArray[PlacementRecord]) -> None:
+    """Draws the map of bodies, those near its middle."""
+    squares = maps.bodies[0:_BODIES, 0:_BODIES]  # a part, as tiles are: `_cast` is compiled once
+    first, reach = maps.window, 0.5 * _BODIES * TEXEL
     for y in range(_BODIES):
         for x in range(_BODIES):
             squares[y, x] = _NOTHING
@@ -172,7 +176,7 @@ def draw_body_shadows(
                 _cast(maps, squares, bank, j, first[2], first[3], body.x, body.y, body.z, body.cos, body.sin)
 
 
-@inlined
+@compiled
 def _cast(
     maps: ShadowMaps, target: NDArray[np.int16], mesh: Mesh, k: int, left: int, top: int, x: float, y: float, z: float,
     c: float, s: float,

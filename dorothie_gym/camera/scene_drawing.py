@@ -1,0 +1,52 @@
+"""All triangles of a scene in one call: town, what stands in the session, and bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.camera.bodies import copy_bodies
+from dorothie_gym.camera.cells import CellOrder, CellTable, draw_cells, draw_more_cells
+from dorothie_gym.camera.mesh import Mesh
+from dorothie_gym.camera.models.model_bank import PlacementRecord
+from dorothie_gym.camera.pose import View
+from dorothie_gym.camera.rasterizer import VisibilityBuffer, clear, draw_triangles
+from dorothie_gym.compilation import concurrent
+from dorothie_gym.compilation.records import RecordArray
+from dorothie_gym.maps.model import Array
+
+
+@concurrent
+def draw_scene(
+    view: View, buffer: VisibilityBuffer, town: Mesh, cells: CellTable, order: CellOrder, overlay: Mesh,
+    overlay_cells: CellTable, overlay_order: CellOrder, bank: Mesh, ranges: NDArray[np.int32],
+    boxes: NDArray[np.float32], bodies: RecordArray[PlacementRecord], box: Array, placed: Mesh, count: int,
+) -> int:  # fmt: skip
+    """Draws all triangles to an emptied buffer; returns the number of those of bodies.
+
+    Args:
+        view: projection.
+        buffer: to be drawn to.
+        town: what stands in every session, sorted by cell.
+        cells: of the town.
+        order: scratch space for them.
+        overlay: what stands in the session, sorted by cell.
+        overlay_cells: of the overlay.
+        overlay_order: scratch space for them.
+        bank: triangles of all models.
+        ranges: of `ModelBank`.
+        boxes: of `ModelBank`.
+        bodies: models and places.
+        box: (2, 3) scratch space.
+        placed: triangles of bodies. If it has too little room, they are not drawn.
+        count: of the triangles in `placed`, negative if they are to be written first.
+    """
+    clear(buffer)
+    draw_cells(view, buffer, town, cells, order, 0)
+    first = town.corners.shape[0]
+    draw_more_cells(view, buffer, overlay, overlay_cells, overlay_order, order.tiles, first)
+    if count < 0:
+        count = copy_bodies(view, order.tiles, bank, ranges, boxes, bodies, box, placed)
+    if count <= placed.corners.shape[0]:
+        draw_triangles(view, buffer, placed, 0, count, first + overlay.corners.shape[0])
+    return count
