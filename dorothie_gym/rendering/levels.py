@@ -182,6 +182,16 @@ class LevelLookup:
         level = np.abs(self._centre[index, 2] - points[:, 2][:, None]) < BRIDGE_CLEARANCE / 2.0
         return np.asarray((level & (distance < self._half[index] + 0.8)).any(axis=1))
 
+    def beside(self, points: Array, within: float) -> NDArray[np.bool_]:
+        """Returns which positions (n, 3) [m] lie beside stretches at their height, up to a distance [m] (n,)."""
+        if self._tree is None or not len(points):
+            return np.zeros(len(points), dtype=bool)
+        near = self._tree.query_ball_point(points[:, :2], within)
+        level = [
+            np.abs(self._centre[k, 2] - z) < BRIDGE_CLEARANCE / 2.0 for k, z in zip(near, points[:, 2], strict=True)
+        ]
+        return np.array([bool(row.any()) for row in level])
+
     def cross(self, points: Array, within: float) -> NDArray[np.bool_]:
         """Returns which positions (n, 3) [m] have a stretch at another height within a distance [m] (n,)."""
         if self._tree is None or not len(points):

@@ -166,9 +166,15 @@ _LONGEST_ARC = 120.0  # [m] from arm to arm
 _JOINED = 4  # segments of an outline per polygon
 
 
-def sidewalks(town: Town, areas: Sequence[Array], lines: Sequence[Border]) -> Iterator[Shape]:
-    """Yields pavements, including those around roundabouts and around the corners of junctions."""
-    walks = [(walk.points[:, :2], min(walk.width, _WIDEST_WALK)) for walk in town.sidewalks]
+def sidewalks(town: Town, areas: Sequence[Array], lines: Sequence[Border], bridges: LevelLookup) -> Iterator[Shape]:
+    """Yields pavements on the ground, including those around roundabouts and around the corners of junctions."""
+    walks = [
+        (walk.points[run, :2], min(walk.width, _WIDEST_WALK))
+        for walk in town.sidewalks
+        for run in _runs(~bridges.beside(walk.points, _BRIDGE_REACH))
+    ]
+    if not walks:
+        return
     walks += list(_around_rings(walks, lines))
     corners = list(_corners(walks, areas))
     for wider, colour in ((_EDGE, palette.SIDEWALK_EDGE), (0.0, palette.SIDEWALK)):
@@ -215,8 +221,8 @@ def _corners(walks: Sequence[tuple[Array, float]], areas: Sequence[Array]) -> It
                 yield part, float((away + half)[[k, after]].mean())
 
 
-def verges(town: Town, lines: Iterable[Border]) -> Iterator[Shape]:
-    """Yields paving between a kerb and a pavement that does not touch it."""
+def verges(town: Town, lines: Iterable[Border], bridges: LevelLookup) -> Iterator[Shape]:
+    """Yields paving between a kerb and a pavement that does not touch it, on the ground."""
     walks = [(walk, cut(walk.points, [(0.0, polyline_length(walk.points))], 1.0)[0]) for walk in town.sidewalks]
     places = np.concatenate([points for _, points in walks])
     tree = cKDTree(places[:, :2])
@@ -228,6 +234,7 @@ def verges(town: Town, lines: Iterable[Border]) -> Iterator[Shape]:
         gap = near - half[where]
         outer = line.shifted(-np.clip(gap + 0.5, 0.0, _WIDEST_VERGE + 0.5))
         beside = (gap < _WIDEST_VERGE) & (np.abs(places[where, 2] - line.points[:, 2]) < SAME_SURFACE)
+        beside &= ~bridges.hold(line.points)
         for run in np.split(np.arange(len(gap)), np.flatnonzero(np.diff(beside.astype(int)) != 0) + 1):
             if beside[run[0]] and len(run) > 1:
                 for k in range(run[0], run[-1], 8):
@@ -249,6 +256,7 @@ _JOINT = 0.05  # [m]
 _BAY_DEPTH = 2.3  # [m]
 _BAY_LENGTH = 6.0  # [m] without its tapered ends
 _BAY_TAPER = 2.2  # [m]
+_BRIDGE_REACH = 14.0  # [m] from the middle of a lane on a bridge to the middle of a pavement on it, at most
 _BEFORE_PORTAL = 4.0  # [m] of asphalt between a median and the mouth of a tunnel
 BEYOND_BRIDGE = 6.0  # [m] of asphalt and paint beyond a bridge: adjacent lanes begin theirs at different places
 
@@ -279,8 +287,10 @@ def streets(
     pieces = list(_open_pieces(town, tunnels))
     areas = junction_areas(town)
     if town.sidewalks:
-        yield from sidewalks(town, areas, lines)
-        yield from verges(town, lines)
+        # pavements within reach of the shorter ones lie on bridges
+        bridges = LevelLookup(samples, [_longer(part, -_BRIDGE_REACH) for part in parts if part.level > 0])
+        yield from sidewalks(town, areas, lines, bridges)
+        yield from verges(town, lines, bridges)
     else:
         yield from _layer(town, pieces, areas, _VERGE, palette.SIDEWALK)
     yield from _layer(town, pieces, areas, _ROAD_KERB, palette.KERB)
@@ -307,7 +317,7 @@ def _longer(part: LevelStretch, more: float) -> LevelStretch:
 
 
 def deck(town: Town, parts: Sequence[LevelStretch], lines: Iterable[Border], places: LevelLookup) -> Iterator[Shape]:
-    """Yields the bridges of one level: shadow, parapets and asphalt.
+    """Yields the bridges of one level: shadow, parapets, pavements and asphalt.
 
     Args:
         town: town to paint.
@@ -315,6 +325,8 @@ def deck(town: Town, parts: Sequence[LevelStretch], lines: Iterable[Border], pla
         lines: borders; between parallel bridges there is concrete.
         places: lookup of the positions on the stretches.
     """
+    lines = list(lines)
+    paved = list(_bridge_pavements(town, lines, places))
     between = [(line, run) for line in lines if line.kind is BorderKind.MEDIAN for run in held(line, places)]
     layers = (
         (1.9, 0.0, palette.BRIDGE_SHADOW),
@@ -325,13 +337,43 @@ def deck(town: Town, parts: Sequence[LevelStretch], lines: Iterable[Border], pla
     )
     for margin, further, colour in layers:
         if colour == palette.KERB:
+            for line, outer in paved:
+                yield from (Shape(piece, palette.SIDEWALK) for piece in _beside(line, outer))
             for line, run in between:
                 yield from (Shape(piece, palette.MEDIAN_KERB) for piece in flat_strip(line, run))
+        elif colour != palette.ROAD:
+            for line, outer in paved:
+                yield from (Shape(piece, colour) for piece in _beside(line, outer + margin))
         for part in parts:
             lane = town.lanes[part.lane]
             reach = max(0.0, part.start - further), min(lane.length, part.end + further)
             if reach[1] - reach[0] > 0.5:
                 yield Shape(ribbon(lane, margin, *reach), colour)
+
+
+def _bridge_pavements(town: Town, lines: Iterable[Border], places: LevelLookup) -> Iterator[tuple[Border, Array]]:
+    """Yields the edges of roads on bridges that have a pavement, and the distances (n,) to its outer edge [m]."""
+    walks = [(walk, cut(walk.points, [(0.0, polyline_length(walk.points))], 1.0)[0]) for walk in town.sidewalks]
+    rows = [(walk, points[places.beside(points, _BRIDGE_REACH)]) for walk, points in walks]
+    middle = np.concatenate([np.zeros((0, 3)), *(points for _, points in rows)])
+    if not len(middle):
+        return
+    half = np.concatenate([np.full(len(points), min(walk.width, _WIDEST_WALK) / 2.0) for walk, points in rows])
+    tree = cKDTree(middle[:, :2])
+    for line in lines:
+        if line.kind is BorderKind.EDGE:
+            near, where = (np.asarray(row) for row in tree.query(line.points[:, :2]))
+            outside = np.hypot(*(line.shifted(-near) - middle[where, :2]).T) < near  # and not across the road
+            level = np.abs(middle[where, 2] - line.points[:, 2]) < SAME_SURFACE
+            for run in _runs(places.hold(line.points) & outside & level & (near < _BRIDGE_REACH)):
+                yield line.part(run), near[run] + half[where[run]]
+
+
+def _beside(line: Border, reach: Array) -> Iterator[Array]:
+    """Yields polygons (n, 2) [m] from an edge of a road to a distance (n,) [m] outside of it."""
+    outer = line.shifted(-reach)
+    for k in range(0, len(outer) - 1, 8):
+        yield np.concatenate((line.points[k : k + 9, :2], outer[k : k + 9][::-1]))
 
 
 def _open_pieces(town: Town, tunnels: Sequence[LevelStretch]) -> Iterator[tuple[Lane, float, float]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -25,6 +26,7 @@ _LEVEL = 4.5  # [m] of level ground beside other roads: their pavements
 _BESIDE = 0.5  # [m] further from the edge of a lane than from the nearest one; its height counts as well
 _ALIKE = 1.0  # [m] between road and land at which the level ground is narrow
 _APART = 0.25  # [m] of height between a pavement and the land from which it is a bench
+_WIDEST_VERGE = 7.0  # [m] from a road to the middle of its pavement
 _OWN_ROAD = 1.5  # [m] of height between a pavement and the road beside it, at most
 _NEAREST = 24  # samples of lanes that are considered at a point
 _AROUND = 12  # samples of the land that are considered at a point
@@ -72,7 +74,10 @@ class HeightField:
             Zone.COVER: _Lanes(samples, (level == 0) & ~sunken),
         }
         walks = _sidewalk_samples(town)
-        beside = cKDTree(samples.centre).query(walks.centre)[1]
+        away, beside = (np.asarray(row) for row in cKDTree(samples.centre).query(walks.centre))
+        # level from the road on, and as far behind
+        verge = np.clip(away - samples.half_width[beside], 0.0, _WIDEST_VERGE)
+        walks = replace(walks, half_width=np.maximum(walks.half_width, verge))
         self._walks = _Lanes(walks, (level[beside] == 0) & (np.abs(z[beside] - walks.centre[:, 2]) < _OWN_ROAD))
         self._apart = {k: _Lanes(samples, level == k) for k in np.unique(level[level != 0]).tolist()}
         # the land below raised roads rises no more steeply than roads do, and it is as it was below bridges

@@ -149,8 +149,10 @@ def add_bridge(
 
 
 def deck_area(town: Town, sheet: Sheet, further: float = 0.0) -> BaseGeometry:
-    """Returns the area of the bridges of one level, longer at both ends [m]."""
-    return footprint(town, [_longer(town, part, further) for part in sheet.stretches], _DECK_MARGIN)
+    """Returns the area of the bridges of one level with their pavements, longer at both ends [m]."""
+    lanes = footprint(town, [_longer(town, part, further) for part in sheet.stretches], _DECK_MARGIN)
+    edges = [part.points for part in sheet.polygons if part.material is Material.BRIDGE_EDGE]
+    return tidy(only_areas(shapely.union_all([lanes, *polygons_of(edges)])))
 
 
 def _longer(town: Town, part: LevelStretch, more: float) -> LevelStretch:

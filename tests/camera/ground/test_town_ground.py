@@ -154,3 +154,14 @@ def test_ground_is_the_same_when_built_again() -> None:
         assert getattr(first.mesh, name).tobytes() == getattr(second.mesh, name).tobytes(), name
     for name in GroundArrays._fields:
         assert getattr(first.arrays, name).tobytes() == getattr(second.arrays, name).tobytes(), name
+
+
+def test_people_on_bridges_walk_on_the_deck() -> None:
+    ground, town = ground_of("Town05"), town_of("Town05")
+    points = np.concatenate([walk.points for walk in town.sidewalks])
+    above = points[points[:, 2] > 5.0]
+    heights = np.stack([ground.height_at(above[:, :2], sheet) for sheet in range(len(ground.arrays.origins))])
+    with np.errstate(invalid="ignore"):
+        away = np.nanmin(np.abs(heights - above[:, 2]), axis=0)
+    assert len(above) > 100
+    assert (away < KERB_HEIGHT + 0.1).mean() > 0.97
