@@ -16,17 +16,20 @@ import hashlib
 import json
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import environment_pages
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from dorothie_gym.bench.report import Report, draw, world_report
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
@@ -38,7 +41,11 @@ from dorothie_gym.maps import fold_of, load_town
 from dorothie_gym.ontology import AGENT_ROLES, ActionValue, LandmarkName, WeatherParameter
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation import NavigationAction
+from dorothie_gym.recording import Session
+from dorothie_gym.render_view import RenderView
 from dorothie_gym.rendering import town_picture
+from dorothie_gym.rendering.playback import Playback
+from dorothie_gym.rendering.session_views import SessionRenderer
 from dorothie_gym.rollout import play_session
 from dorothie_gym.rollout.closed_loop.leaderboard import CHART_METRICS, PART_TITLES, ChartRow, draw_rows
 from dorothie_gym.sim.config import WorldConfig
@@ -81,6 +88,44 @@ def draw_midtown(path: Path) -> None:
     """Draws the map that `dorothie-gym towns midtown --picture` draws, in a size for a page."""
     town_picture(load_town("midtown"), path, size=(1400, 1372), fold=fold_of("midtown"))
     _reduce(path)
+
+
+WINDSCREEN_TOWN, WINDSCREEN_SEED, WINDSCREEN_SECONDS = "midtown", 7, 52.0
+WINDSCREEN_FRAME = 684
+WINDSCREEN_FILM = range(1215, 1545, 3)
+"""Frames of the film; ten in a second."""
+
+
+def windscreen_frames(frames: Sequence[int]) -> Iterator[NDArray[np.uint8]]:
+    """Yields what `dorothie-gym film` shows of a session with dense traffic at some frames."""
+    config = EnvConfig(max_seconds=WINDSCREEN_SECONDS, world=WorldConfig(vehicles=70, pedestrians=90))
+    engine = SessionEngine(WINDSCREEN_TOWN, config=config)
+    policies = {role: make_policy("scripted", role, engine.limits) for role in AGENT_ROLES}
+    with TemporaryDirectory() as folder:
+        play_session(engine, policies, seed=WINDSCREEN_SEED, folder=Path(folder) / "session")
+        session = Session.load(Path(folder) / "session")
+    renderer = SessionRenderer(RenderView.BOTH)
+    width, height = renderer.windscreen or (0, 0)
+    playback = Playback(session, engine.town)
+    pictures = RecordedPictures(session, engine.town, CameraConfig(width=width, height=height))
+    for frame in frames:
+        yield renderer.draw(playback.scene(frame), pictures.picture(frame).rgb)
+
+
+def draw_windscreen(path: Path) -> None:
+    """Draws the first picture of README.md: windscreen, talk and map."""
+    (frame,) = windscreen_frames([WINDSCREEN_FRAME])
+    Image.fromarray(frame).save(path, optimize=True)
+
+
+def draw_film(path: Path) -> None:
+    """Draws the film of README.md, smaller than the pictures."""
+    size = 800, 450
+    shots = [
+        Image.fromarray(frame).resize(size, Image.Resampling.LANCZOS) for frame in windscreen_frames(WINDSCREEN_FILM)
+    ]
+    shots[0].save(path.with_suffix(".webp"), save_all=True, append_images=shots[1:], duration=100, loop=0, quality=60,
+                  method=6)  # fmt: skip
 
 
 CAMERA_TOWN, CAMERA_SEED, CAMERA_LANDMARK = "midtown", 3, LandmarkName.IKEA
@@ -222,6 +267,8 @@ def _reduce(path: Path) -> None:
 PICTURES: Final[Mapping[str, Callable[[Path], None]]] = {
     "session": draw_first_session,
     "midtown": draw_midtown,
+    "windscreen": draw_windscreen,
+    "film": draw_film,
     "camera": draw_camera,
     "dashboard": draw_dashboard,
     "bench_world": draw_benchmark,

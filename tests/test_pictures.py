@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 DOCS = Path(__file__).parents[1] / "docs"
-DRAWN = ("session", "midtown", "camera", "dashboard")
+DRAWN = ("session", "midtown", "windscreen", "camera", "dashboard")
 """Pictures that are drawn again: the versions of pygame and Pillow draw nearly the same pixels."""
 
 DIFFERENT = 0.01
@@ -66,4 +66,16 @@ def test_charts_show_the_recorded_figures(pictures: ModuleType) -> None:
 
 def test_every_picture_of_the_pages_is_drawn_by_a_command(pictures: ModuleType) -> None:
     from_runs = {"navigation_curve", "selfplay_curve"}  # docs/pages.py curves, train-rl
-    assert {path.stem for path in DOCS.glob("*.png")} == {*pictures.PICTURES, "corpus", *from_runs}
+    drawn = {path.stem for kind in ("png", "webp") for path in DOCS.glob(f"*.{kind}")}
+    assert drawn == {*pictures.PICTURES, "corpus", *from_runs}
+
+
+def test_film_of_the_first_page_is_small_and_moves() -> None:
+    path = DOCS / "film.webp"
+    assert path.stat().st_size < 2_000_000
+    with Image.open(path) as film:
+        frames = int(getattr(film, "n_frames", 1))
+        assert frames > 60 and film.width * 9 == film.height * 16
+        first = np.asarray(film.convert("RGB"), dtype=np.int16)
+        film.seek(frames - 1)
+        assert (np.abs(first - np.asarray(film.convert("RGB"))).max(axis=2) > 60).mean() > 0.05
