@@ -17,6 +17,7 @@ BENCHMARKS = {
     "vector": ("vector",),
     "rl": ("rl",),
     "rl_medium_traffic": ("rl", "--town", "midtown", "--traffic", "medium", "--exceptions", "2"),
+    "rl_camera": ("rl", "--algorithm", "maskable_ppo", "--observation", "camera"),
     "camera": ("camera", "--cold"),
     "import": ("import",),
 }

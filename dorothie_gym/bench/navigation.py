@@ -16,6 +16,7 @@ from dorothie_gym.bench.metadrive import MetaDriveReference, metadrive_reference
 from dorothie_gym.bench.timing import Figures, Progress, ignore_progress, rounded, wall_seconds
 from dorothie_gym.envs.driving_arrays import row_of
 from dorothie_gym.envs.driving_batch import DrivingBatch
+from dorothie_gym.envs.driving_cameras import DrivingCameras
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 from dorothie_gym.sim.batch.worlds import VectorWorld
@@ -33,12 +34,16 @@ KERNEL_DECISIONS: Final = 8
 PARTS: Final = ("physics", "actions", "guidance", "other")
 """Parts of a step: physics; actions and paths; instructor, rewards, observations and masks; resets and the rest."""
 
+PICTURES: Final = "pictures"
+"""Further part of a step of environments whose observations are pictures."""
+
 
 def measure(
     town: str = "brookside",
     *,
     traffic: str = "light",
     exceptions: float = 0.0,
+    observation: str = "vector",
     environments: int = 256,
     threads: int | None = None,
     decisions: int = 60,
@@ -52,6 +57,7 @@ def measure(
         town: name or file of a town.
         traffic: traffic density.
         exceptions: average number of exceptions in a session.
+        observation: "vector" or "camera".
         environments: number of environments in the batch.
         threads: number of threads; None for one per processor.
         decisions: decisions of the batch in a repetition.
@@ -68,14 +74,15 @@ def measure(
     progress("environments", 0.0)
     rng = np.random.default_rng(seed)
     envs = NavigationVectorEnv(
-        environments, town, traffic=traffic, exceptions=exceptions, threads=threads,
+        environments, town, traffic=traffic, exceptions=exceptions, observation=observation, threads=threads,
         autoreset_mode=AutoresetMode.SAME_STEP,
     )  # fmt: skip
-    single = NavigationEnv(town, traffic=traffic, exceptions=exceptions)
+    single = NavigationEnv(town, traffic=traffic, exceptions=exceptions, observation=observation)
     envs.reset(seed=seed)
     single.reset(seed=seed)
     references: dict[str, StockIntersection | MetaDriveReference] = {"stock": StockIntersection(seed)}
-    metadrive = metadrive_reference(seed)
+    camera = envs.config.camera
+    metadrive = metadrive_reference(seed, None if camera is None else (camera.width, camera.height))
     if metadrive is not None:
         references["metadrive"] = metadrive
     kernel = _Kernel(envs)
@@ -90,7 +97,7 @@ def measure(
         _play_single(single, rng, WARM_UP_DECISIONS)
         kernel.step()
     rates: dict[str, list[float]] = {name: [] for name in works}
-    spent = {"act_share": 0.0, "guide_share": 0.0, "total": 0.0}
+    spent = {"act_share": 0.0, "guide_share": 0.0, PICTURES: 0.0, "total": 0.0}
     for turn in range(repeats):
         for number, (name, work) in enumerate(works.items()):
             progress(name, (turn + number / len(works)) / repeats)
@@ -104,17 +111,21 @@ def measure(
     medians = {name: statistics.median(values) for name, values in rates.items()}
     acting, guiding = spent["act_share"] / spent["total"], spent["guide_share"] / spent["total"]
     physics = min(medians["batch"] / medians["kernel"], acting)
-    shares = (physics, acting - physics, guiding, 1.0 - acting - guiding)
+    drawing = spent[PICTURES] / spent["total"]
+    shares = dict(zip(PARTS, (physics, acting - physics, guiding, 1.0 - acting - guiding - drawing), strict=True))
+    if camera is not None:
+        shares[PICTURES] = drawing
     return {
         "town": town,
         "traffic": traffic,
         "exceptions": exceptions,
+        "observation": observation,
         "batch": environments,
         "threads": envs.threads,
         "metadrive_steps_per_second": None,
         **{f"{name}_steps_per_second": rounded(rate) for name, rate in medians.items()},
         "of_kernel": round(medians["batch"] / medians["kernel"], 3),
-        "step_shares": {name: round(value, 3) for name, value in zip(PARTS, shares, strict=True)},
+        "step_shares": {name: round(value, 3) for name, value in shares.items()},
         "bytes_per_environment": envs.nbytes // environments,
     }
 
@@ -174,8 +185,9 @@ def _play_reference(reference: StockIntersection | MetaDriveReference, steps: in
 
 @contextmanager
 def _timed_shares(seconds: dict[str, float]) -> Iterator[None]:
-    """Adds the time of the compiled halves of decisions to `seconds`, by the name of the function."""
-    share: Any = DrivingBatch.share  # replaced for the time of the measurement
+    """Adds the time of the compiled halves of decisions to `seconds`, by the name of the function, and of pictures."""
+    share: Any = DrivingBatch.share  # both are replaced for the time of the measurement
+    draw: Any = DrivingCameras.draw
 
     def timed(batch: DrivingBatch, work: Callable[..., None], *arguments: object) -> object:
         start = time.perf_counter()
@@ -183,8 +195,15 @@ def _timed_shares(seconds: dict[str, float]) -> Iterator[None]:
         seconds[work.__name__] = seconds.get(work.__name__, 0.0) + time.perf_counter() - start
         return events
 
+    def timed_draw(cameras: DrivingCameras, *arguments: object) -> None:
+        start = time.perf_counter()
+        draw(cameras, *arguments)
+        seconds[PICTURES] = seconds.get(PICTURES, 0.0) + time.perf_counter() - start
+
     setattr(DrivingBatch, "share", timed)  # noqa: B010  # mypy knows methods as fixed
+    setattr(DrivingCameras, "draw", timed_draw)  # noqa: B010  # see above
     try:
         yield
     finally:
         setattr(DrivingBatch, "share", share)  # noqa: B010  # see above
+        setattr(DrivingCameras, "draw", draw)  # noqa: B010  # see above

@@ -198,6 +198,8 @@ def rl_report(figures: Figures) -> Report:
     ]
     notes = [f"training: {shares}"]
     setting = f"{_count(figures['environments'], 'environment')}, network {figures['network']}"
+    if figures["observation"] != "vector":
+        setting += ", pictures"
     if figures["batch_steps_per_second"] is not None:
         rows = [
             Measurement(label="its physics alone", value=figures["kernel_steps_per_second"]),

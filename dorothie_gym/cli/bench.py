@@ -192,12 +192,19 @@ def _outputs(text: str) -> tuple[CameraOutput, ...]:
 def rl(
     env: Annotated[str, typer.Option(metavar="ID", help="Id of the environment.")] = "dorothie_gym/Navigation-v0",
     algorithm: Annotated[str, typer.Option(help="ppo, maskable_ppo or a2c.")] = "ppo",
-    environments: Annotated[int, typer.Option(min=1, max=4096, help="Number of parallel environments.")] = 256,
+    observation: Annotated[
+        str, typer.Option(metavar="KIND", help="What a driver of the navigation environments observes: vector, camera.")
+    ] = "vector",
+    environments: Annotated[
+        int | None, typer.Option(min=1, max=4096, help="Parallel environments; default 256, with pictures 16.")
+    ] = None,
     workers: Annotated[
         int | None,
         typer.Option(min=0, max=256, help="Processes that step them; default none for a batch, else one per core."),
     ] = None,
-    steps: Annotated[int, typer.Option(min=256, help="Steps of the training.")] = 65_536,
+    steps: Annotated[
+        int | None, typer.Option(min=256, help="Steps of the training; default 65,536, with pictures 4,096.")
+    ] = None,
     town: Town = "brookside",
     traffic: Annotated[str, typer.Option(help="Traffic of the town: none, light, medium or heavy.")] = "light",
     exceptions: Annotated[float, typer.Option(min=0.0, max=4.0, help="Average number of exceptions.")] = 0.0,
@@ -216,8 +223,8 @@ def rl(
 
         try:
             return measure(
-                env, algorithm=algorithm, environments=environments, workers=workers, steps=steps, town=town,
-                traffic=traffic, exceptions=exceptions, seed=seed, progress=progress,
+                env, algorithm=algorithm, observation=observation, environments=environments, workers=workers,
+                steps=steps, town=town, traffic=traffic, exceptions=exceptions, seed=seed, progress=progress,
             )  # fmt: skip
         except (SettingsError, ValueError) as error:
             fail(str(error))

@@ -60,6 +60,11 @@ class DrivingBatch(DrivingRows):
         """
         return self.vectors if self._cameras is None else self._cameras.pictures
 
+    @property
+    def nbytes(self) -> int:
+        """Memory of the arrays of all environments, and of their cameras [bytes]."""
+        return super().nbytes + (0 if self._cameras is None else self._cameras.nbytes)
+
     def _draw(self, numbers: Sequence[int]) -> None:
         """Draws the pictures of some environments, if they observe any."""
         if self._cameras is not None:

@@ -54,6 +54,11 @@ class DrivingCameras:
         self._cameras: list[tuple[DrivingFace, SessionCamera] | None] = [None] * count
         self._compiled = False
 
+    @property
+    def nbytes(self) -> int:
+        """Memory of the cameras and their pictures [bytes]."""
+        return self.pictures.nbytes + sum(known[1].camera.nbytes for known in self._cameras if known is not None)
+
     def draw(self, batch: DrivingRows, numbers: Sequence[int], pool: ThreadPool) -> None:
         """Draws the pictures of some environments on the threads of a pool."""
         jobs = [(number, self._camera(batch, number)) for number in numbers]

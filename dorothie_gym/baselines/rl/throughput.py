@@ -11,7 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from dorothie_gym.baselines.rl.checkpoint import make_model
 from dorothie_gym.baselines.rl.environments import has_batch, make_training_env
-from dorothie_gym.baselines.rl.settings import NAVIGATION, ON_POLICY, TrainingSettings, tuned_settings
+from dorothie_gym.baselines.rl.settings import CAMERA, NAVIGATION, ON_POLICY, TrainingSettings, tuned_settings
 from dorothie_gym.bench import navigation
 from dorothie_gym.bench.timing import Figures, Progress, ignore_progress, machine, rounded
 from dorothie_gym.errors import SettingsError
@@ -31,9 +31,10 @@ def measure(
     env: str = NAVIGATION,
     *,
     algorithm: str = "ppo",
-    environments: int = 256,
+    observation: str = "vector",
+    environments: int | None = None,
     workers: int | None = None,
-    steps: int = 65_536,
+    steps: int | None = None,
     town: str = "brookside",
     traffic: str = "light",
     exceptions: float = 0.0,
@@ -45,10 +46,12 @@ def measure(
     Args:
         env: id of the environment.
         algorithm: one that learns from rollouts: ppo, maskable_ppo or a2c.
-        environments: number of parallel environments.
+        observation: what a driver of the navigation environments observes: "vector" or "camera".
+        environments: number of parallel environments; None for 256, or 16 with pictures.
         workers: number of processes that step them in training; None for none where they are a batch, else one per
             processor.
-        steps: number of steps of the training, after a first rollout that is not counted.
+        steps: number of steps of the training, after a first rollout that is not counted; None for 65,536, or 4,096
+            with pictures.
         town: town of the navigation environments.
         traffic: their traffic density.
         exceptions: their average number of exceptions in a session.
@@ -60,7 +63,11 @@ def measure(
     """
     if algorithm not in ON_POLICY:
         raise SettingsError(f"algorithm is {algorithm!r}; it must be one of {', '.join(ON_POLICY)}")
-    world = {"town": town, "traffic": traffic, "exceptions": exceptions} if env == NAVIGATION else {}
+    world: dict[str, object] = {"town": town, "traffic": traffic, "exceptions": exceptions} if env == NAVIGATION else {}
+    if observation != "vector":
+        world["observation"] = observation
+    environments = environments or (16 if observation == CAMERA else 256)
+    steps = steps or (4096 if observation == CAMERA else 65_536)
     if workers is None:
         workers = 0 if has_batch(env) else min(available_processors(), environments)
     settings = tuned_settings(
@@ -69,7 +76,7 @@ def measure(
     alone: Figures = dict.fromkeys(ALONE)
     if env == NAVIGATION:
         alone = navigation.measure(
-            town, traffic=traffic, exceptions=exceptions, environments=environments, seed=seed,
+            town, traffic=traffic, exceptions=exceptions, observation=observation, environments=environments, seed=seed,
             progress=lambda part, share: progress(part, 0.5 * share),
         )  # fmt: skip
     progress("training", 0.5)
@@ -81,6 +88,7 @@ def measure(
         "algorithm": algorithm,
         "environments": environments,
         "workers": workers,
+        "observation": observation,
         "network": list(settings.network),
         "steps": steps,
         "end_to_end_steps_per_second": rounded(steps / total),

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines.rl.throughput import SHARES, measure
+from dorothie_gym.bench import navigation
 from dorothie_gym.bench.report import rl_report
 from dorothie_gym.cli.app import app
 from dorothie_gym.errors import SettingsError
@@ -26,6 +27,19 @@ def test_speeds_and_shares_of_a_training_on_a_batch() -> None:
     assert "environment steps per second" in report.headline
     assert len(report.rows) == 5 + (figures["metadrive_steps_per_second"] is not None)
     json.dumps(figures, allow_nan=False)
+
+
+def test_pictures_are_a_part_of_the_steps() -> None:
+    figures = navigation.measure(observation="camera", environments=2, decisions=4, repeats=1)
+    assert list(figures["step_shares"]) == ["physics", "actions", "guidance", "other", "pictures"]
+    assert figures["step_shares"]["pictures"] > 0.2
+    assert figures["bytes_per_environment"] > 1e6
+
+
+def test_unknown_observation_is_refused() -> None:
+    result = CliRunner().invoke(app, ["bench", "rl", "--observation", "radar"])
+    assert result.exit_code == 2
+    assert "observation is 'radar'; it must be one of vector, camera" in " ".join(result.stderr.split())
 
 
 def test_other_environments_are_only_trained_on() -> None:
