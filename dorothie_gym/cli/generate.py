@@ -48,7 +48,7 @@ def generate(
 
         config = env_config(max_seconds, word_errors, perception)
         try:
-            compile_first()
+            compile_first(pictures=perception is PerceptionModel.CAMERA)
             begun = time.perf_counter()
             with session_progress(quiet=as_json) as on_session:
                 made = generate_corpus(

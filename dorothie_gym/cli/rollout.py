@@ -98,7 +98,7 @@ def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | 
 
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out
     try:
-        compile_first()
+        compile_first(pictures=settings.config.perception is PerceptionModel.CAMERA)
         with session_progress(quiet=quiet) as on_session:
             result = roll_out(settings, folder, workers=workers, ray=ray, on_session=on_session)
     except KeyboardInterrupt:

@@ -157,7 +157,8 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
     from dorothie_gym.rollout import play_session
 
     cast = find_cast(*plan.players)
-    compile_first(pictures=plan.video is not None and plan.view is not RenderView.MAP)
+    filmed = plan.video is not None and plan.view is not RenderView.MAP
+    compile_first(pictures=filmed or plan.perception is PerceptionModel.CAMERA)
     config = env_config(plan.max_seconds, plan.word_errors, plan.perception)
     engine = SessionEngine(plan.town, plan.storyboard, config=config)
     engine.reset(seed=plan.seed)

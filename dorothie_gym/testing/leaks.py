@@ -47,8 +47,8 @@ def check_observations_do_not_leak(env: ParallelSession, *, seed: int = 0, decis
     participant's observation must differ, or the check would prove nothing.
 
     Pictures may show a hidden landmark. With a camera, the pictures of the Co-Wizard and of the participant must be
-    equal at every decision at which no hidden landmark is in view in either session. With perception by the camera,
-    what they observe of their surroundings, too, must be equal until the first such decision.
+    equal at every decision at which no hidden landmark is in view in either session. With perception by the camera, all
+    is compared until the first decision at which one is in view: the Co-Wizard, and the car, may know it from then on.
 
     Args:
         env: a `DuoWizardEnv`, or a wrapper around one with the same parallel API and
@@ -68,10 +68,17 @@ Play = Callable[..., Iterator[Decision]]
 
 
 class Compared(NamedTuple):
-    """Numbers of decisions of a pair of sessions: all, and those at which a hidden landmark was in view in either."""
+    """Numbers of decisions of a pair of sessions.
+
+    Attributes:
+        decisions: played.
+        in_view: at which a hidden landmark was in view in either session.
+        pictures: at which pictures, if there are any, were compared.
+    """
 
     decisions: int
     in_view: int
+    pictures: int
 
 
 def check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decisions: int) -> Compared:
@@ -94,16 +101,17 @@ def check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decision
     by_camera = env.unwrapped.config.perception is PerceptionModel.CAMERA
     views = list(map(bool.__or__, in_view, in_view_again))
     for k, (decision, (observations, infos)) in enumerate(zip(played, again, strict=False)):
+        if by_camera and any(views[: k + 1]):
+            break  # what the Co-Wizard has seen may change where the car stops
         if not views[k]:
             _check_pictures(where, k, decision.observations, observations)
-        if not by_camera or not any(views[: k + 1]):
-            one, other = (_without_pictures(part) for part in (decision.observations, observations))
-            _check_equal(where, k, (one, decision.infos), (other, infos))
-            field = first_unequal(one[PARTICIPANT]["objects"], other[PARTICIPANT]["objects"], "objects")
-            assert field is None, f"{where}, decision {k}: the participant's observation {field} differs"
+        one, other = (_without_pictures(part) for part in (decision.observations, observations))
+        _check_equal(where, k, (one, decision.infos), (other, infos))
+        field = first_unequal(one[PARTICIPANT]["objects"], other[PARTICIPANT]["objects"], "objects")
+        assert field is None, f"{where}, decision {k}: the participant's observation {field} differs"
         seen, moved_seen = (part[PARTICIPANT]["landmarks"] for part in (decision.observations, observations))
         assert not np.array_equal(seen, moved_seen), f"{where}, decision {k}: the participant must see the difference"
-    return Compared(len(views), sum(views))
+    return Compared(len(views), sum(views), views.index(True) if by_camera and any(views) else views.count(False))
 
 
 # --- Pictures ---------------------------------------------------------------------------------------------------------
@@ -126,16 +134,20 @@ def _with_views(env: ParallelSession, playing: Iterator[_Played]) -> tuple[list[
 
 
 def _cameras(config: EnvConfig) -> list[CameraConfig]:
-    """Returns cameras whose pixels are the samples of the pictures that the roles see, or see by."""
+    """Returns cameras whose pixels are the samples of the pictures that the roles see, or see by.
+
+    RGB has several samples in a pixel; labels have one, in the middle, which is none of these.
+    """
     cameras = [] if config.camera is None else [config.camera]
     if config.perception is PerceptionModel.CAMERA:
         cameras.append(PERCEPTION_CAMERA)
     return [
         dataclasses.replace(
-            camera, width=camera.samples * camera.width, height=camera.samples * camera.height, antialiasing=False,
+            camera, width=samples * camera.width, height=samples * camera.height, antialiasing=False,
             outputs=(CameraOutput.INSTANCE,),
         )
         for camera in cameras
+        for samples in {1, camera.samples}
     ]  # fmt: skip
 
 

@@ -43,22 +43,23 @@ def test_pictures_and_what_is_seen_by_them_do_not_leak() -> None:
     ids=["brookside", "midtown", "symbolic"],
 )
 def test_hidden_landmarks_change_no_picture_while_out_of_view(town: str, config: EnvConfig) -> None:
-    env, decisions, in_view = DuoWizardEnv(town, config=config), 0, 0
+    env, pictures = DuoWizardEnv(town, config=config), 0
     for seed in [seed for seed in range(30) if has_hidden(town, seed)][:2]:
-        compared = check_hidden_landmarks(env, play_scripted, seed, 30)
-        decisions, in_view = decisions + compared.decisions, in_view + compared.in_view
-    assert decisions - in_view > 20
+        pictures += check_hidden_landmarks(env, play_scripted, seed, 30).pictures
+    assert pictures > 10
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("town", [*UNSEEN_TOWNS, *SEEN_TOWNS])
-def test_hidden_landmarks_change_no_picture_in_many_sessions(town: str) -> None:
-    env = DuoWizardEnv(town, config=CONFIG)
+@pytest.mark.parametrize("config", [CONFIG, SYMBOLIC], ids=["camera", "symbolic"])
+def test_hidden_landmarks_change_no_picture_in_many_sessions(town: str, config: EnvConfig) -> None:
+    env = DuoWizardEnv(town, config=config)
     compared = [
-        check_hidden_landmarks(env, play_scripted, seed, 300)
-        for seed in [seed for seed in range(500, 600) if has_hidden(town, seed)][:7]
+        check_hidden_landmarks(env, play_scripted, seed, 200)
+        for seed in [seed for seed in range(500, 600) if has_hidden(town, seed)][:6]
     ]
-    assert 0 < sum(pair.in_view for pair in compared) < sum(pair.decisions for pair in compared) / 2
+    assert sum(pair.in_view for pair in compared) > 0
+    assert sum(pair.pictures for pair in compared) > 50
 
 
 # --- Leaks that are planted are found ---------------------------------------------------------------------------------
@@ -148,5 +149,6 @@ def test_moved_landmarks_come_into_view_sometimes() -> None:
     env = DuoWizardEnv("brookside", config=SYMBOLIC)
     compared = check_hidden_landmarks(env, play_scripted, 8, 60)
     assert 0 < compared.in_view < compared.decisions
+    assert compared.pictures == compared.decisions - compared.in_view
     env.reset(seed=8)
     assert np.any([landmark.hidden for landmark in env.scenario.storyboard.landmarks])
