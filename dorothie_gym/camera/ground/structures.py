@@ -28,6 +28,7 @@ COVER = 3.2
 
 _CELL = 8.0  # [m]
 _OVERLAP = 0.05  # [m] by which the floor of a tunnel continues in the open
+_UNDER = 0.3  # [m] of the walls of tunnels below their floors
 _LID = 0.15  # [m] below the ground over tunnels
 _SUNK = 0.005  # [m] of the floor there below the road
 _MOUTH = 16.0  # [m] of floor beyond the covered lanes, at most: up to the wall over the mouth
@@ -118,8 +119,12 @@ def add_tunnel(
     shapely.prepare(inside)
     middle = sides[..., :2].mean(axis=1)
     sides = sides[shapely.contains_xy(inside, middle[:, 0], middle[:, 1])]
+    way = sides[:, 1] - sides[:, 0]
+    way *= 2.0 * _OVERLAP / np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-9)[:, None]
+    sides = np.stack((sides[:, 0] - way, sides[:, 1] + way), axis=1)  # up to the walls over the mouths
     high = sides.copy()
     high[..., 2] += _headroom(field, high)
+    sides[..., 2] -= _UNDER
     _add_quads(builder, sides[:, ::-1], high[:, ::-1], _TILES, ObjectClass.WALL)
     high[..., 2] += ROOF - _LID / 2.0  # up to the lid; in the ground, where only the sun sees it
     _add_quads(builder, sides, high, _TILES, ObjectClass.WALL)
