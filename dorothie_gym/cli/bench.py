@@ -157,7 +157,7 @@ def camera(
             seconds=seconds, cold=cold, seed=seed, repeats=repeats, progress=progress,
         )  # fmt: skip
 
-    _bench("camera", measured, picture, as_json)
+    _bench("camera", measured, picture, as_json, pictures=True)
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -229,7 +229,7 @@ def rl(
         except (SettingsError, ValueError) as error:
             fail(str(error))
 
-    _bench("rl", measured, picture, as_json)
+    _bench("rl", measured, picture, as_json, pictures=observation == "camera")
 
 
 @bench.command("import", cls=BenchCommand)
@@ -277,8 +277,8 @@ def train(
     _bench("train", measured, picture, as_json)
 
 
-def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> None:
-    """Runs a measurement and shows its results."""
+def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool, *, pictures: bool = False) -> None:
+    """Runs a measurement, which may need the first-person camera, and shows its results."""
     if picture == Path(OWN_NAME):
         picture = Path(f"bench_{name}.png")
     if picture is not None:
@@ -286,7 +286,7 @@ def _bench(name: str, measure: Measure, picture: Path | None, as_json: bool) -> 
     try:
         with reporting_errors():
             if name in SIMULATING:
-                compile_first(everything=name == "vector", batches=name == "rl")
+                compile_first(everything=name == "vector", batches=name == "rl", pictures=pictures)
             with _progress() as progress:
                 figures = measure(progress)
     except KeyboardInterrupt:

@@ -188,7 +188,7 @@ def _train(
     if changes["workers"] is None and ray is None and not has_batch(settings.env):
         settings = _with_default_workers(settings)
     if ray is None and settings.env.startswith("dorothie_gym/"):
-        compile_first(batches=has_batch(settings.env) and settings.workers == 0)
+        compile_first(batches=has_batch(settings.env) and settings.workers == 0, pictures=settings.sees)
     with _progress(settings.steps, out, _line, quiet=as_json) as (on_progress, on_stage):
         result = Training(settings, out, on_progress, ray, on_stage, device or "cpu").run()
     if as_json:

@@ -19,7 +19,7 @@ import torch
 from typer.testing import CliRunner
 
 from dorothie_gym.baselines.rl import Training, TrainingSettings, load_model, tuned_settings
-from dorothie_gym.baselines.rl.picture_features import PictureFeatures
+from dorothie_gym.baselines.rl.picture_features import STREET, PictureFeatures
 from dorothie_gym.cli.app import app
 from dorothie_gym.errors import PolicyLoadError, SettingsError
 from dorothie_gym.ontology import Role
@@ -63,12 +63,16 @@ def test_resumed_run_ends_like_an_undisturbed_one(tmp_path: Path) -> None:
     assert all(torch.equal(one[name], other[name]) for name in one)
 
 
-def test_brightness_moves_the_features_and_the_width_is_as_asked() -> None:
+def test_street_and_dashboard_move_features_and_the_width_is_as_asked() -> None:
     space = gym.spaces.Box(0, 255, (3, 84, 84), np.uint8)
     features = PictureFeatures(space, (4, 6, 8))
-    dark, bright = features(torch.zeros(1, 3, 84, 84)), features(torch.ones(1, 3, 84, 84))
-    assert dark.shape == (1, features.features_dim)
-    assert not torch.equal(dark, bright)
+    dark, sky, lamp = torch.zeros(3, 1, 3, 84, 84)
+    sky[..., :40, :], lamp[..., 80, :] = 1.0, 1.0
+    seen = [features(picture)[0] for picture in (dark, sky, lamp)]
+    assert seen[0].shape == (features.features_dim,)
+    changed = [(each != seen[0]).nonzero().flatten() for each in seen[1:]]
+    assert len(changed[0]) and changed[0].max() < STREET  # the dashboard is dark in both
+    assert len(changed[1]) and changed[1].max() >= STREET
     assert [layer.out_channels for layer in features.modules() if isinstance(layer, torch.nn.Conv2d)] == [4, 6, 8]
 
 
