@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_radians
@@ -189,7 +190,11 @@ class RecordedPictures:
         heights, odometers = np.zeros(len(rows)), np.zeros(len(rows))
         x, y, heading = (np.ascontiguousarray(rows[name]) for name in ("x", "y", "heading"))
         driven = _moved_before(self._tracks) * np.abs(rows["speed"])
-        _follow(town_arrays(network_of(self._town)), x, y, heading, tracks.before, driven, heights, odometers)
+        town = town_arrays(network_of(self._town))
+        _follow(town, x, y, heading, tracks.before, driven, heights, odometers)
+        walking = rows["kind"] == int(ActorKind.PEDESTRIAN)
+        if not town.flat and walking.any():
+            heights[walking] = _footway_heights(town, x[walking], y[walking])
         return heights, odometers
 
     def _find_car_heights(self) -> Array:
@@ -251,6 +256,26 @@ def _moved_before(tracks: ActorTracks) -> Array:
     frames[first] = tracks.table.frames[0]
     frames[first][walking] -= -np.arange(int(walking.sum())) % PACE
     return np.asarray(np.maximum(frames, 0.0) / FRAME_RATE)
+
+
+def _footway_heights(town: TownArrays, x: Array, y: Array) -> Array:
+    """Returns the heights (n,) of the closest footway or crosswalk to places [m]."""
+    walks, points = plain(town.walks), town.walk_points
+    inner = np.concatenate([np.arange(first, last) for first, last in zip(walks["first"], walks["last"], strict=True)])
+    across = plain(town.crossings)
+    begin = np.concatenate((points[inner][:, [0, 1, 4]], _ends(across, 0)))  # x, y, height
+    end = np.concatenate((points[inner + 1][:, [0, 1, 4]], _ends(across, 1)))
+    lines = np.asarray(shapely.linestrings(np.stack((begin[:, :2], end[:, :2]), axis=1)), dtype=np.object_)
+    places = shapely.points(x, y)
+    closest = shapely.STRtree(lines).nearest(places)
+    share = shapely.line_locate_point(lines[closest], places, normalized=True)
+    share = np.nan_to_num(share)  # of lines without a length
+    return np.asarray(begin[closest, 2] + share * (end[closest, 2] - begin[closest, 2]))
+
+
+def _ends(crossings: NDArray[np.void], end: int) -> Array:
+    """Returns x, y and height (n, 3) of one end of crosswalks [m]."""
+    return np.column_stack((crossings["x"][:, end], crossings["y"][:, end], crossings["height"]))
 
 
 @compiled

@@ -17,13 +17,14 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import Town, load_town
-from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
+from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.recording import EventType, Session, Surroundings, read_session
 from dorothie_gym.recording.sdn import write_sdn
 from dorothie_gym.rollout import play_session
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, ObservationMapping
+from tests.maps.opendrive_text import shared_map
 
 CONFIG = CameraConfig(width=120, height=80, outputs=tuple(CameraOutput))
 FRAMES = 15
@@ -185,6 +186,33 @@ def test_a_session_of_sdns_layout_shows_its_surroundings(played: Played, tmp_pat
         assert (one.instance == other.instance).mean() > 0.98
         compared += bool(keys(one))
     assert compared > 5
+
+
+@pytest.mark.slow
+def test_bodies_on_hills_and_bridges_are_as_high_as_they_were(tmp_path: Path) -> None:
+    """Also with a road above or below."""
+    map_ = load_town(shared_map("Town05"))
+    engine = SessionEngine(map_, config=EnvConfig(max_seconds=5.0, world=WorldConfig(vehicles=100, pedestrians=100)))
+    live: dict[int, dict[int, float]] = {}
+
+    def look(engine: SessionEngine) -> None:
+        world = engine.session.world
+        driving = {int(body.key): float(body.height) for body in world.actors.vehicles}
+        walking = {int(body.key): float(body.height) for body in world.actors.pedestrians}
+        live[world.frame] = {**driving, **walking, 0: float(world.car.height)}
+
+    policies = {role: make_policy("silent", role, engine.limits) for role in AGENT_ROLES}
+    play_session(engine, policies, seed=3, folder=tmp_path / "s", on_step=look)
+    again = RecordedPictures(Session.load(tmp_path / "s"), map_, CONFIG)
+    gaps: list[float] = []
+    for frame in (15, 60, 150):
+        bodies = again.bodies(frame)
+        assert again.pose(frame).z - CONFIG.mount.up == pytest.approx(live[frame][0], abs=0.05)
+        for body in bodies.vehicles:
+            assert float(body.height) == pytest.approx(live[frame][int(body.key)], abs=1e-9)
+        gaps += [abs(float(body.height) - live[frame][int(body.key)]) for body in bodies.pedestrians]
+    assert max(live[150].values()) > 5.0
+    assert np.mean(np.array(gaps) < 0.1) > 0.98
 
 
 def test_keys_that_are_no_instances_are_numbered(played: Played, town: Town) -> None:
