@@ -27,6 +27,7 @@ from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology import Role
+from dorothie_gym.render_view import checked_view
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.vector_infos import Infos, mask_of, masked_infos, seeds_of
 
@@ -52,7 +53,7 @@ class DrivingVectorEnv(
         self, num_envs: int, town: Towns, storyboard: str | Path | StoryboardTemplate | None,
         config: NavigationConfig, observation_space: spaces.Space[DriverObservation],
         action_space: spaces.Space[np.int64] | spaces.Space[NDArray[np.float32]], render_mode: str | None, view: str,
-        threads: int | None, autoreset_mode: str | AutoresetMode, *, pedals: bool,
+        render_view: str, threads: int | None, autoreset_mode: str | AutoresetMode, *, pedals: bool,
     ) -> None:  # fmt: skip
         super().__init__(num_envs, town, config, render_mode, threads, autoreset_mode)
         import_module("filterpy.kalman")  # takes a second, for which no decision should wait: see `beliefs.refined`
@@ -78,8 +79,9 @@ class DrivingVectorEnv(
         self._make_batches(
             lambda each, numbers, threads: DrivingBatch(each, template, config, len(numbers), threads, pedals=pedals)
         )
+        shown = checked_view(render_view)
         self._views = [
-            DrivingView(SessionView.of_role(Role.CO_WIZARD, view, render_mode, config.decision_frequency))
+            DrivingView(SessionView.of_role(Role.CO_WIZARD, view, render_mode, config.decision_frequency, shown))
             for _ in range(num_envs if render_mode is not None else 0)
         ]
 
@@ -146,7 +148,7 @@ class DrivingVectorEnv(
         return self._observations.copy(), rewards, terminations, truncations, infos
 
     def render_one(self, number: int) -> NDArray[np.uint8] | None:
-        """Draws one of the environments (800, 1280, 3), as the single environment does."""
+        """Draws one of the environments, as the single environment does."""
         batch, place = self._places[range(self.num_envs)[number]]
         view = self._views[number].view if self._views else SessionView(None, frames_per_second=1.0)
         return view.render(batch.catch_up(place))

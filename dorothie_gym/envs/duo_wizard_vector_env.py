@@ -23,6 +23,7 @@ from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.render_view import RenderView, checked_view
 from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.spaces import ActionMapping, SpaceLimits, action_space, observation_space
 from dorothie_gym.tasks import StoryboardTemplate
@@ -81,6 +82,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         max_cycles: int | None = None,
         threads: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_view: str = RenderView.MAP,
     ) -> None:
         """Makes the environments.
 
@@ -93,6 +95,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
             max_cycles: as in `DuoWizardEnv`.
             threads: number of threads; None for one per processor.
             autoreset_mode: see above.
+            render_view: as in `DuoWizardEnv`.
 
         Raises:
             ValueError: an argument is out of its range.
@@ -120,7 +123,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         self.engines: tuple[SessionEngine, ...] = tuple(batch.engines[row] for batch, row in places)
         self._over = np.zeros(num_envs, dtype=np.bool_)
         views = num_envs if render_mode is not None else 0
-        self._views = [SessionView(render_mode, frames_per_second=rate) for _ in range(views)]
+        view = checked_view(render_view)
+        self._views = [SessionView(render_mode, frames_per_second=rate, render_view=view) for _ in range(views)]
 
     def _observed(self, role: Role) -> spaces.Dict:
         """Returns the observation space of a role in one environment, with the pictures of its camera."""
@@ -218,7 +222,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         )  # fmt: skip
 
     def render_one(self, number: int) -> NDArray[np.uint8] | None:
-        """Draws the session of one environment (800, 1280, 3), as `DuoWizardEnv` does; None without a render mode."""
+        """Draws the session of one environment, as `DuoWizardEnv` does; None without a render mode."""
         engine = self.engines[range(self.num_envs)[number]]
         return self._views[number].render(engine.session) if self._views else None
 

@@ -14,6 +14,7 @@ from dorothie_gym.envs.driving_cameras import driver_space
 from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.navigation_continuous_v0 import control_space, controls_of, path_space
+from dorothie_gym.render_view import RenderView
 from dorothie_gym.tasks import StoryboardTemplate
 
 
@@ -58,6 +59,7 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
         view: str = "role",
         threads: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_view: str = RenderView.MAP,
     ) -> None:
         config = NavigationConfig(
             traffic=traffic, exceptions=exceptions, weights=weights_of(reward), max_seconds=max_seconds,
@@ -65,7 +67,7 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
         )  # fmt: skip
         super().__init__(
             num_envs, town, storyboard, config, driver_space(config, path_space()), control_space(control), render_mode,
-            view, threads, autoreset_mode, pedals=True,
+            view, render_view, threads, autoreset_mode, pedals=True,
         )  # fmt: skip
 
         self.control = control

@@ -22,6 +22,7 @@ from dorothie_gym.errors import short_repr
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import navigation_space
+from dorothie_gym.render_view import RenderView
 from dorothie_gym.tasks import StoryboardTemplate
 from dorothie_gym.vector_infos import Infos, masked_infos
 
@@ -73,6 +74,7 @@ class NavigationVectorEnv(DrivingVectorEnv):
         view: str = "role",
         threads: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_view: str = RenderView.MAP,
     ) -> None:
         config = NavigationConfig(
             guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
@@ -80,7 +82,7 @@ class NavigationVectorEnv(DrivingVectorEnv):
         )  # fmt: skip
         super().__init__(
             num_envs, town, storyboard, config, driver_space(config, navigation_space()), spaces.Discrete(len(ACTIONS)),
-            render_mode, view, threads, autoreset_mode, pedals=False,
+            render_mode, view, render_view, threads, autoreset_mode, pedals=False,
         )  # fmt: skip
         self._masks = np.zeros((num_envs, len(ACTIONS)), dtype=np.int8)
 

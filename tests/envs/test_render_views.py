@@ -237,3 +237,28 @@ def test_an_unknown_view_is_refused_with_the_known_ones() -> None:
         duo("side")
     with pytest.raises(ValueError, match="it must be one of map, camera, both"):
         gym.make("dorothie_gym/Navigation-v0", render_view="windscreen")
+
+
+@pytest.mark.parametrize("name", ["Navigation-v0", "Navigation-continuous-v0"])
+def test_batches_show_the_windscreens_of_their_environments(name: str) -> None:
+    batch: Any = gym.make_vec(
+        f"dorothie_gym/{name}", num_envs=2, town="brookside", render_mode="rgb_array", render_view="both", threads=1
+    )
+    batch.reset(seed=[3, 4])
+    for number, seed in enumerate((3, 4)):
+        env = gym.make(f"dorothie_gym/{name}", **SMALL_TOWN, render_view="both")
+        env.reset(seed=seed)
+        np.testing.assert_array_equal(batch.render_one(number), env.render())
+    with pytest.raises(ValueError, match="render_view is 'side'; it must be one of map, camera, both"):
+        gym.make_vec(f"dorothie_gym/{name}", num_envs=2, render_view="side")
+
+
+def test_a_batch_of_sessions_shows_their_windscreens() -> None:
+    batch = dorothie_gym.DuoWizardVectorEnv(
+        2, "brookside", config=CONFIG, render_mode="rgb_array", render_view="camera"
+    )
+    batch.reset(seed=[3, 4])
+    for number, seed in enumerate((3, 4)):
+        single = duo("camera")
+        single.reset(seed=seed)
+        np.testing.assert_array_equal(batch.render_one(number), single.render())
