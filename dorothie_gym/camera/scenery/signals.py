@@ -29,7 +29,7 @@ LENS_OFF: dict[Colour, tuple[int, int, int]] = {
 """Colours of the lenses of traffic lights that are on and off."""
 
 _HEAD = 3.4  # [m] height of the middle of a traffic light
-_LENS, _BETWEEN = 0.17, 0.46  # [m] radius of a lens, distance of two
+_LENS, _BETWEEN = 0.2, 0.46  # [m] radius of a lens, distance of two
 _SIGN = 2.4  # [m] height of the middle of a sign
 _METAL, _BACK = (100, 104, 104), (150, 152, 154)
 _BLADE = 2.2, 0.55  # [m] width and height of a street name
