@@ -46,7 +46,9 @@ def _predicted(session: SessionFrames, model: SegFormer, folder: Path) -> Sessio
         semantic, depth = np.empty_like(session.semantic), np.empty_like(session.depth)
         for start in range(0, len(session), _AT_ONCE):
             rows = slice(start, start + _AT_ONCE)
-            semantic[rows], depth[rows] = predict_pixels(model, np.asarray(session.rgb[rows]))
+            semantic[rows], depth[rows] = predict_pixels(
+                model, np.array(session.rgb[rows])
+            )  # torch warns of maps that are read only
         for part, values in (("semantic", semantic), ("depth", depth)):
             with replacing(kept[part], shared=True) as path, path.open("wb") as file:
                 np.save(file, values, allow_pickle=False)

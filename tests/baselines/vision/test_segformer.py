@@ -108,6 +108,7 @@ def test_soft_jaccard_loss_is_zero_for_sure_and_right_scores_only():
 
 def test_predictions_replace_labels_but_not_boxes_and_are_kept(tmp_path):
     model, pictures = SegFormer(TINY), frame_set(0, count=3)
+    pictures.sessions[0].rgb.setflags(write=False)  # as the cache's
     found = with_predictions(pictures, model, tmp_path)
     classes, depth = predict_pixels(model, pictures.take(range(3)).rgb)
     assert np.array_equal(found.take(range(3)).semantic, classes)
