@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Final, Self
+from typing import Final, Literal, Self, TypeAlias
 
 import numpy as np
 import torch
@@ -13,7 +13,7 @@ from torch import Tensor
 
 from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, text_encoder, text_table
 from dorothie_gym.baselines.model_io import TASKS, Examples
-from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, build, points
+from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, Sight, VisibleBoxes, build, points
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording import Fold
 from dorothie_gym.user_cache import cache_folder
@@ -24,6 +24,11 @@ TRAIN: Final = "train"
 VALIDATION: Final = "val"
 TEST: Final = "test"
 
+Objects: TypeAlias = Literal["record", "boxes"]
+"""Source of the objects around the ego: all near ones in the record, or those that the camera on the car shows."""
+
+_SIGHTS: Final[dict[Objects, Sight | None]] = {"record": None, "boxes": VisibleBoxes()}
+
 
 class Dataset:
     """Dataset of a corpus. Vectors of texts are kept in the user's cache.
@@ -32,12 +37,16 @@ class Dataset:
         columns: the corpus.
         encoder: encoder of its texts.
         cache: folder for vectors of texts; None for no cache.
+        corpus: folder of the corpus, if it may be read again for objects of another source.
     """
 
-    def __init__(self, columns: Columns, encoder: TextEncoder, cache: Path | None = None):
+    def __init__(
+        self, columns: Columns, encoder: TextEncoder, cache: Path | None = None, corpus: Path | str | None = None
+    ):
         self.columns = columns
         self.encoder = encoder
-        self._cache = cache
+        self._cache, self._corpus = cache, corpus
+        self._others: dict[Objects, Dataset] = {}
         self._examples: dict[tuple[str, BatchSpec], Examples] = {}
 
     @classmethod
@@ -53,7 +62,27 @@ class Dataset:
             EncoderError: the encoder is unknown, or what it needs is not here.
         """
         cache = cache_folder()
-        return cls(build(corpus), text_encoder(encoder), None if cache is None else cache / _TABLES)
+        return cls(build(corpus), text_encoder(encoder), None if cache is None else cache / _TABLES, corpus)
+
+    def seeing(self, objects: Objects, on_session: Callable[[], object] | None = None) -> Dataset:
+        """Returns the dataset with the objects of a source; of this one if that is the record.
+
+        Args:
+            objects: the source.
+            on_session: called after each session whose pictures were drawn.
+
+        Raises:
+            SessionError: the corpus cannot be read again.
+        """
+        sight = _SIGHTS[objects]
+        if sight is None:
+            return self
+        if objects not in self._others:
+            if self._corpus is None:
+                raise SessionError("the dataset has no corpus whose pictures could be drawn")
+            columns = build(self._corpus, sight=sight, on_session=on_session)
+            self._others[objects] = Dataset(columns, self.encoder, self._cache)
+        return self._others[objects]
 
     def about(self) -> dict[str, object]:
         """Returns the identity of the features in JSON types; part of every checkpoint and every result."""

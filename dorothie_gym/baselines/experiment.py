@@ -92,6 +92,7 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
         SessionError: the corpus lacks a fold.
         OSError: the folder cannot be written.
     """
+    material = material.seeing(job.row.objects)
     about = {"model": job.row.name, "version": __version__, **material.about()}
     if job.row.kind in ("ppo", "cloning"):
         return _run_policy(job, about)
@@ -300,7 +301,10 @@ OnExperimentEpoch: TypeAlias = Callable[[Experiment, Epoch], None]
 
 
 def run_experiments(
-    jobs: Sequence[Experiment], workers: int, on_epoch: OnExperimentEpoch = lambda job, epoch: None
+    jobs: Sequence[Experiment],
+    workers: int,
+    on_epoch: OnExperimentEpoch = lambda job, epoch: None,
+    on_session: Callable[[], object] = lambda: None,
 ) -> Iterator[tuple[Experiment, dict[str, object]]]:
     """Runs trainings on one corpus, one per worker at a time, and yields each with its result when it is complete.
 
@@ -310,6 +314,7 @@ def run_experiments(
         jobs: the trainings.
         workers: processes; with 1 everything happens in this one.
         on_epoch: called after each epoch in this process.
+        on_session: called after each session whose pictures were drawn, for models that see by the camera.
 
     Raises:
         CheckpointError: the folder of a training holds another one.
@@ -323,11 +328,12 @@ def run_experiments(
     alone = workers <= 1 or len(jobs) == 1 or any(_is_large(job) for job in jobs)
     threads = torch.get_num_threads()
     trainer = _ExperimentWorker(jobs[0].corpus, jobs[0].encoder)
+    material = trainer.load()
+    for objects in sorted({job.row.objects for job in jobs}):
+        _ = material.seeing(objects, on_session).vectors  # other processes find them in the cache
     if not alone:
-        _ = trainer.load().vectors  # the others find them in the cache
         yield from run_tasks(trainer.prepare, jobs, workers=min(workers, len(jobs)))
         return
-    material = trainer.load()
     try:
         for job in jobs:
             torch.set_num_threads(threads if _is_large(job) else 1)

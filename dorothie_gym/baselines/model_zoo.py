@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, TypeAlias
 import torch
 from torch import Tensor
 
-from dorothie_gym.baselines.dataset import Dataset
+from dorothie_gym.baselines.dataset import Dataset, Objects
 from dorothie_gym.baselines.encoders.pretrained import find_transformers, has_minilm, load_pretrained, minilm_folder
 from dorothie_gym.baselines.junction_reader import JunctionReader, reader_config
 from dorothie_gym.baselines.toto import (
@@ -48,6 +48,7 @@ class ModelEntry:
         command: name on the command line and in paths.
         change: function from TOTO's config to the model's; None for a policy, and if it cannot be run.
         missing: reason why it cannot be run, or empty.
+        objects: where the objects around the ego come from, see `Dataset.seeing`.
         kind: "toto" (with ablations and rivals), "reader" (Junction Reader), a policy by "ppo" or "cloning", or
             "shallow" (scikit-learn, see `dorothie_gym.benchmark.shallow_models`).
     """
@@ -56,6 +57,7 @@ class ModelEntry:
     command: str
     change: Change | None = None
     missing: str = ""
+    objects: Objects = "record"
     kind: Kind = "toto"
 
 
@@ -115,6 +117,14 @@ ROWS: Final[tuple[ModelEntry, ...]] = (
 """Models of the paper's table, in its order; then TOTO with another clock, shallow models, policies, and the Junction
 Reader. TOTO without the current utterance stands beside the paper's row without its sound."""
 
+CAMERA_ROWS: Final = tuple(
+    replace(row, name=f"{row.name} (oracle boxes)", command=f"{row.command}-boxes", objects="boxes")
+    for row in ROWS
+    if row.command in ("toto", "detector", "et", "et-bert")
+)
+"""Models whose objects are those that the camera on the car shows. They are trained where they are named: pictures of a
+corpus take minutes."""
+
 
 class EpisodicTransformer(TOTO):
     """E.T. (Pashevich et al., 2021): TOTO's encoder over actions, text and images alone."""
@@ -122,10 +132,11 @@ class EpisodicTransformer(TOTO):
 
 def find_row(name: str) -> ModelEntry:
     """Returns a model by its command or name; raises `ValueError` listing all for an unknown one."""
-    for row in ROWS:
+    rows = (*ROWS, *CAMERA_ROWS)
+    for row in rows:
         if name.casefold() in (row.command, row.name.casefold()):
             return row
-    commands = tuple(row.command for row in ROWS)
+    commands = tuple(row.command for row in rows)
     raise ValueError(f"there is no model {name!r}; {did_you_mean(name, commands)}choose from {', '.join(commands)}")
 
 

@@ -38,10 +38,12 @@ from dorothie_gym.recording.recorded_perception import Switches, light_switches
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.pedestrians.walking import PACE
+from dorothie_gym.sim.sensing.visibility import Visibility
 from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.weather import Weather
+from dorothie_gym.sim.world import CLARITY
 from dorothie_gym.tasks import Landmark
 
 _KINDS = {ActorKind.VEHICLE: Kind.CAR, ActorKind.CYCLIST: Kind.CYCLIST}
@@ -58,6 +60,8 @@ class RecordedPictures:
 
     Attributes:
         camera: the camera.
+        actors: (m,) recorded actors, rows of `ACTOR_DTYPE`.
+        keys: (m,) int32 key of each actor in pictures.
         first_frame: first frame of the car (30 Hz).
         last_frame: last frame of the car (30 Hz).
 
@@ -81,7 +85,8 @@ class RecordedPictures:
             raise SessionError(f"{session.name}: has no recorded surroundings (actors); no pictures can be drawn")
         self.first_frame, self.last_frame = int(rows["frame"][0]), int(rows["frame"][-1])
         self._tracks = ActorTracks(scene.actors)
-        self._keys = _keys_of(scene.actors.rows["key"])
+        self.actors = scene.actors.rows
+        self.keys = _keys_of(self.actors["key"])
         self._heights, self._odometers = self._follow_tracks()
         self._accelerations = _accelerations_of(self._tracks)
         self._car_heights = self._find_car_heights()
@@ -114,7 +119,7 @@ class RecordedPictures:
             self.weather(frame),
             time=frame / FRAME_RATE,
             head_lights=_last_switch(self._switches, frame),
-            faults=[sensor for sensor, switches in self._faults.items() if _last_switch(switches, frame)],
+            faults=self._faulty(frame),
             own=_NO_BODY,
             traffic_lights=self._traffic_lights(frame),
         )
@@ -154,6 +159,14 @@ class RecordedPictures:
                     continue
         return self._weathers[key]
 
+    def visibility(self, frame: int) -> Visibility:
+        """Returns the visibility at a frame, by weather, light and faults of the view."""
+        clarity = min((CLARITY.get(sensor, 1.0) for sensor in self._faulty(frame)), default=1.0)
+        return self.weather(frame).visibility(lights=_last_switch(self._switches, frame), clarity=clarity)
+
+    def _faulty(self, frame: int) -> list[Sensor]:
+        return [sensor for sensor, switches in self._faults.items() if _last_switch(switches, frame)]
+
     def bodies(self, frame: int) -> BodySnapshot:
         """Returns the bodies at a frame."""
         moment = self._tracks.at(frame)
@@ -163,7 +176,7 @@ class RecordedPictures:
             odometers = np.maximum(odometers + moment.seconds * np.abs(actors["speed"]), 0.0)
         columns: dict[str, NDArray[np.generic]] = {
             **{name: actors[name] for name in ("x", "y", "heading", "speed", "length", "width")},
-            "cos": np.cos(actors["heading"]), "sin": np.sin(actors["heading"]), "key": self._keys[moment.rows],
+            "cos": np.cos(actors["heading"]), "sin": np.sin(actors["heading"]), "key": self.keys[moment.rows],
             "height": _between(self._heights, moment), "odometer": odometers,
             "acceleration": _between(self._accelerations, moment),
         }  # fmt: skip

@@ -105,7 +105,7 @@ def _table(arrays: Mapping[str, NDArray[Any]], name: str, kind: Callable[..., Ta
 
 
 @functools.cache
-def _builder_digest() -> str | None:
+def builder_digest() -> str | None:
     """Returns a digest of everything besides the town that determines its scene; None if it cannot be read."""
     compiler = compiler_digest()
     if compiler is None:
@@ -120,7 +120,7 @@ def _builder_digest() -> str | None:
 
 def _entry(town: Town) -> Path | None:
     """Returns the file of a town's scene, which need not exist; None if caching is turned off."""
-    cache, builder = cache_folder(), _builder_digest()
+    cache, builder = cache_folder(), builder_digest()
     if cache is None or builder is None:
         return None
     key = hashlib.sha256(builder.encode() + pack(town, "")).hexdigest()

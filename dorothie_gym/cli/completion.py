@@ -47,12 +47,12 @@ def complete_policy(role: str) -> Completion:
 def complete_model(incomplete: str) -> list[str]:
     """Returns the models of `train` that begin with a text; none where torch is not installed."""
     try:
-        from dorothie_gym.baselines.model_zoo import ROWS
+        from dorothie_gym.baselines.model_zoo import CAMERA_ROWS, ROWS
     except ImportError:
         return []
     from dorothie_gym.cli.train_vision import VISION_MODELS
 
-    return _names(incomplete, (*(row.command for row in ROWS), *VISION_MODELS))
+    return _names(incomplete, (*(row.command for row in (*ROWS, *CAMERA_ROWS)), *VISION_MODELS))
 
 
 def complete_algorithm(incomplete: str) -> list[str]:

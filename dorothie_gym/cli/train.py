@@ -177,8 +177,8 @@ def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> lis
 
     found: dict[Path, Facts] = {}
     try:
-        with _progress(len(jobs), quiet=quiet) as (on_epoch, on_job):
-            for job, result in run_experiments(jobs, workers or available_processors(), on_epoch):
+        with _progress(len(jobs), quiet=quiet) as (on_epoch, on_job, on_session):
+            for job, result in run_experiments(jobs, workers or available_processors(), on_epoch, on_session):
                 found[job.folder] = result
                 on_job(job)
     except KeyboardInterrupt:
@@ -191,14 +191,14 @@ def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> lis
 @contextmanager
 def _progress(
     jobs: int, *, quiet: bool
-) -> Iterator[tuple[Callable[[Experiment, Epoch], None], Callable[[Experiment], None]]]:
+) -> Iterator[tuple[Callable[[Experiment, Epoch], None], Callable[[Experiment], None], Callable[[], None]]]:
     """Shows a progress bar on a terminal."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = stderr()
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
-        bar = progress.add_task("Trainings", total=jobs)
+        bar, drawn = progress.add_task("Trainings", total=jobs), 0
 
         def on_epoch(job: Experiment, epoch: Epoch) -> None:
             loss = f"{epoch.training:.3f} / {epoch.validation:.3f}"
@@ -207,7 +207,12 @@ def _progress(
         def on_job(job: Experiment) -> None:
             progress.update(bar, advance=1, description=f"{job.model}, seed {job.seed}: done")
 
-        yield on_epoch, on_job
+        def on_session() -> None:
+            nonlocal drawn
+            drawn += 1
+            progress.update(bar, description=f"Pictures of {drawn} session{'s'[: drawn > 1]} drawn")
+
+        yield on_epoch, on_job, on_session
 
 
 def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:

@@ -1,6 +1,6 @@
 import pytest
 
-from dorothie_gym.baselines.model_zoo import ROWS, SIZES, find_row
+from dorothie_gym.baselines.model_zoo import CAMERA_ROWS, ROWS, SIZES, find_row
 from dorothie_gym.baselines.toto import ALL_CHANNELS, Channel
 from dorothie_gym.benchmark import paper_figures
 
@@ -11,13 +11,21 @@ def test_every_row_of_the_papers_table_is_there_in_its_words():
 
 
 def test_commands_are_words_without_spaces_and_distinct():
-    commands = [row.command for row in ROWS]
+    commands = [row.command for row in (*ROWS, *CAMERA_ROWS)]
     assert len(set(commands)) == len(commands)
     assert all(command == command.lower() and " " not in command for command in commands)
 
 
 def test_a_row_is_found_by_its_command_and_by_its_name():
     assert find_row("toto-no-map-knowledge") is find_row("TOTO (- Map Knowledge)")
+
+
+def test_rows_that_see_by_the_camera_differ_in_their_objects_only():
+    assert {row.command for row in CAMERA_ROWS} == {"toto-boxes", "detector-boxes", "et-boxes", "et-bert-boxes"}
+    for row in CAMERA_ROWS:
+        base = find_row(row.command.removesuffix("-boxes"))
+        assert (row.objects, base.objects) == ("boxes", "record")
+        assert row.change is base.change and row.name == f"{base.name} (oracle boxes)"
 
 
 def test_an_unknown_row_is_refused_with_the_names_of_all():

@@ -20,6 +20,7 @@ from dorothie_gym.benchmark.features.columns import (
 )
 from dorothie_gym.benchmark.features.corpus_columns import build, columns_of
 from dorothie_gym.benchmark.features.point_table import PointTable, points
+from dorothie_gym.benchmark.features.sight import Sight, VisibleBoxes
 from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, ObjectKind
 from dorothie_gym.recording.trajectory import TENTHS
 
@@ -44,9 +45,11 @@ __all__ = [
     "ObjectRows",
     "PointTable",
     "SessionRows",
+    "Sight",
     "StreetRows",
     "TownGraph",
     "UtteranceRows",
+    "VisibleBoxes",
     "build",
     "columns_of",
     "gather",

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from dorothie_gym.benchmark.features.column_checks import fault_in
 from dorothie_gym.benchmark.features.columns import GROUPS, NO_TEXT, Columns, SessionRows, TownGraph
 from dorothie_gym.benchmark.features.session_columns import SessionColumns, extract, town_graph
+from dorothie_gym.benchmark.features.sight import Sight, seen_by
 from dorothie_gym.errors import FeatureStoreError, SessionError, TownError, one_line
 from dorothie_gym.files import PART
 from dorothie_gym.input_files import ARRAY_ERRORS, MIB, checked, parse_json, raising, read_text
@@ -50,12 +51,17 @@ _READ: Final = (".json", ".jsonl", ".csv", ".parquet", ".journal")
 
 
 def build(
-    corpus: Corpus | Path | str, *, cache: bool = True, on_session: Callable[[], object] | None = None
+    corpus: Corpus | Path | str,
+    *,
+    sight: Sight | None = None,
+    cache: bool = True,
+    on_session: Callable[[], object] | None = None,
 ) -> Columns:
     """Returns a corpus as columns, from the cache or newly built.
 
     Args:
         corpus: corpus or its folder.
+        sight: source of the objects around the ego; None for the record.
         cache: whether to use the user's cache folder (`DOROTHIE_GYM_CACHE`).
         on_session: called after each session that was read.
 
@@ -63,23 +69,23 @@ def build(
         SessionError: no session can be read.
     """
     corpus = corpus if isinstance(corpus, Corpus) else Corpus.load(corpus)
-    key = _key(corpus)
+    key = _key(corpus, sight)
     found = recall(key) if cache else None
     if found is None:
-        found = _build(corpus, key, on_session)
+        found = _build(corpus, key, sight, on_session)
         if cache:
             keep(found)
     return found
 
 
-def columns_of(session: Session, fold: str = "", maps: Path | None = None) -> Columns:
+def columns_of(session: Session, fold: str = "", maps: Path | None = None, sight: Sight | None = None) -> Columns:
     """Returns the columns of a single session; they are not cached."""
     town = find_town(session.header.town, maps)
-    part = extract(session, town)
+    part = extract(seen_by(sight, session, town), town)
     return join(part.signature, [session.name], [fold], [part], [town_graph(part.town, town)], [])
 
 
-def _build(corpus: Corpus, key: str, on_session: Callable[[], object] | None) -> Columns:
+def _build(corpus: Corpus, key: str, sight: Sight | None, on_session: Callable[[], object] | None) -> Columns:
     towns: dict[str, Town | None] = {}
     read: list[tuple[CorpusEntry, SessionColumns]] = []
     unreadable = []
@@ -88,7 +94,8 @@ def _build(corpus: Corpus, key: str, on_session: Callable[[], object] | None) ->
             session = entry.load()
             if session.header.town not in towns:
                 towns[session.header.town] = find_town(session.header.town, entry.maps)
-            read.append((entry, extract(session, towns[session.header.town])))
+            town = towns[session.header.town]
+            read.append((entry, extract(seen_by(sight, session, town), town)))
         except (SessionError, TownError) as error:
             unreadable.append((entry.name, str(error)))
         if on_session is not None:
@@ -120,9 +127,11 @@ def _fold_name(fold: Fold | None) -> str:
     return "" if fold is None else fold.value
 
 
-def _key(corpus: Corpus) -> str:
+def _key(corpus: Corpus, sight: Sight | None) -> str:
     """Returns the hash of everything that determines the columns: files, names and folds of sessions, and sources."""
     digest = hashlib.sha256(f"{_sources_digest()} {compiler_digest()} numpy {np.__version__}\n".encode())
+    if sight is not None:
+        digest.update(f"sight {sight.digest}\n".encode())
     for folder in sorted({entry.maps for entry in corpus.entries if entry.maps is not None}):
         _add_files(digest, folder, (".xodr", ".yaml", ".yml"))
     for entry in corpus.entries:
