@@ -48,7 +48,7 @@ class ModelEntry:
         command: name on the command line and in paths.
         change: function from TOTO's config to the model's; None for a policy, and if it cannot be run.
         missing: reason why it cannot be run, or empty.
-        objects: where the objects around the ego come from, see `Dataset.seeing`.
+        objects: source of the objects around the ego, see `Dataset.seeing`.
         kind: "toto" (with ablations and rivals), "reader" (Junction Reader), a policy by "ppo" or "cloning", or
             "shallow" (scikit-learn, see `dorothie_gym.benchmark.shallow_models`).
     """

@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
+from dorothie_gym.camera.scene_cache import builder_digest
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.files import PART
 from dorothie_gym.maps import Town
-from dorothie_gym.maps.cache import compiler_digest, pack, package_sources
+from dorothie_gym.maps.cache import pack, package_sources
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import Sensor, parse_sensor
 from dorothie_gym.recording import FRAME_RATE, Corpus, CorpusEntry, EventType, Session
@@ -52,7 +53,6 @@ _FORMAT: Final = 1
 _OUTPUTS: Final = (
     CameraOutput.RGB, CameraOutput.DEPTH, CameraOutput.SEMANTIC, CameraOutput.INSTANCE, CameraOutput.BOXES,
 )  # fmt: skip
-_SOURCES: Final = ("dorothie_gym.camera", "dorothie_gym.rendering", "dorothie_gym.recording", "dorothie_gym.sim")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -384,8 +384,11 @@ def _recall(path: Path, name: str, town: str, sampling: FrameSampling) -> Sessio
 
 @functools.cache
 def _builder_digest() -> str:
-    digest = hashlib.sha256(f"{_FORMAT} {compiler_digest()} {np.__version__}\n".encode())
-    for package in _SOURCES:
-        for name, text in package_sources(package):
-            digest.update(f"{package} {name} {len(text)}\n".encode() + text)
+    """Returns a digest of everything besides the session that determines its pictures."""
+    scenes = builder_digest()
+    if scenes is None:
+        raise SessionError("the sources of the camera cannot be read; no pictures can be kept for the training")
+    digest = hashlib.sha256(f"{_FORMAT} {scenes} {np.__version__}\n".encode())
+    for name, text in package_sources("dorothie_gym.recording"):
+        digest.update(f"{name} {len(text)}\n".encode() + text)
     return digest.hexdigest()

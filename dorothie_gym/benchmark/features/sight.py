@@ -1,4 +1,4 @@
-"""Where the objects around the ego come from that models receive: the record, or pictures of the camera."""
+"""Sources of the objects around the ego: the record of a session, or pictures of the camera on the car."""
 
 from __future__ import annotations
 
