@@ -108,7 +108,16 @@ class CameraConfig:
         """Number of samples along each side of a pixel."""
         return 2 if self.antialiasing else 1
 
-    def pose_on(self, x: float, y: float, z: float, heading: float) -> CameraPose:
-        """Returns the pose of the camera on a car at a position [m] with a heading [rad]."""
-        pose = CameraPose(x, y, z, heading, math.radians(self.mount.pitch))
-        return pose.moved(self.mount.forward, self.mount.up)
+    def pose_on(self, x: float, y: float, z: float, heading: float, rise: float = 0.0) -> CameraPose:
+        """Returns the pose of the camera on a car.
+
+        Args:
+            x: of the car [m].
+            y: of the car [m].
+            z: of the road below it [m].
+            heading: of the car [rad].
+            rise: of the road per metre ahead.
+        """
+        mount = self.mount
+        car = CameraPose(x, y, z, heading, math.atan(rise))
+        return car.mounted(mount.forward, mount.up, math.radians(mount.pitch))

@@ -28,6 +28,7 @@ class CameraPose:
         z: [m].
         heading: [rad].
         pitch: upwards [rad].
+        tilt: of the car that carries it, upwards [rad]: that of the road.
     """
 
     x: float
@@ -35,11 +36,20 @@ class CameraPose:
     z: float
     heading: float
     pitch: float = 0.0
+    tilt: float = 0.0
 
-    def moved(self, forward: float, up: float) -> Self:
-        """Returns the pose moved along the heading and upwards [m], as a mount on a car is."""
-        x, y = self.x + forward * math.cos(self.heading), self.y + forward * math.sin(self.heading)
-        return type(self)(x, y, self.z + up, self.heading, self.pitch)
+    def mounted(self, forward: float, up: float, pitch: float) -> Self:
+        """Returns the pose of a mount on a car with this pose.
+
+        Args:
+            forward: of the middle of the car [m].
+            up: above the road, at a right angle to it [m].
+            pitch: relative to the car [rad].
+        """
+        c, s = math.cos(self.pitch), math.sin(self.pitch)
+        ahead, rise = forward * c - up * s, forward * s + up * c
+        x, y = self.x + ahead * math.cos(self.heading), self.y + ahead * math.sin(self.heading)
+        return type(self)(x, y, self.z + rise, self.heading, self.pitch + pitch, self.pitch)
 
 
 @by_reference

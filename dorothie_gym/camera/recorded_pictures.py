@@ -142,7 +142,7 @@ class RecordedPictures:
         heading = float(here["heading"])
         if share:
             heading += share * wrap_radians(float(there["heading"]) - heading)
-        return self.camera.config.pose_on(x, y, height, heading)
+        return self.camera.pose_on(x, y, height, heading)
 
     def weather(self, frame: int) -> Weather:
         """Returns the last recorded weather at a frame; a clear noon where there is none."""

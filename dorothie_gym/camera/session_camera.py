@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from typing import Protocol
 
@@ -37,6 +38,7 @@ LIGHTS_BELOW = 6.0
 _LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # precipitation and density of fog from which on [%]
 _COLOURS = {LightColour.GREEN: Colour.GREEN, LightColour.YELLOW: Colour.YELLOW, LightColour.RED: Colour.RED}
 _RAISED = np.array([LOOKS[material].relief in (Relief.RAISED, Relief.SLOPE) for material in Material])
+_BELOW = -1.0  # [m] height of the people in tunnels
 _FIRST_LIFTED, _FIRST_LEFT, _NOTHING = FIRST_PERSON, FIRST_PROP, int(Material.NOTHING)
 
 
@@ -75,11 +77,23 @@ class SessionCamera:
         self._shown: NDArray[np.int64] | None = None
         self._phases: list[LightPhase] | None = None  # that the lenses show, if those of the programmes
 
+    def pose_on(self, x: float, y: float, z: float, heading: float) -> CameraPose:
+        """Returns the pose of the camera on a car, which stands tilted on slopes.
+
+        Args:
+            x: of the car [m].
+            y: of the car [m].
+            z: of the road below it [m].
+            heading: of the car [rad].
+        """
+        rise = rise_at(self.scene.town.slopes, x, y, z, math.cos(heading), math.sin(heading))
+        return self.config.pose_on(x, y, z, heading, rise)
+
     def render(self, world: World) -> CameraFrame:
         """Returns the picture that the camera takes of a world."""
         car = world.car
         x, y = car.position.tolist()
-        pose = self.config.pose_on(x, y, float(car.height), float(car.heading))
+        pose = self.pose_on(x, y, float(car.height), float(car.heading))
         return self.render_from(
             pose, world.actors.arrays, world.weather, time=world.time, head_lights=world.ego.lights, faults=world.faults
         )
@@ -181,10 +195,13 @@ def _lift(ground: GroundArrays, slopes: RoadSlopes, placed: RecordArray[Placemen
         body = placed[k]
         if body.model < _FIRST_LIFTED:
             body.rise = rise_at(slopes, body.x, body.y, body.z, body.cos, body.sin)
-        if _FIRST_LIFTED <= body.model < _FIRST_LEFT and _RAISED[material_at(ground, GROUND_SHEET, body.x, body.y)]:
-            covered = False  # by a bridge, on which there are no kerbs
+        if _FIRST_LIFTED <= body.model < _FIRST_LEFT:
+            raised = _RAISED[material_at(ground, GROUND_SHEET, body.x, body.y)]
             for sheet in range(1, len(ground.outside)):
-                if ground.outside[sheet] == _NOTHING:  # no tunnel
-                    covered |= material_at(ground, sheet, body.x, body.y) != _NOTHING
-            if not covered:
+                material = material_at(ground, sheet, body.x, body.y)
+                if ground.outside[sheet] == _NOTHING:  # a bridge, on which there are no kerbs
+                    raised &= material == _NOTHING
+                else:  # a tunnel, with kerbs below whatever is above
+                    raised |= _RAISED[material] and body.z < _BELOW
+            if raised:
                 body.z += KERB_HEIGHT

@@ -122,7 +122,7 @@ class _Windscreen:
         world, now = self._world, self._moment()
         height = self._last.height + share * (now.height - self._last.height)
         return self._camera.render_from(
-            self._camera.config.pose_on(scene.car.x, scene.car.y, height, scene.car.heading),
+            self._camera.pose_on(scene.car.x, scene.car.y, height, scene.car.heading),
             bodies_between(self._last.bodies, now.bodies, share),
             world.weather,
             time=scene.time,

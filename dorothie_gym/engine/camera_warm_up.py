@@ -34,5 +34,5 @@ def warm_up(progress: Progress | None = None) -> None:
         camera = SessionCamera(scene, CameraConfig(width=16, height=16, outputs=tuple(CameraOutput)))
         camera.render(world)
         x, y = world.car.position.tolist()
-        pose = camera.config.pose_on(x, y, float(world.car.height), 0.0)
+        pose = camera.pose_on(x, y, float(world.car.height), 0.0)
         camera.render_from(pose, world.actors.arrays, rain, time=0.0, head_lights=True, faults=(Sensor.BLUR,))

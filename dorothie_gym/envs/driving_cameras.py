@@ -96,7 +96,7 @@ class DrivingCameras:
         car, plan = plain(arrays.vehicles)[0], plain(arrays.plan)[0]
         # the Ad-Wizard changes weather and sensors of a session with objects only
         world = None if face.live is None else face.live.world
-        pose = self.config.pose_on(float(car["x"]), float(car["y"]), float(car["height"]), float(car["heading"]))
+        pose = camera.pose_on(float(car["x"]), float(car["y"]), float(car["height"]), float(car["heading"]))
         frame = camera.render_from(
             pose, arrays, Weather() if world is None else world.weather,
             time=int(plain(arrays.clock)["frame"][0]) / FRAME_RATE, head_lights=bool(plan["lights"]),

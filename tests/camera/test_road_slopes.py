@@ -50,6 +50,27 @@ def test_level_towns_have_no_slopes() -> None:
     assert rise_at(slopes, 0.0, 0.0, 0.0, 1.0, 0.0) == 0.0
 
 
+def test_the_camera_is_fixed_to_a_car_on_a_slope() -> None:
+    town = load_town("northgate")
+    camera = SessionCamera(SessionScene(town_scene(town)), CameraConfig(width=16, height=16))
+    mount = camera.config.mount
+    lane = max(town.lanes, key=lambda row: abs(row.points[-1, 2] - row.points[0, 2]))
+    stations = np.arange(2.0, lane.length - 2.0, 0.5)
+    poses = []
+    for station in stations.tolist():
+        x, y = lane.position(station).tolist()
+        poses.append(camera.pose_on(x, y, lane.height_at(station), lane.heading_at(station)))
+    rises = np.array([(lane.height_at(s + 1.3) - lane.height_at(s - 1.3)) / 2.6 for s in stations.tolist()])
+    pitches = np.array([pose.pitch for pose in poses])
+    assert np.abs(rises).max() > 0.04
+    assert np.quantile(np.abs(pitches - math.radians(mount.pitch) - np.arctan(rises)), 0.95) < 0.01
+    assert np.abs(np.diff(pitches)).max() < 0.015  # without steps
+    # the way from the road below the middle of the car to the camera keeps its length
+    feet = np.array([(*lane.position(s).tolist(), lane.height_at(s)) for s in stations.tolist()])
+    away = np.array([(pose.x, pose.y, pose.z) for pose in poses]) - feet
+    np.testing.assert_allclose(np.linalg.norm(away, axis=1), math.hypot(mount.forward, mount.up), rtol=1e-9)
+
+
 def test_people_walk_on_top_of_the_pavements_of_a_town_with_a_tunnel() -> None:
     engine = SessionEngine("midtown", config=EnvConfig(world=WorldConfig(vehicles=20, pedestrians=60)))
     engine.reset(seed=2)
