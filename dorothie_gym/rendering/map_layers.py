@@ -17,7 +17,7 @@ from dorothie_gym.rendering.levels import LevelLookup, stretches
 from dorothie_gym.rendering.markings import lane_arrows
 from dorothie_gym.rendering.medians import find_pockets, held, pocket_paint
 from dorothie_gym.rendering.shapes import Shape, TownSamples
-from dorothie_gym.rendering.surfaces import BEYOND_BRIDGE, deck, streets, tunnel_floors
+from dorothie_gym.rendering.surfaces import BEYOND_BRIDGE, deck, streets, tunnel_floors, tunnel_pavements
 
 _SIGN_ASIDE = 1.5  # [m] from the edge of the lane
 SHOWN = (SignalKind.TRAFFIC_LIGHT, SignalKind.STOP, SignalKind.YIELD)
@@ -153,14 +153,15 @@ class MapLayers:
         return [*shapes, *self._held(list(self._paint()), above)]
 
     def tunnel_shapes(self) -> list[Shape]:
-        """Returns the polygons in tunnels: floors and the lines on them."""
+        """Returns the polygons in tunnels: pavements, floors and the lines on them."""
         parts = [part for part in self.stretches if part.level < 0]
         if not parts:
             return []
         covered = LevelLookup(self._samples, parts)
         inside = [line.part(run) for line in self.borders.lines for run in held(line, covered)]
         floors = tunnel_floors(self.town, parts, self.borders.lines, covered)
-        return [*floors, *markings.lines(inside, self.detail), *self._held(list(self._paint()), covered)]
+        pavements = tunnel_pavements(self.town, covered)
+        return [*pavements, *floors, *markings.lines(inside, self.detail), *self._held(list(self._paint()), covered)]
 
     @staticmethod
     def _held(paint: list[Shape], places: LevelLookup, wanted: bool = True) -> Iterator[Shape]:

@@ -39,6 +39,7 @@ _PORTAL = 0.9  # [m]
 _APRON = 4.0  # [m] of asphalt before a portal, where grass ends
 _OVER = 0.9  # [m] by which the wall of a portal extends beyond the road
 _JITTER = 2.0  # [m] between the points of borders
+_BEFORE_WALL = 0.35  # [m] of a pavement in a tunnel beyond its width
 _ABREAST = 14.0  # [m] between lanes through one portal
 
 
@@ -96,6 +97,15 @@ def tunnel_floors(
                 dashes = dash_pattern(polyline_length(line.points[run]), 1.6, 1.2)
                 for piece in cut(line.points[run, :2], dashes):
                     yield from (Shape(outline, palette.TUNNEL_EDGE) for outline in strokes(piece, 0.6))
+
+
+def tunnel_pavements(town: Town, covered: LevelLookup) -> Iterator[Shape]:
+    """Yields the pavements in tunnels, up to the walls; a lookup holds the lanes there."""
+    for walk in town.sidewalks:
+        middle = cut(walk.points, [(0.0, polyline_length(walk.points))], 1.0)[0]
+        for run in _runs(covered.beside(middle, _LEVEL_REACH)):
+            pieces = strokes(middle[run, :2], min(walk.width, _WIDEST_WALK) + 2.0 * _BEFORE_WALL)
+            yield from (Shape(piece, palette.SIDEWALK) for piece in pieces)
 
 
 def portals(town: Town, parts: Sequence[LevelStretch]) -> Iterator[Shape]:
@@ -171,7 +181,7 @@ def sidewalks(town: Town, areas: Sequence[Array], lines: Sequence[Border], bridg
     walks = [
         (walk.points[run, :2], min(walk.width, _WIDEST_WALK))
         for walk in town.sidewalks
-        for run in _runs(~bridges.beside(walk.points, _BRIDGE_REACH))
+        for run in _runs(~bridges.beside(walk.points, _LEVEL_REACH))
     ]
     if not walks:
         return
@@ -256,7 +266,7 @@ _JOINT = 0.05  # [m]
 _BAY_DEPTH = 2.3  # [m]
 _BAY_LENGTH = 6.0  # [m] without its tapered ends
 _BAY_TAPER = 2.2  # [m]
-_BRIDGE_REACH = 14.0  # [m] from the middle of a lane on a bridge to the middle of a pavement on it, at most
+_LEVEL_REACH = 14.0  # [m] from the middle of a lane on a bridge or in a tunnel to that of a pavement there, at most
 _BEFORE_PORTAL = 4.0  # [m] of asphalt between a median and the mouth of a tunnel
 BEYOND_BRIDGE = 6.0  # [m] of asphalt and paint beyond a bridge: adjacent lanes begin theirs at different places
 
@@ -288,7 +298,7 @@ def streets(
     areas = junction_areas(town)
     if town.sidewalks:
         # pavements within reach of the shorter ones lie on bridges
-        bridges = LevelLookup(samples, [_longer(part, -_BRIDGE_REACH) for part in parts if part.level > 0])
+        bridges = LevelLookup(samples, [_longer(part, -_LEVEL_REACH) for part in parts if part.level > 0])
         yield from sidewalks(town, areas, lines, bridges)
         yield from verges(town, lines, bridges)
     else:
@@ -354,7 +364,7 @@ def deck(town: Town, parts: Sequence[LevelStretch], lines: Iterable[Border], pla
 def _bridge_pavements(town: Town, lines: Iterable[Border], places: LevelLookup) -> Iterator[tuple[Border, Array]]:
     """Yields the edges of roads on bridges that have a pavement, and the distances (n,) to its outer edge [m]."""
     walks = [(walk, cut(walk.points, [(0.0, polyline_length(walk.points))], 1.0)[0]) for walk in town.sidewalks]
-    rows = [(walk, points[places.beside(points, _BRIDGE_REACH)]) for walk, points in walks]
+    rows = [(walk, points[places.beside(points, _LEVEL_REACH)]) for walk, points in walks]
     middle = np.concatenate([np.zeros((0, 3)), *(points for _, points in rows)])
     if not len(middle):
         return
@@ -365,7 +375,7 @@ def _bridge_pavements(town: Town, lines: Iterable[Border], places: LevelLookup) 
             near, where = (np.asarray(row) for row in tree.query(line.points[:, :2]))
             outside = np.hypot(*(line.shifted(-near) - middle[where, :2]).T) < near  # and not across the road
             level = np.abs(middle[where, 2] - line.points[:, 2]) < SAME_SURFACE
-            for run in _runs(places.hold(line.points) & outside & level & (near < _BRIDGE_REACH)):
+            for run in _runs(places.hold(line.points) & outside & level & (near < _LEVEL_REACH)):
                 yield line.part(run), near[run] + half[where[run]]
 
 

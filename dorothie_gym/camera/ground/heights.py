@@ -78,7 +78,8 @@ class HeightField:
         # level from the road on, and as far behind
         verge = np.clip(away - samples.half_width[beside], 0.0, _WIDEST_VERGE)
         walks = replace(walks, half_width=np.maximum(walks.half_width, verge))
-        self._walks = _Lanes(walks, (level[beside] == 0) & (np.abs(z[beside] - walks.centre[:, 2]) < _OWN_ROAD))
+        # those in tunnels count before the mouths; above, only lanes do
+        self._walks = _Lanes(walks, (level[beside] <= 0) & (np.abs(z[beside] - walks.centre[:, 2]) < _OWN_ROAD))
         self._apart = {k: _Lanes(samples, level == k) for k in np.unique(level[level != 0]).tolist()}
         # the land below raised roads rises no more steeply than roads do, and it is as it was below bridges
         land = np.flatnonzero(~sunken & (level <= 0))[::_THIN]

@@ -67,21 +67,23 @@ def cut_ground(
     return _triangles(pieces)
 
 
-def cut_area(area: BaseGeometry, step: float) -> NDArray[np.int64]:
-    """Returns triangles (n, 3, 2) [grid steps] of one area, cut into cells of a width [m]."""
-    if area.is_empty:
-        return np.zeros((0, 3, 2), dtype=np.int64)
-    x0, y0, x1, y1 = area.bounds
+def cut_areas(regions: Sequence[Cut], step: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Returns triangles (n, 3, 2) [grid steps] with their areas (n,), cut into cells of a width [m]."""
+    regions = [row for row in regions if not row[1].is_empty]
+    if not regions:
+        return np.zeros((0, 3, 2), dtype=np.int64), np.zeros(0, dtype=np.int64)
+    x0, y0, x1, y1 = shapely.total_bounds([area for _, area in regions]).tolist()
     corner = np.floor(np.array([x0, y0])) - 1.0 + _ODD
     count = int(np.ceil(max(x1 - corner[0], y1 - corner[1]) / step))
     pieces: list[Cut] = []
     for i in range(count):
-        # strips first: an intersection costs as much as the polygon has corners
-        strip = _clipped(area, corner[0] + i * step, y0 - 1.0, corner[0] + (i + 1) * step, y1 + 1.0)
-        for k in range(0 if strip.is_empty else count):
-            low = corner + np.array([i, k]) * step
-            pieces.append((0, _clipped(strip, *low, *(low + step))))
-    return _triangles(pieces)[0]
+        for kind, area in regions:
+            # strips first: an intersection costs as much as the polygon has corners
+            strip = _clipped(area, corner[0] + i * step, y0 - 1.0, corner[0] + (i + 1) * step, y1 + 1.0)
+            for k in range(0 if strip.is_empty else count):
+                low = corner + np.array([i, k]) * step
+                pieces.append((kind, _clipped(strip, *low, *(low + step))))
+    return _triangles(pieces)
 
 
 def _cut(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -13,10 +14,18 @@ from shapely.geometry.base import BaseGeometry
 from dorothie_gym.camera.ground.heights import HeightField, Zone
 from dorothie_gym.camera.ground.lookup import GroundArrays, material_at
 from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material
-from dorothie_gym.camera.ground.partition import Area, cut_area
+from dorothie_gym.camera.ground.partition import Area, cut_areas
 from dorothie_gym.camera.ground.regions import GRID, footprint, only_areas, polygons_of, tidy
 from dorothie_gym.camera.ground.sheets import GROUND_SHEET, Sheet
-from dorothie_gym.camera.ground.surface import PORTAL_HEIGHT, ROOF, Edges, GroundTriangles, add_sheet, find_edges
+from dorothie_gym.camera.ground.surface import (
+    PORTAL_HEIGHT,
+    ROOF,
+    Edges,
+    GroundTriangles,
+    add_faces,
+    add_sheet,
+    find_edges,
+)
 from dorothie_gym.camera.mesh import MeshBuilder
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
@@ -26,9 +35,13 @@ from dorothie_gym.rendering.levels import LevelStretch
 COVER = 3.2
 """Width of covered ground on both sides of the lanes in a tunnel [m]: beyond the slopes of a cutting."""
 
+_BEHIND = 1.0  # [m] of covered ground behind the pavements in a tunnel
+_FARTHEST_PAVEMENT = 14.0  # [m] from the edge of a lane in a tunnel to the outer edge of its pavement
+_KERB = 0.05  # [m] of road beyond the lanes there
 _CELL = 8.0  # [m]
 _OVERLAP = 0.05  # [m] by which the floor of a tunnel continues in the open
 _UNDER = 0.3  # [m] of the walls of tunnels below their floors
+_THICK = 0.4  # [m] of the walls of tunnels, for the sun
 _LID = 0.15  # [m] below the ground over tunnels
 _SUNK = 0.005  # [m] of the floor there below the road
 _MOUTH = 16.0  # [m] of floor beyond the covered lanes, at most: up to the wall over the mouth
@@ -48,20 +61,24 @@ _SHADED = (138, 136, 131)
 _TILES = (178, 178, 172)
 
 
-def covered_ground(town: Town, stretches: Sequence[LevelStretch], ground: Sheet) -> BaseGeometry:
-    """Returns the area above tunnels, with the walls that the map draws over their mouths.
-
-    Args:
-        town: the town.
-        stretches: bridges and tunnels.
-        ground: sheet of the ground.
-    """
-    tunnels = footprint(town, [part for part in stretches if part.level < 0], COVER)
+def covered_ground(town: Town, sheets: Sequence[Sheet]) -> BaseGeometry:
+    """Returns the area above tunnels and their pavements, with the walls that the map draws over their mouths."""
+    parts = [part for sheet in sheets for part in sheet.stretches if part.level < 0]
+    tunnels = footprint(town, parts, COVER)
     if tunnels.is_empty:
         return tunnels
+    pavements = shapely.buffer(_pavements(sheets), _BEHIND, join_style="mitre")
+    aside = shapely.intersection(pavements, footprint(town, parts, _FARTHEST_PAVEMENT))
     kinds = (Material.PARAPET, Material.BRIDGE_EDGE, Material.TUNNEL_FLOOR)
-    walls = [part.points for part in ground.polygons if part.material in kinds]
-    return tidy(only_areas(shapely.union_all([tunnels, *polygons_of(walls)])))
+    walls = [part.points for part in sheets[GROUND_SHEET].polygons if part.material in kinds]
+    return tidy(only_areas(shapely.union_all([tunnels, aside, *polygons_of(walls)])))
+
+
+def _pavements(sheets: Sequence[Sheet]) -> BaseGeometry:
+    """Returns the area of the pavements in tunnels."""
+    inside = [part for sheet in sheets if sheet.level < 0 for part in sheet.polygons]
+    paved = polygons_of(part.points for part in inside if part.material is Material.PAVEMENT)
+    return only_areas(shapely.union_all(paved))
 
 
 def add_portals(builder: MeshBuilder, edges: Edges) -> None:
@@ -82,21 +99,31 @@ def add_lids(builder: MeshBuilder, triangles: GroundTriangles) -> None:
     builder.triangles(covered - [0.0, 0.0, _LID], colour=_SHADED, kind=ObjectClass.WALL)
 
 
-def tunnel_floor(town: Town, sheets: Sequence[Sheet], cover: BaseGeometry) -> BaseGeometry:
-    """Returns the area of the floors of tunnels below covered ground, up to slightly beyond their mouths."""
+class TunnelFloors(NamedTuple):
+    """Areas of the floors of tunnels, and of the pavements among them."""
+
+    area: BaseGeometry
+    pavements: BaseGeometry
+
+
+def tunnel_floors(town: Town, sheets: Sequence[Sheet], cover: BaseGeometry) -> TunnelFloors:
+    """Returns the floors of tunnels below covered ground, up to slightly beyond their mouths."""
     flat, lanes = [], []
     for sheet in sheets:
         if sheet.level < 0:
             lanes += [_longer(town, part, _MOUTH) for part in sheet.stretches]
             flat += [part.points for part in sheet.polygons if part.material is Material.TUNNEL_FLOOR]
-    longer = footprint(town, lanes, _JOINT)
+    pavements = _pavements(sheets)
+    longer = shapely.union_all([footprint(town, lanes, _JOINT), pavements])
     closed = shapely.buffer(shapely.buffer(longer, _GAP / 2.0, join_style="mitre"), -_GAP / 2.0, join_style="mitre")
     within = shapely.buffer(cover, _OVERLAP, join_style="mitre")
-    return tidy(only_areas(shapely.intersection(shapely.union_all([closed, *polygons_of(flat)]), within)))
+    area = tidy(only_areas(shapely.intersection(shapely.union_all([closed, *polygons_of(flat)]), within)))
+    road = shapely.union_all([footprint(town, lanes, _KERB), *polygons_of(flat)])
+    return TunnelFloors(area, tidy(only_areas(shapely.intersection(area, shapely.difference(pavements, road)))))
 
 
 def add_tunnel(
-    builder: MeshBuilder, level: int, number: int, field: HeightField, area: BaseGeometry, cover: BaseGeometry
+    builder: MeshBuilder, level: int, number: int, field: HeightField, floors: TunnelFloors, cover: BaseGeometry
 ) -> None:
     """Adds floor, walls and ceiling of the tunnels.
 
@@ -105,12 +132,16 @@ def add_tunnel(
         level: of the tunnels.
         number: of their sheet.
         field: heights.
-        area: of their floors.
+        floors: areas of their floors.
         cover: area of the ground above.
     """
-    floor = _at_height(cut_area(area, _CELL), field, level)
+    road = only_areas(shapely.difference(floors.area, floors.pavements, grid_size=GRID))
+    floor = _at_height(cut_areas([(Area.FLAT, road), (Area.RAISED, floors.pavements)], _CELL), field, level)
     floor.corners[..., 2] -= _SUNK
-    add_sheet(builder, floor.corners, number)
+    stepped = GroundTriangles(floor.corners.copy(), floor.areas)
+    stepped.corners[floor.areas == Area.RAISED, :, 2] += KERB_HEIGHT
+    add_sheet(builder, stepped.corners, number)
+    add_faces(builder, find_edges(stepped), shapely.Polygon())
     ceiling = floor.corners.copy()
     ceiling[..., 2] += _headroom(field, ceiling)
     builder.triangles(ceiling[:, ::-1], colour=_SHADED, kind=ObjectClass.WALL)
@@ -126,8 +157,10 @@ def add_tunnel(
     high[..., 2] += _headroom(field, high)
     sides[..., 2] -= _UNDER
     _add_quads(builder, sides[:, ::-1], high[:, ::-1], _TILES, ObjectClass.WALL)
-    high[..., 2] += ROOF - _LID / 2.0  # up to the lid; in the ground, where only the sun sees it
-    _add_quads(builder, sides, high, _TILES, ObjectClass.WALL)
+    # up to the lid; in the ground, where only the sun sees it, so far behind the wall that no light gets through
+    behind = np.concatenate((_THICK * _inward(sides), np.zeros((len(sides), 1))), axis=1)[:, None]
+    high[..., 2] += ROOF - _LID / 2.0
+    _add_quads(builder, sides - behind, high - behind, _TILES, ObjectClass.WALL)
 
 
 def _headroom(field: HeightField, points: Array) -> Array:
@@ -140,7 +173,7 @@ def add_bridge(
     builder: MeshBuilder, sheet: Sheet, number: int, field: HeightField, town: Town, ground: GroundArrays
 ) -> None:  # fmt: skip
     """Adds the decks of one level of bridges, with sides, undersides, parapets and pillars."""
-    deck = _at_height(cut_area(deck_area(town, sheet, _DECK_OVERLAP), _CELL), field, sheet.level)
+    deck = _at_height(cut_areas([(Area.FLAT, deck_area(town, sheet, _DECK_OVERLAP))], _CELL), field, sheet.level)
     add_sheet(builder, deck.corners, number)
     below = np.array([0.0, 0.0, _DECK_THICKNESS])
     builder.triangles(deck.corners[:, ::-1] - below, colour=_SHADED, kind=ObjectClass.BRIDGE)
@@ -191,12 +224,15 @@ def _add_pillars(
 # --- Parts ------------------------------------------------------------------------------------------------------------
 
 
-def _at_height(points: NDArray[np.int64], field: HeightField, level: int) -> GroundTriangles:
-    """Returns triangles of a bridge or tunnel (n, 3, 2) [grid steps] with their heights."""
+def _at_height(
+    cut: tuple[NDArray[np.int64], NDArray[np.int64]], field: HeightField, level: int
+) -> GroundTriangles:  # fmt: skip
+    """Returns triangles of a bridge or tunnel (n, 3, 2) [grid steps] with their areas (n,) and heights."""
+    points, areas = cut
     places, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
     heights = np.round(field.road(places * GRID, level) / GRID) * GRID
     corners = np.concatenate((points * GRID, heights[index.reshape(-1)].reshape(-1, 3)[..., None]), axis=2)
-    return GroundTriangles(corners, np.zeros(len(points), dtype=np.int64))
+    return GroundTriangles(corners, areas)
 
 
 def _inward(lines: Array) -> Array:

@@ -144,10 +144,11 @@ def add_faces(builder: MeshBuilder, edges: Edges, tunnels: BaseGeometry) -> None
         top, foot = places[rows].copy(), places[rows].copy()
         top[..., 2], foot[..., 2] = edges.heights[rows, above], edges.heights[rows, 1 - above]
         kinds = edges.areas[rows]
-        opening = (kinds[:, 1 - above] == Area.FLAT) & (kinds[:, above] & Area.COVERED != 0)
+        opening = (kinds[:, 1 - above] & Area.COVERED == 0) & (kinds[:, above] & Area.COVERED != 0)
         opening &= shapely.contains_xy(tunnels, *top[..., :2].mean(axis=1).T)
+        kerb = np.where(kinds[:, 1 - above] == Area.FLAT, 0.0, KERB_HEIGHT)[opening, None]
         foot[opening, :, 2] = np.maximum(
-            foot[opening, :, 2], np.minimum(foot[opening, :, 2] + PORTAL_HEIGHT, top[opening, :, 2] - ROOF)
+            foot[opening, :, 2], np.minimum(foot[opening, :, 2] - kerb + PORTAL_HEIGHT, top[opening, :, 2] - ROOF)
         )
         # seen from the lower side: from the left of the way if the first triangle is the higher one
         start, end = (1, 0) if above == 0 else (0, 1)

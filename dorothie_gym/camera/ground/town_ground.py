@@ -23,7 +23,7 @@ from dorothie_gym.camera.ground.structures import (
     add_tunnel,
     covered_ground,
     deck_area,
-    tunnel_floor,
+    tunnel_floors,
 )
 from dorothie_gym.camera.ground.surface import add_faces, add_sheet, find_edges, lifted
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface
@@ -81,7 +81,7 @@ def build_ground(town: Town) -> Ground:
     stretches = [part for sheet in sheets for part in sheet.stretches]
     field = HeightField(town, stretches)
     ground = sheets[GROUND_SHEET]
-    cover = covered_ground(town, stretches, ground)
+    cover = covered_ground(town, sheets)
     decks = [(sheet.level, deck_area(town, sheet)) for sheet in sheets if sheet.level > 0]
     regions = find_regions(ground.polygons)
     areas = _faces(regions, cover, only_areas(shapely.union_all([deck for _, deck in decks])), field)
@@ -90,8 +90,8 @@ def build_ground(town: Town) -> Ground:
     edges = find_edges(triangles)
     builder = MeshBuilder()
     add_sheet(builder, triangles.corners, GROUND_SHEET)
-    tunnels = tunnel_floor(town, sheets, cover)
-    add_faces(builder, edges, tunnels)
+    tunnels = tunnel_floors(town, sheets, cover)
+    add_faces(builder, edges, tunnels.area)
     add_portals(builder, edges)
     add_lids(builder, triangles)
     for number, sheet in enumerate(sheets):

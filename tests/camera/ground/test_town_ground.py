@@ -16,6 +16,8 @@ from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.rendering.ground import town_bounds
+from dorothie_gym.rendering.levels import LevelLookup, stretches
+from dorothie_gym.rendering.shapes import TownSamples
 from tests.maps.opendrive_text import shared_map
 
 TOWNS = ["brookside", "midtown", "Town05"]
@@ -118,6 +120,35 @@ def test_pavements_of_a_sunken_road_are_level() -> None:
         sunken += int(open_sky.sum())
     assert sunken > 20
     assert level >= 0.97 * sunken  # a pavement may end at the wall beside the mouth of the tunnel
+
+
+def test_pavements_continue_through_a_tunnel() -> None:
+    ground, town = ground_of("midtown"), town_of("midtown")
+    samples = TownSamples.of(town)
+    tunnels = LevelLookup(samples, [part for part in stretches(town, samples) if part.level < 0])
+    number = next(k for k, kind in enumerate(ground.arrays.outside.tolist()) if kind == Material.TUNNEL_FLOOR)
+    tried = 0
+    for walk in town.sidewalks:
+        way = np.diff(walk.points[:, :2], axis=0)
+        across = np.column_stack((-way[:, 1], way[:, 0])) / np.hypot(*way.T)[:, None]
+        middle = (walk.points[1:] + walk.points[:-1]) / 2.0
+        inside = tunnels.beside(middle, 8.0)
+        middle, across = middle[inside], across[inside]
+        for side in (-0.8, 0.0, 0.8):
+            places = middle + np.column_stack((side * across, np.zeros(len(across))))
+            floor = ground.height_at(places[:, :2], number)
+            here = np.isfinite(floor)  # not in the open before the mouth
+            np.testing.assert_allclose(floor[here] - places[here, 2], KERB_HEIGHT, atol=0.1)
+            kinds = np.empty(int(here.sum()), dtype=np.uint8)
+            materials_at(ground.arrays, number, np.ascontiguousarray(places[here, :2]), kinds)
+            assert (kinds == Material.PAVEMENT).all()
+            heads = places[here] + [0.0, 0.0, 1.8]
+            for turn in (-1.0, 1.0):  # nothing between people on it, nor over their heads
+                ways = np.column_stack((turn * across[here], np.zeros(int(here.sum()))))
+                assert distances(ground.mesh, heads - 0.3 * ways, ways).min(initial=9.0) > 0.4
+            assert distances(ground.mesh, heads, np.tile([0.0, 0.0, 1.0], (len(heads), 1))).min(initial=9.0) > 0.5
+            tried += int(here.sum())
+    assert tried > 30
 
 
 def test_kerbs_face_the_road() -> None:
