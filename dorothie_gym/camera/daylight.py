@@ -55,6 +55,7 @@ class Daylight(NamedTuple):
         wetness: of the road in [0, 1].
         lamps: strength of street lamps, lit windows and signs in [0, 1].
         head_lights: strength of the car's head lights in [0, 1].
+        beams: strength of the head lights of other vehicles in [0, 1].
     """
 
     sun: Array
@@ -74,6 +75,7 @@ class Daylight(NamedTuple):
     wetness: float
     lamps: float
     head_lights: float
+    beams: float
 
 
 def daylight_of(weather: Weather, *, head_lights: bool) -> Daylight:
@@ -120,6 +122,7 @@ def daylight_of(weather: Weather, *, head_lights: bool) -> Daylight:
         ),
         lamps=1.0 - _share(altitude, _LAMPS_ON, _LAMPS_OFF),
         head_lights=(0.15 + 0.85 * (1.0 - day)) if head_lights else 0.0,
+        beams=1.0 - day,
     )
 
 

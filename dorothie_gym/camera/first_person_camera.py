@@ -14,6 +14,7 @@ from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.daylight import Daylight, daylight_of
 from dorothie_gym.camera.faces import new_face
 from dorothie_gym.camera.ground.lookup import GroundArrays
+from dorothie_gym.camera.head_lights import draw_head_lights, new_head_lights
 from dorothie_gym.camera.labels import find_boxes, new_labels, write_labels
 from dorothie_gym.camera.lighting import LampMap, add_rain
 from dorothie_gym.camera.mesh import TOWN, Mesh, empty_mesh
@@ -125,6 +126,7 @@ class FirstPersonCamera:
             self._textures = textures_of(scene.atlas)
             self._face = new_face()
             self._shadows = new_shadow_maps(enabled=config.shadows)
+            self._beams = new_head_lights()
             self._scratch = np.zeros(max(width, height), np.uint8)
             self._light_key: tuple[float, ...] = ()
             self._casts_shadows = False
@@ -178,11 +180,13 @@ class FirstPersonCamera:
                     self._shadows, self.scene.town, self.scene.cells, self._overlay, self._overlay_cells, pose.x,
                     pose.y, pose.z, self.scene.bank.mesh, self.scene.bank.ranges, bodies,
                 )  # fmt: skip
+            if light.beams > 0.0:
+                draw_head_lights(self._beams, pose.x, pose.y, pose.heading, bodies)
             picture = np.empty((config.height, config.width, 3), np.uint8)
             shade(
-                view, optics_of(view, light, self._shadows), self._buffer, config.samples, self.scene.town,
+                view, optics_of(view, light, self._shadows, pose.tilt), self._buffer, config.samples, self.scene.town,
                 self._overlay, self._bodies, self.scene.ground, self._textures, light, sky_noise(), self.scene.lamps,
-                self._shadows, self._samples, self._face, picture.reshape(-1, 3),
+                self._beams, self._shadows, self._samples, self._face, picture.reshape(-1, 3),
             )  # fmt: skip
             if light.rainfall > 0.02:
                 add_rain(picture, light.rainfall, round(time * 30.0))
@@ -250,7 +254,7 @@ class FirstPersonCamera:
         """Size of the buffers [bytes]."""
         parts: list[tuple[object, ...]] = [self._bodies, self._overlay, self._samples]
         if self._draws_rgb:
-            parts += [self._buffer, *self._orders, self._shadows]
+            parts += [self._buffer, *self._orders, self._shadows, self._beams]
         if self._labelled:
             parts += [self._label_buffer, *self._label_orders, self._labels]
         return sum(array.nbytes for part in parts for array in part if isinstance(array, np.ndarray))

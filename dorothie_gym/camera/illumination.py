@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from dorothie_gym.camera.head_lights import HeadLights, beam_light
 from dorothie_gym.camera.lighting import (
     HAZE_START,
     WARM,
@@ -50,20 +51,23 @@ _GLOW = (0.8, 0.69, 0.5)  # factors of the light of lit windows
 
 
 @compiled
-def light_samples(optics: Optics, lamps: LampMap, shadows: ShadowMaps, samples: Samples, count: int) -> None:
+def light_samples(
+    optics: Optics, lamps: LampMap, beams: HeadLights, shadows: ShadowMaps, samples: Samples, count: int
+) -> None:  # fmt: skip
     """Changes the colours of surfaces to those that the camera sees of them, 0..255.
 
     Args:
         optics: numbers of the picture.
         lamps: light of street lamps.
+        beams: light of the head lights of other vehicles, that was drawn for the picture.
         shadows: maps that were drawn for the picture.
         samples: colours, places and surfaces.
         count: number of the samples.
     """
     values = samples.values
     _find_shadows(optics, shadows, samples, count)
-    if optics.lamps > 0.0 or optics.head_lights > 0.0:
-        _find_lamps(optics, lamps, samples, count)
+    if optics.lamps > 0.0 or optics.head_lights > 0.0 or optics.beams > 0.0:
+        _find_lamps(optics, lamps, beams, samples, count)
     else:
         for k in range(count):
             values[TWO + k] = 0.0
@@ -106,7 +110,7 @@ def _find_shadows(optics: Optics, shadows: ShadowMaps, samples: Samples, count: 
 
 
 @inlined
-def _find_lamps(optics: Optics, lamps: LampMap, samples: Samples, count: int) -> None:
+def _find_lamps(optics: Optics, lamps: LampMap, beams: HeadLights, samples: Samples, count: int) -> None:
     """Writes the factor of the light of lamps to TWO."""
     values = samples.values
     for k in range(count):
@@ -118,6 +122,8 @@ def _find_lamps(optics: Optics, lamps: LampMap, samples: Samples, count: int) ->
                 lamp = head_light(optics, x - optics.x, y - optics.y, z - optics.z, slant)
             if optics.lamps > 0.0:
                 lamp += lamp_light(lamps, x, y) * optics.lamps * values[LAMP + k]
+            if optics.beams > 0.0:
+                lamp += beam_light(beams, x, y, z) * optics.beams
         values[TWO + k] = lamp
 
 

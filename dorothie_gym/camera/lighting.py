@@ -97,7 +97,7 @@ def head_light(optics: Optics, x: float, y: float, z: float, slant: float) -> fl
     if ahead < 1.0:
         return 0.0
     cone = max(0.0, 1.0 - aside / (1.6 + 0.38 * ahead))
-    above = min(1.0, max(0.0, 1.0 - (z - 0.15) / (0.6 + 0.03 * ahead)))  # low beam
+    above = min(1.0, max(0.0, 1.0 - (z - optics.rise * ahead - 0.15) / (0.6 + 0.03 * ahead)))  # low beam
     return float(optics.head_lights * cone * above * _BEAM * 260.0 / (ahead * ahead + 260.0) * (0.35 + 0.65 * slant))
 
 

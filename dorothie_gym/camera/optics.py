@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from dorothie_gym.camera.daylight import Daylight
@@ -26,7 +27,8 @@ class Optics(NamedTuple):
         sky_r, sky_g, sky_b: factors of the light of the sky.
         horizon_r, horizon_g, horizon_b: colour.
         air_r, air_g, air_b: colour.
-        fog, fog_start, rain, wetness, lamps, head_lights: see `Daylight`.
+        fog, fog_start, rain, wetness, lamps, head_lights, beams: see `Daylight`.
+        rise: of the car per metre ahead.
         shadows: whether the sun casts shadows.
         slope_x, slope_y: see `ShadowMaps.slope`.
         town_x, town_y, bodies_x, bodies_y: first squares of the maps of shadows.
@@ -66,6 +68,8 @@ class Optics(NamedTuple):
     wetness: float
     lamps: float
     head_lights: float
+    beams: float
+    rise: float
     shadows: bool
     slope_x: float
     slope_y: float
@@ -75,13 +79,14 @@ class Optics(NamedTuple):
     bodies_y: int
 
 
-def optics_of(view: View, light: Daylight, maps: ShadowMaps) -> Optics:
-    """Returns the numbers of a picture whose shadows have been drawn."""
+def optics_of(view: View, light: Daylight, maps: ShadowMaps, tilt: float = 0.0) -> Optics:
+    """Returns the numbers of a picture whose shadows have been drawn; `tilt` of the car upwards [rad]."""
     colours = (light.sun, light.sunshine, light.ambient, light.horizon, light.air)
     return Optics(  # type: ignore[call-arg]  # unpacked arrays, in the order of the fields
         *view.origin.tolist(), *view.axes.ravel().tolist(), 1.0 / view.focal,
         *(value for colour in colours for value in colour.tolist()),
         light.fog, light.fog_start, light.rain, light.wetness, light.lamps, light.head_lights,
+        light.beams, math.tan(tilt),
         bool(maps.strength[0] > 0.0), *maps.slope.tolist(), *maps.window.tolist(),
     )  # fmt: skip
 

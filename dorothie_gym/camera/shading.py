@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dorothie_gym.camera.daylight import Daylight
 from dorothie_gym.camera.faces import Face, add_face, read_face
 from dorothie_gym.camera.ground.lookup import GroundArrays
+from dorothie_gym.camera.head_lights import HeadLights
 from dorothie_gym.camera.illumination import light_samples
 from dorothie_gym.camera.labels import mesh_of, row_in
 from dorothie_gym.camera.lighting import LampMap
@@ -33,7 +34,7 @@ _GROUND = int(Surface.GROUND)
 def shade(
     view: View, optics: Optics, buffer: VisibilityBuffer, side: int, town: Mesh, overlay: Mesh, bodies: Mesh,
     ground: GroundArrays, textures: Textures, light: Daylight, noise: NDArray[np.float32], lamps: LampMap,
-    shadows: ShadowMaps, samples: Samples, face: Face, picture: NDArray[np.uint8],
+    beams: HeadLights, shadows: ShadowMaps, samples: Samples, face: Face, picture: NDArray[np.uint8],
 ) -> None:  # fmt: skip
     """Writes the colours of a picture.
 
@@ -50,6 +51,7 @@ def shade(
         light: light and air.
         noise: of the sky.
         lamps: light of street lamps on the ground.
+        beams: light of the head lights of other vehicles, that was drawn for the picture.
         shadows: maps that were drawn for the picture.
         samples: scratch space.
         face: scratch space.
@@ -62,7 +64,7 @@ def shade(
         x = 0
         while x < view.width:
             if count > ROOM - 4:
-                light_samples(optics, lamps, shadows, samples, count)
+                light_samples(optics, lamps, beams, shadows, samples, count)
                 pixel = _write(samples, count, picture, pixel)
                 count = 0
             end = x + 1
@@ -90,7 +92,7 @@ def shade(
                         count += 1
                 samples.parts[first] = count - first
             x = end
-    light_samples(optics, lamps, shadows, samples, count)
+    light_samples(optics, lamps, beams, shadows, samples, count)
     _write(samples, count, picture, pixel)
 
 

@@ -25,6 +25,7 @@ from dorothie_gym.camera.ground.sheets import Sheet
 from dorothie_gym.camera.lighting import lamp_map
 from dorothie_gym.camera.mesh import MeshBuilder, Surface, empty_mesh
 from dorothie_gym.camera.models.model_bank import ModelBank, PlacementRecord
+from dorothie_gym.camera.models.vehicles import Lamps
 from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.maps.model import Array
@@ -257,6 +258,39 @@ def test_street_lamps_and_head_lights_shine_at_night() -> None:
     assert dark[ground & (distance < 3.0)].mean() > 2.0 * dark[ground & (distance > 30.0)].mean()
     ahead = ground & (places[..., 0] > 5.0) & (places[..., 0] < 12.0) & (np.abs(places[..., 1]) < 1.5)
     assert lit[ahead].mean() > dark[ahead].mean() + 20.0
+
+
+def test_head_lights_of_another_car_light_the_road_before_it_at_night() -> None:
+    builder = MeshBuilder()
+    builder.box((12.0, 3.0), 0.0, 0.2, 3.0, 2.0, 4.0, colour=WHITE, kind=ObjectClass.STATIC)  # a board above its beam
+    town = scene(builder)
+    model = town.bank
+    last = model.mesh.size
+    states = replace(  # by the lamps that are on
+        model, ranges=np.array([(0, last)] * 4, np.int32), boxes=np.repeat(model.boxes, 4, axis=0)
+    )
+    camera = FirstPersonCamera(replace(town, bank=states), CONFIG)
+    bodies = placed((20.0, 3.0, math.pi))
+
+    def picture(sky: Weather, lamps: Lamps) -> Array:
+        bodies[0].model = int(lamps)
+        found = camera.render(EYE, sky, bodies=bodies).rgb
+        assert found is not None
+        return found.astype(float)
+
+    night, noon = weather(sun_altitude_angle=-40.0), weather()
+    frame = camera.render(EYE, night, bodies=bodies)
+    assert frame.depth is not None and frame.semantic is not None
+    places = frame.view.origin + frame.view.rays() * np.where(np.isinf(frame.depth), 0.0, frame.depth)[..., None]
+    more = (picture(night, Lamps.LIGHTS) - picture(night, Lamps.BRAKES)).mean(axis=-1)
+    road = frame.semantic == ObjectClass.ROAD.value
+    before = road & (np.abs(places[..., 1] - 3.0) < 1.0) & (places[..., 0] > 7.0) & (places[..., 0] < 15.0)
+    beside = road & (np.abs(places[..., 1] - 3.0) > 12.0)
+    board = frame.semantic == ObjectClass.STATIC.value
+    assert before.sum() > 20 and beside.sum() > 200 and board.sum() > 20
+    assert more[before].min() > 8.0
+    assert np.abs(more[beside | board]).max() == 0.0
+    assert (picture(noon, Lamps.LIGHTS) == picture(noon, Lamps.BRAKES)).all()
 
 
 def test_lamps_of_signals_change_their_colour() -> None:

@@ -23,6 +23,9 @@ from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Kind, Walk
 
+LAMP_STATES = 4
+"""Number of combinations of `Lamps`; the state of a vehicle is the rest of its model's index."""
+
 COARSE_FROM = 40.0
 """Distance from which on people have few triangles [m]."""
 
@@ -30,14 +33,13 @@ BRAKING = -0.6
 """Acceleration below which brake lamps are on [m/s^2]: less is engine drag."""
 
 _STAND = 0.1  # [m/s] a car stands, with the brakes on, and a person does not walk
-_STATES = 4  # combinations of `Lamps`
 _COARSE_STEP = 2  # of the phases of walking, every second one has a coarse version
 _COARSE_POSES = PHASES // _COARSE_STEP + 1
 
 # which type a car has: out of sixteen
 _TYPES = np.array([0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 3, 3, 3], dtype=np.int64)
 
-FIRST_CYCLIST = len(VehicleType) * len(PAINTS) * _STATES
+FIRST_CYCLIST = len(VehicleType) * len(PAINTS) * LAMP_STATES
 FIRST_PERSON = FIRST_CYCLIST + len(RIDERS) * PEDAL_PHASES
 FIRST_COARSE = FIRST_PERSON + len(LOOKS) * POSES
 FIRST_PROP = FIRST_COARSE + len(LOOKS) * _COARSE_POSES
@@ -71,7 +73,7 @@ def model_bank() -> ModelBank:
     models: list[Mesh] = []
     for kind in VehicleType:
         form = vehicle_form(kind)
-        models += [painted_vehicle(form, paint, Lamps(state)) for paint in PAINTS for state in range(_STATES)]
+        models += [painted_vehicle(form, paint, Lamps(state)) for paint in PAINTS for state in range(LAMP_STATES)]
     riding = [cyclist_form(phase) for phase in range(PEDAL_PHASES)]
     models += [dressed_cyclist(form, rider) for rider in RIDERS for form in riding]
     fine = {outfit: [person_form(outfit, pose) for pose in range(POSES)] for outfit in Outfit}
@@ -124,7 +126,7 @@ def vehicle_model(vehicle: VehicleRecord, lights: bool) -> int:
     lamps = 2 if lights else 0
     if vehicle.acceleration < BRAKING or abs(vehicle.speed) < _STAND:
         lamps += 1
-    return int((form * _PAINTS + mixed(key, 3) % _PAINTS) * _STATES + lamps)
+    return int((form * _PAINTS + mixed(key, 3) % _PAINTS) * LAMP_STATES + lamps)
 
 
 @compiled
