@@ -17,11 +17,17 @@ VISION_MODELS: Final = ("segformer", "detr")
 
 _FIGURES: Final[Mapping[str, Mapping[str, str]]] = {
     "segformer": {"miou": "mIoU", "macc": "mAcc", "aacc": "aAcc", "depth_error": "depth error"},
-    "detr": {"ap50": "AP50", "ap50_95": "AP50:95"},
-}
+    "detr": {
+        "ap50": "AP50", "ap50_95": "AP50:95", "ap_place": "AP 2 m", "place_error": "place", "range_error": "depth",
+        "size_error": "size", "heading_error": "heading",
+    },
+}  # fmt: skip
+_UNITS: Final[Mapping[str, str]] = {"place_error": "m", "heading_error": "deg"}
+"""Units of figures that are no shares."""
 _MEANINGS: Final[Mapping[str, str]] = {
     "segformer": "Means over the classes that occur in the fold; depth error: mean relative error up to 80 m.",
-    "detr": "Objects with at least 64 visible pixels; means over the kinds that occur in the fold.",
+    "detr": "Objects with at least 64 visible pixels; AP: means over the kinds that occur in the fold, of boxes in the "
+    "picture and of places in space up to 2 m apart. Then mean errors in space of those found.",
 }
 
 
@@ -92,8 +98,8 @@ def _show(model: str, results: Sequence[Mapping[str, Any]]) -> None:
     for result in results:
         for towns, figures in result["test"].items():
             label = f"{towns} towns" + (f", seed {result['seed']}" if len(results) > 1 else "")
-            table.add_row(label, *(_percent(figures[name]) for name in names))
-    table.add_row("paper", *(_percent(results[0]["paper"].get(name)) for name in names), style="dim")
+            table.add_row(label, *(_shown(name, figures[name]) for name in names))
+    table.add_row("paper", *(_shown(name, results[0]["paper"].get(name)) for name in names), style="dim")
     wide_stdout().print(table)
     stdout().print(_MEANINGS[model], style="dim", markup=False, soft_wrap=True)
     for result in results:
@@ -104,5 +110,9 @@ def _show(model: str, results: Sequence[Mapping[str, Any]]) -> None:
         )  # fmt: skip
 
 
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100.0 * value:.1f} %"
+def _shown(name: str, value: float | None) -> str:
+    """Returns a figure with its unit, "-" where there is none."""
+    if value is None:
+        return "-"
+    unit = _UNITS.get(name)
+    return f"{100.0 * value:.1f} %" if unit is None else f"{value:.1f} {unit}"

@@ -1,7 +1,8 @@
 """Deformable DETR on five channels (Zhu et al., 2021; paper, appendix C): RGB, depth and class of each pixel.
 
 Letters in shapes: B pictures of h x w pixels, q queries of d numbers, k kinds of objects. The detector is from
-`transformers`, built from a config with a ResNet as backbone; nothing is downloaded.
+`transformers`, built from a config with a ResNet as backbone; nothing is downloaded. As in the paper, a second head
+predicts a box in space for each query.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines.vision.frames import CLASSES
-from dorothie_gym.baselines.vision.libraries import transformers
+from dorothie_gym.baselines.vision.libraries import matcher_of, transformers
 from dorothie_gym.baselines.vision.segformer import FARTHEST, NEAREST
+from dorothie_gym.baselines.vision.solids import SOLID, solid_loss, solids_from
 from dorothie_gym.ontology import ObjectClass
 
 KINDS: Final = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
@@ -25,6 +27,7 @@ KINDS: Final = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC
 
 _CHANNELS: Final = 4  # RGB and depth; the class is looked up
 _PRIOR: Final = 0.01  # sureness at first (Lin et al., 2017)
+_FIRST_SOLID: Final = (0.0, 0.0, math.log(15.0), *(math.log(size) for size in (3.0, 1.5, 1.6)), 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +58,7 @@ class DetectorConfig:
         epochs: passes over the training pictures.
         zoom: share of a picture's width and height in the smallest part that training enlarges to a whole picture.
         least_pixels: visible pixels from which on an object has to be found in training.
+        solid_loss: weight of the loss of boxes in space.
     """
 
     width: int = 320
@@ -79,6 +83,7 @@ class DetectorConfig:
     epochs: int = 12
     zoom: float = 0.5
     least_pixels: int = 32
+    solid_loss: float = 0.5
 
     def __post_init__(self) -> None:
         if self.width % 32 or self.height % 32 or min(self.width, self.height) < 64:
@@ -89,6 +94,8 @@ class DetectorConfig:
             raise ValueError(f"DetectorConfig.levels is {self.levels}; it must be 3 or 4")
         if not 0.1 <= self.zoom <= 1.0:
             raise ValueError(f"DetectorConfig.zoom is {self.zoom}; it must be in 0.1..1")
+        if not 0.0 <= self.solid_loss <= 100.0:
+            raise ValueError(f"DetectorConfig.solid_loss is {self.solid_loss}; it must be in 0..100")
 
     @classmethod
     def small(cls) -> Self:
@@ -110,17 +117,44 @@ class DetectorConfig:
 
 
 @dataclass(frozen=True, eq=False)
+class Targets:
+    """Objects that have to be found in a picture.
+
+    Attributes:
+        boxes: (n, 4) as of `Detections`.
+        kinds: (n,) rows of `KINDS`.
+        solids: (n, 8) boxes in space.
+        known: (n,) bool, whether the solid is known.
+    """
+
+    boxes: Tensor
+    kinds: Tensor
+    solids: Tensor
+    known: Tensor
+
+    def of(self, chosen: Tensor) -> Self:
+        """Returns the chosen objects."""
+        return type(self)(self.boxes[chosen], self.kinds[chosen], self.solids[chosen], self.known[chosen])
+
+    def to(self, device: torch.device) -> Self:
+        """Returns the objects on a device."""
+        return type(self)(*(part.to(device) for part in (self.boxes, self.kinds, self.solids, self.known)))
+
+
+@dataclass(frozen=True, eq=False)
 class Detections:
     """What is found in B pictures.
 
     Attributes:
         boxes: (B, q, 4) middle x and y, width and height, in widths and heights of the picture.
         scores: (B, q, k) sureness in 0..1.
+        solids: (B, q, 8) boxes in space, see `solids`.
         queries: (B, q, d) vectors of the queries after the last layer.
     """
 
     boxes: Tensor
     scores: Tensor
+    solids: Tensor
     queries: Tensor
 
 
@@ -147,9 +181,14 @@ class Detector(nn.Module):
         )  # fmt: skip
         self._without_layers = copy.copy(self.settings)
         self._without_layers.auxiliary_loss = False
+        self._matcher: Any = matcher_of(self.settings)
         self.colours = nn.Conv2d(_CHANNELS, config.encoded, 1)
         self.kinds = nn.Embedding(CLASSES, config.encoded)
         self.detr: Any = library.DeformableDetrForObjectDetection(self.settings)
+        self.solid_head = nn.Sequential(
+            nn.Linear(config.size, config.size), nn.ReLU(), nn.Linear(config.size, config.size), nn.ReLU(),
+            nn.Linear(config.size, SOLID),
+        )  # fmt: skip
         self._start_heads()
         self.register_state_dict_post_hook(_drop_shared)  # type: ignore[no-untyped-call]
         self.register_load_state_dict_pre_hook(_add_shared)  # type: ignore[no-untyped-call]
@@ -166,11 +205,17 @@ class Detector(nn.Module):
             nn.init.zeros_(head.layers[-1].bias)
             if not self.config.two_stage:
                 nn.init.constant_(head.layers[-1].bias[2:], -2.0)
+        last = self.solid_head[-1]
+        assert isinstance(last, nn.Linear)
+        nn.init.zeros_(last.weight)
+        with torch.no_grad():
+            last.bias.copy_(torch.tensor(_FIRST_SOLID))
 
     def forward(self, rgb: Tensor, depth: Tensor, semantic: Tensor) -> Detections:
         """Returns what is found in pictures (B, 3, h, w) in [-1, 1], depths [m] and classes (B, h, w)."""
         found = self.detr(pixel_values=self.encoded(rgb, depth, semantic))
-        return Detections(found.pred_boxes, found.logits.sigmoid(), found.last_hidden_state)
+        solids = solids_from(found.pred_boxes, self.solid_head(found.last_hidden_state))
+        return Detections(found.pred_boxes, found.logits.sigmoid(), solids, found.last_hidden_state)
 
     def encoded(self, rgb: Tensor, depth: Tensor, semantic: Tensor) -> Tensor:
         """Returns the five channels of pictures, encoded (B, c, h, w)."""
@@ -179,19 +224,16 @@ class Detector(nn.Module):
         mixed: Tensor = self.colours(torch.cat((rgb, scaled[:, None]), 1)) + self.kinds(semantic).permute(0, 3, 1, 2)
         return mixed
 
-    def loss(
-        self, rgb: Tensor, depth: Tensor, semantic: Tensor, boxes: Sequence[Tensor], kinds: Sequence[Tensor]
-    ) -> Tensor:
+    def loss(self, rgb: Tensor, depth: Tensor, semantic: Tensor, wanted: Sequence[Targets]) -> Tensor:
         """Returns the mean loss of B pictures.
 
         Args:
             rgb: (B, 3, h, w) in [-1, 1].
             depth: (B, h, w) [m].
             semantic: (B, h, w) classes.
-            boxes: of each picture (n, 4), as of `Detections`.
-            kinds: of each picture (n,), rows of `KINDS`.
+            wanted: objects of each picture.
         """
-        labels = [{"class_labels": kind, "boxes": box} for kind, box in zip(kinds, boxes, strict=True)]
+        labels = [{"class_labels": target.kinds, "boxes": target.boxes} for target in wanted]
         found = self.detr(pixel_values=self.encoded(rgb, depth, semantic), labels=labels)
         loss: Tensor = found.loss
         if self.config.two_stage:  # objects of any kind at the cells of the encoder, which the library leaves out
@@ -200,7 +242,21 @@ class Detector(nn.Module):
             loss = loss + self.detr.loss_function(
                 found.enc_outputs_class, objects, rgb.device, proposals, self._without_layers, None, None
             )[0]  # fmt: skip
+        if self.config.solid_loss:
+            loss = loss + self.config.solid_loss * self._solid_loss(found, labels, wanted)
         return loss
+
+    def _solid_loss(self, found: Any, labels: list[dict[str, Tensor]], wanted: Sequence[Targets]) -> Tensor:
+        """Returns the loss of the boxes in space of the queries that are matched to objects."""
+        with torch.no_grad():
+            pairs = self._matcher({"logits": found.logits, "pred_boxes": found.pred_boxes}, labels)
+        solids = solids_from(found.pred_boxes.detach(), self.solid_head(found.last_hidden_state))
+        matched = []
+        for number, ((queries, objects), target) in enumerate(zip(pairs, wanted, strict=True)):
+            known = target.known[objects.to(target.known.device)].to(queries.device)
+            rows, places = objects[known].to(solids.device), queries[known].to(solids.device)
+            matched.append((solids[number, places], target.solids[rows], target.boxes[rows]))
+        return solid_loss(*(torch.cat(column) for column in zip(*matched, strict=True)))
 
 
 def _second_names(module: nn.Module) -> dict[str, str]:

@@ -19,10 +19,12 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.camera.scene_cache import builder_digest
+from dorothie_gym.camera.solid_boxes import SolidBoxes
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.files import PART
 from dorothie_gym.maps import Town
@@ -39,17 +41,22 @@ OnFrames: TypeAlias = Callable[[int, int], None]
 CLASSES: Final = 23
 """Number of CARLA's semantic classes, `ObjectClass` without QUERIED."""
 
+SPACE_COLUMNS: Final = ("x", "y", "z", "length", "width", "height", "heading")
+"""Columns of a body's upright box in space: middle to the right, down and along the axis of the camera, size [m], and
+heading relative to the camera's, clockwise from above [rad]."""
+
 BOX_DTYPE: Final = np.dtype(
     [(name, np.int32) for name in ("picture", "kind", "left", "top", "right", "bottom", "pixels")]
+    + [(name, np.float32) for name in SPACE_COLUMNS]
 )
-"""Number of the picture in its session, `ObjectClass`, limits behind the last pixel, visible pixels."""
+"""Number of the picture in its session, `ObjectClass`, limits behind the last pixel, visible pixels, box in space."""
 
 CAMERA_FAULTS: Final = (Sensor.BLUR, Sensor.VIEW)
 """Faults that show in pictures."""
 
 _NEAR: Final = 45.0  # [m] farther road users have few pixels
 _TRIED: Final = 2  # pictures that are looked at for one that is chosen
-_FORMAT: Final = 1
+_FORMAT: Final = 2
 _OUTPUTS: Final = (
     CameraOutput.RGB, CameraOutput.DEPTH, CameraOutput.SEMANTIC, CameraOutput.INSTANCE, CameraOutput.BOXES,
 )  # fmt: skip
@@ -173,7 +180,7 @@ class SessionFrames:
         rgb: (n, h, w, 3) uint8.
         semantic: (n, h, w) uint8 `ObjectClass`.
         depth: (n, h, w) float16 distance along the axis of the camera [m], infinite for the sky.
-        boxes: (m,) of `BOX_DTYPE`, by ascending picture: road users and props.
+        boxes: (m,) of `BOX_DTYPE`, by ascending picture: road users and props, in the picture and in space.
         frames: (n,) int64 frames of the session (30 Hz).
     """
 
@@ -319,13 +326,11 @@ def _draw(task: _Task) -> _Drawn:
     target = folder / key
     if _recall(target, session.name, town.name, sampling) is None:
         pictures = RecordedPictures(session, town, sampling.camera)
-        _write(target, pictures.picture, sampling.choose(session, town), sampling)
+        _write(target, pictures, sampling.choose(session, town), sampling)
     return number, target, session.name, town.name
 
 
-def _write(
-    target: Path, picture: Callable[[int], CameraFrame], frames: NDArray[np.int64], sampling: FrameSampling
-) -> None:
+def _write(target: Path, pictures: RecordedPictures, frames: NDArray[np.int64], sampling: FrameSampling) -> None:
     """Draws pictures into a new folder, which gets its name when it is whole."""
     size = len(frames), sampling.height, sampling.width
     part = Path(tempfile.mkdtemp(prefix=f"{target.name[:16]}.", suffix=PART, dir=target.parent))
@@ -335,9 +340,9 @@ def _write(
         depth: Any = np.lib.format.open_memmap(part / "depth.npy", mode="w+", dtype=np.float16, shape=size)
         boxes = [np.empty(0, BOX_DTYPE)]
         for k, frame in enumerate(frames.tolist()):
-            drawn = picture(frame)
+            drawn = pictures.picture(frame)
             rgb[k], semantic[k], depth[k] = drawn.rgb, drawn.semantic, drawn.depth
-            boxes.append(_boxes(k, drawn))
+            boxes.append(_boxes(k, drawn, pictures.solid_boxes(frame), pictures.pose(frame).heading))
         del rgb, semantic, depth  # writes them
         np.save(part / "boxes.npy", np.concatenate(boxes), allow_pickle=False)
         np.save(part / "frames.npy", frames, allow_pickle=False)
@@ -348,16 +353,31 @@ def _write(
         shutil.rmtree(part, ignore_errors=True)
 
 
-def _boxes(number: int, drawn: CameraFrame) -> NDArray[np.void]:
-    """Returns the boxes of road users and props in a picture; the class is the commonest of their pixels."""
+def _boxes(number: int, drawn: CameraFrame, solid: SolidBoxes, heading: float) -> NDArray[np.void]:
+    """Returns the boxes of road users and props in a picture; the class is the commonest of their pixels.
+
+    Args:
+        number: of the picture.
+        drawn: the picture.
+        solid: boxes in space of the bodies near the camera.
+        heading: of the camera [rad].
+    """
     assert drawn.boxes is not None and drawn.instance is not None and drawn.semantic is not None
+    places = {key: place for place, key in enumerate(solid.keys.tolist())}
+    middles = (solid.centres - drawn.view.origin) @ drawn.view.axes.T  # right, up, ahead
     chosen = np.flatnonzero(drawn.boxes.keys > 0)  # landmarks have negative keys
     rows = np.zeros(len(chosen), BOX_DTYPE)
     for place, k in enumerate(chosen.tolist()):
         left, top, right, bottom = drawn.boxes.limits[k].tolist()
         inside = drawn.instance[top:bottom, left:right] == drawn.boxes.keys[k]
         kind = int(np.bincount(drawn.semantic[top:bottom, left:right][inside]).argmax())
-        rows[place] = (number, kind, left, top, right, bottom, int(drawn.boxes.pixels[k]))
+        body = places[int(drawn.boxes.keys[k])]
+        aside, up, ahead = middles[body].tolist()
+        turned = wrap_radians(float(solid.headings[body]) - heading)
+        rows[place] = (
+            number, kind, left, top, right, bottom, int(drawn.boxes.pixels[k]), aside, -up, ahead,
+            *solid.sizes[body].tolist(), turned,
+        )  # fmt: skip
     return rows
 
 

@@ -20,3 +20,12 @@ def transformers() -> Any:
         raise EncoderError(
             f"vision models need transformers ({error}); run: pip install 'dorothie-gym[vision]'"
         ) from None
+
+
+def matcher_of(settings: Any) -> Any:
+    """Returns the module that matches queries to objects, as the loss of a `DeformableDetrConfig` does."""
+    transformers()
+    module = importlib.import_module("transformers.loss.loss_deformable_detr")
+    return module.DeformableDetrHungarianMatcher(
+        class_cost=settings.class_cost, bbox_cost=settings.bbox_cost, giou_cost=settings.giou_cost
+    )

@@ -4,18 +4,22 @@ Classes present are those with at least one true pixel in the pictures that are 
 these. Objects are tested class by class as in COCO: a detection is right if its box overlaps one of the picture's true
 boxes of its class, not found by a surer detection, by at least a share of their union. Precision is read at 101 values
 of recall. True boxes with few visible pixels are ignored: they need not be found, and detections of them do not count.
+
+Boxes in space are tested like nuScenes (Caesar et al., CVPR 2020): average precision where a detection is right if its
+middle is at most 2 m from a true one, height aside, and mean errors of the detections that are right by overlap.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.baselines.vision.frames import CLASSES
 from dorothie_gym.ontology import ObjectClass
 
@@ -26,6 +30,9 @@ DEPTH_RANGE: Final = 80.0
 
 OVERLAPS: Final = tuple(round(0.5 + 0.05 * k, 2) for k in range(10))
 """COCO's thresholds of overlap."""
+
+PLACE_RADIUS: Final = 2.0
+"""Largest distance of the middles of a true and a detected box in space that belong together [m]."""
 
 _RECALLS: Final = np.linspace(0.0, 1.0, 101)
 
@@ -87,38 +94,126 @@ class PictureBoxes:
         true: (n, 4).
         kinds: (n,) classes.
         ignored: (n,) bool, whether a true box is ignored.
+        spaces: (n, 7) boxes in space, `SPACE_COLUMNS`.
         detected: (m, 4).
         detected_kinds: (m,) classes.
         scores: (m,) sureness.
+        detected_spaces: (m, 7) boxes in space.
     """
 
     true: Array
     kinds: NDArray[np.int64]
     ignored: NDArray[np.bool_]
+    spaces: Array
     detected: Array
     detected_kinds: NDArray[np.int64]
     scores: Array
+    detected_spaces: Array
+
+    def of_kind(self, kind: int) -> PictureBoxes:
+        """Returns the boxes of one kind, those detected the surest first."""
+        true, found = self.kinds == kind, np.flatnonzero(self.detected_kinds == kind)
+        found = found[np.argsort(-self.scores[found], kind="stable")]
+        return PictureBoxes(
+            self.true[true], self.kinds[true], self.ignored[true], self.spaces[true], self.detected[found],
+            self.detected_kinds[found], self.scores[found], self.detected_spaces[found],
+        )  # fmt: skip
 
 
-def average_precisions(pictures: Sequence[PictureBoxes], overlaps: Sequence[float] = OVERLAPS) -> Array:
+Closeness: TypeAlias = Callable[[PictureBoxes], Array]
+"""Returns how close each detected box is to each true one (m, n)."""
+
+
+def _overlap(picture: PictureBoxes) -> Array:
+    return box_overlaps(picture.detected, picture.true)
+
+
+def _nearness(picture: PictureBoxes) -> Array:
+    """Returns the negative distances of the middles, height aside (m, n) [m]."""
+    x, _, z = (picture.detected_spaces[:, None, :3] - picture.spaces[None, :, :3]).transpose(2, 0, 1)
+    return np.asarray(-np.hypot(x, z))
+
+
+def average_precisions(
+    pictures: Sequence[PictureBoxes], overlaps: Sequence[float] = OVERLAPS, closeness: Closeness = _overlap
+) -> Array:
     """Returns the average precision (k,) at each overlap, mean over the classes that have a true box; NaN for none."""
-    kinds = sorted({int(kind) for picture in pictures for kind in picture.kinds[~picture.ignored]})
+    kinds = _kinds_of(pictures)
     if not kinds:
         return np.full(len(overlaps), math.nan)
-    return np.asarray(np.mean([_of_kind(pictures, kind, overlaps) for kind in kinds], axis=0))
+    return np.asarray(np.mean([_of_kind(pictures, kind, overlaps, closeness) for kind in kinds], axis=0))
 
 
-def _of_kind(pictures: Sequence[PictureBoxes], kind: int, overlaps: Sequence[float]) -> Array:
-    """Returns the average precision (k,) of a class at each overlap."""
+def place_precision(pictures: Sequence[PictureBoxes]) -> float:
+    """Returns the average precision by places, mean over the classes that have a true box; NaN for none."""
+    return float(average_precisions(pictures, (-PLACE_RADIUS,), _nearness)[0])
+
+
+def space_errors(pictures: Sequence[PictureBoxes], turned: Sequence[int]) -> dict[str, float]:
+    """Returns the mean errors of boxes in space whose boxes in the picture are right at an overlap of one half.
+
+    Args:
+        pictures: boxes of each picture.
+        turned: kinds whose headings are compared.
+
+    Returns:
+        place_error: distance of the middles, height aside [m].
+        range_error: |detected - true| / true depth.
+        size_error: 1 less intersection over union of the boxes, were they at one place with one heading.
+        heading_error: [degrees].
+        NaN where no box is right.
+    """
+    rows: dict[str, list[Array]] = {name: [] for name in ("place", "range", "size", "heading")}
+    for kind in _kinds_of(pictures):
+        for picture in (each.of_kind(kind) for each in pictures):
+            partner = _partners(_overlap(picture), picture.ignored, 0.5)
+            found, true = picture.detected_spaces[partner >= 0], picture.spaces[partner[partner >= 0]]
+            rows["place"].append(np.hypot(found[:, 0] - true[:, 0], found[:, 2] - true[:, 2]))
+            rows["range"].append(np.abs(found[:, 2] - true[:, 2]) / np.maximum(true[:, 2], 1.0))
+            common = np.prod(np.minimum(found[:, 3:6], true[:, 3:6]), axis=1)
+            rows["size"].append(1.0 - common / (found[:, 3:6].prod(1) + true[:, 3:6].prod(1) - common))
+            if kind in turned:
+                rows["heading"].append(np.abs(np.degrees(wrap_radians(found[:, 6] - true[:, 6]))))
+    every = {name: np.concatenate(parts) if parts else np.empty(0) for name, parts in rows.items()}
+    return {f"{name}_error": float(values.mean()) if len(values) else math.nan for name, values in every.items()}
+
+
+def best_threshold(pictures: Sequence[PictureBoxes]) -> tuple[float, float]:
+    """Returns the least score of detections with the highest F1 at an overlap of one half, and the F1; or (1, 0).
+
+    Precision and recall are over the boxes of all classes.
+    """
+    scores, right, wanted = [np.empty(0)], [np.empty(0, dtype=np.bool_)], 0
+    for kind in _kinds_of(pictures):
+        for picture in (each.of_kind(kind) for each in pictures):
+            wanted += int((~picture.ignored).sum())
+            partner = _partners(_overlap(picture), picture.ignored, 0.5)
+            counts = partner > _OF_IGNORED
+            scores.append(picture.scores[counts])
+            right.append(partner[counts] >= 0)
+    score, hit = np.concatenate(scores), np.concatenate(right)
+    if not hit.any():
+        return 1.0, 0.0
+    order = np.argsort(-score, kind="stable")
+    score, found = score[order], np.cumsum(hit[order])
+    last = np.append(score[1:] < score[:-1], True)  # a threshold takes all detections of a score
+    f1 = np.where(last, 2.0 * found / (np.arange(1, len(score) + 1) + wanted), 0.0)
+    best = int(np.argmax(f1))
+    return float(score[best]), float(f1[best])
+
+
+def _kinds_of(pictures: Sequence[PictureBoxes]) -> list[int]:
+    """Returns the classes that have a true box, rising."""
+    return sorted({int(kind) for picture in pictures for kind in picture.kinds[~picture.ignored]})
+
+
+def _of_kind(pictures: Sequence[PictureBoxes], kind: int, least: Sequence[float], closeness: Closeness) -> Array:
+    """Returns the average precision (k,) of a class at each least closeness."""
     scores, right, counted, wanted = [], [], [], 0
-    for picture in pictures:
-        true, found = picture.kinds == kind, picture.detected_kinds == kind
-        order = np.argsort(-picture.scores[found], kind="stable")
-        boxes, ignored = picture.true[true], picture.ignored[true]
-        wanted += int((~ignored).sum())
-        shares = box_overlaps(picture.detected[found][order], boxes)
-        hit, counts = _matched(shares, ignored, np.asarray(overlaps))
-        scores.append(picture.scores[found][order])
+    for picture in (each.of_kind(kind) for each in pictures):
+        wanted += int((~picture.ignored).sum())
+        hit, counts = _matched(closeness(picture), picture.ignored, np.asarray(least))
+        scores.append(picture.scores)
         right.append(hit)
         counted.append(counts)
     order = np.argsort(-np.concatenate(scores), kind="stable")
@@ -126,21 +221,29 @@ def _of_kind(pictures: Sequence[PictureBoxes], kind: int, overlaps: Sequence[flo
     return np.array([_precision(hit[count], wanted) for hit, count in zip(hits, counts, strict=True)])
 
 
-def _matched(shares: Array, ignored: NDArray[np.bool_], overlaps: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Returns whether each detection (k, m), the surest first, is right at each overlap, and whether it counts."""
-    hit = np.zeros((len(overlaps), len(shares)), dtype=np.bool_)
-    counts = np.ones_like(hit)
-    for row, least in enumerate(overlaps):
-        free = np.ones(len(ignored), dtype=np.bool_)
-        for number, share in enumerate(shares):
-            fits = (share >= least) & free
-            wanted = np.flatnonzero(fits & ~ignored)
-            if len(wanted):
-                best = wanted[np.argmax(share[wanted])]
-                free[best], hit[row, number] = False, True
-            elif (fits & ignored).any():  # several detections may cover a box that is ignored
-                counts[row, number] = False
-    return hit, counts
+def _matched(shares: Array, ignored: NDArray[np.bool_], least: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Returns whether each detection (k, m), the surest first, is right at each closeness, and whether it counts."""
+    partners = np.array([_partners(shares, ignored, each) for each in least.tolist()]).reshape(len(least), len(shares))
+    return partners >= 0, partners > _OF_IGNORED
+
+
+_NOBODY: Final = -1
+_OF_IGNORED: Final = -2
+
+
+def _partners(shares: Array, ignored: NDArray[np.bool_], least: float) -> NDArray[np.int64]:
+    """Returns the true box of each detection (m,), the surest first; or `_NOBODY`, or `_OF_IGNORED`."""
+    partners = np.full(len(shares), _NOBODY, dtype=np.int64)
+    free = np.ones(len(ignored), dtype=np.bool_)
+    for number in np.flatnonzero((shares >= least).any(axis=1)).tolist():
+        fits = (shares[number] >= least) & free
+        wanted = np.flatnonzero(fits & ~ignored)
+        if len(wanted):
+            partners[number] = wanted[np.argmax(shares[number, wanted])]
+            free[partners[number]] = False
+        elif (fits & ignored).any():  # several detections may cover a box that is ignored
+            partners[number] = _OF_IGNORED
+    return partners
 
 
 def _precision(hit: NDArray[np.bool_], wanted: int) -> float:

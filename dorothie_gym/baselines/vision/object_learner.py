@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar, Final
 
 import numpy as np
@@ -10,14 +11,24 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.vision.detector import KINDS, Detector, DetectorConfig
-from dorothie_gym.baselines.vision.frames import FrameSet, Pictures
-from dorothie_gym.baselines.vision.metrics import PictureBoxes, average_precisions
+from dorothie_gym.baselines.vision.detector import KINDS, Detector, DetectorConfig, Targets
+from dorothie_gym.baselines.vision.frames import SPACE_COLUMNS, FrameSampling, FrameSet, Pictures
+from dorothie_gym.baselines.vision.metrics import (
+    PictureBoxes,
+    average_precisions,
+    best_threshold,
+    place_precision,
+    space_errors,
+)
 from dorothie_gym.baselines.vision.pixel_learner import labelled
+from dorothie_gym.baselines.vision.solids import Focals, enlarged, mirrored, solids_of, spaces_of
 from dorothie_gym.baselines.vision.training import Learner
 
 LEAST_PIXELS: Final = 64
 """Visible pixels from which on an object has to be found in tests; others are ignored."""
+
+TURNED: Final = (0, 1)
+"""Rows of `KINDS` whose headings mean something: props look alike from several sides."""
 
 VALIDATED: Final = 150
 """Largest number of validation pictures after an epoch, evenly chosen."""
@@ -57,25 +68,26 @@ class ObjectLearner(Learner):
         """Returns the mean loss of some training pictures, half of them mirrored, enlarged parts of the whole."""
         pictures = self._training.take(rows)
         rgb, depth, semantic = inputs(pictures, self.device)
-        images, wanted, labels = [], list[Tensor](), list[Tensor]()
+        images, wanted = [], []
         for k, boxes in enumerate(pictures.boxes):
-            true, kinds = targets(boxes, self.config.least_pixels, rgb.shape[-1], rgb.shape[-2])
+            true = targets(boxes, self.config)
             window = _window(self.config.zoom)
-            true, kinds = _boxes_in(true, kinds, window)
+            true = _in_part(true, window)
             part = _part(rgb[k], depth[k], semantic[k], window)
             if float(torch.rand(())) < 0.5:
-                part = tuple(image.flip(-1) for image in part)
-                true = torch.cat((1.0 - true[:, :1], true[:, 1:]), 1)
+                part, true = tuple(image.flip(-1) for image in part), _mirrored(true)
             images.append(part)
             wanted.append(true.to(self.device))
-            labels.append(kinds.to(self.device))
         colours, depths, classes = (torch.stack(column) for column in zip(*images, strict=True))
-        return self.model.loss(colours, depths, classes, wanted, labels)
+        return self.model.loss(colours, depths, classes, wanted)
 
     def validate(self) -> Mapping[str, float]:
-        """Returns figures of the validation pictures; the score is AP50."""
-        figures = object_figures(detected_boxes(self.model, self._validation, most=VALIDATED))
-        return {**figures, "score": 0.0 if np.isnan(figures["ap50"]) else figures["ap50"]}
+        """Returns figures of the validation pictures, and the best least score of detections; the score is AP50."""
+        found = detected_boxes(self.model, self._validation, most=VALIDATED)
+        figures = object_figures(found)
+        threshold, f1 = best_threshold(found)
+        score = 0.0 if np.isnan(figures["ap50"]) else figures["ap50"]
+        return {**figures, "threshold": threshold, "f1": f1, "score": score}
 
 
 def inputs(pictures: Pictures, device: torch.device) -> tuple[Tensor, Tensor, Tensor]:
@@ -90,12 +102,22 @@ def kinds_of(boxes: NDArray[np.void]) -> NDArray[np.int64]:
     return np.array([table.get(kind, len(KINDS) - 1) for kind in boxes["kind"].tolist()], dtype=np.int64)
 
 
-def targets(boxes: NDArray[np.void], least: int, width: int, height: int) -> tuple[Tensor, Tensor]:
-    """Returns the boxes (n, 4) with so many visible pixels, as of `Detections`, and their kinds (n,)."""
-    chosen = boxes[boxes["pixels"] >= least]
+def focals_of(config: DetectorConfig) -> Focals:
+    """Returns the focal lengths of the pictures of a detector."""
+    return Focals.of(FrameSampling(width=config.width, height=config.height).camera)
+
+
+def targets(boxes: NDArray[np.void], config: DetectorConfig) -> Targets:
+    """Returns the objects in a picture that have enough visible pixels for training, from boxes of `BOX_DTYPE`."""
+    chosen = boxes[boxes["pixels"] >= config.least_pixels]
     left, top, right, bottom = (chosen[name].astype(np.float32) for name in ("left", "top", "right", "bottom"))
+    width, height = config.width, config.height
     columns = (left + right) / 2 / width, (top + bottom) / 2 / height, (right - left) / width, (bottom - top) / height
-    return torch.from_numpy(np.stack(columns, axis=1)), torch.from_numpy(kinds_of(chosen))
+    solids, known = solids_of(chosen, focals_of(config))
+    return Targets(
+        torch.from_numpy(np.stack(columns, axis=1)), torch.from_numpy(kinds_of(chosen)), torch.from_numpy(solids),
+        torch.from_numpy(known),
+    )  # fmt: skip
 
 
 def _window(zoom: float) -> tuple[float, float, float]:
@@ -119,16 +141,23 @@ def _part(rgb: Tensor, depth: Tensor, semantic: Tensor, window: tuple[float, flo
     return rgb.flatten(1)[:, pixels], depth.flatten()[pixels] * size, semantic.flatten()[pixels]
 
 
-def _boxes_in(boxes: Tensor, kinds: Tensor, window: tuple[float, float, float]) -> tuple[Tensor, Tensor]:
-    """Returns the boxes (n, 4) of a picture in an enlarged part of it, without those that lie mostly outside."""
+def _in_part(true: Targets, window: tuple[float, float, float]) -> Targets:
+    """Returns the objects of a picture in an enlarged part of it, without those that lie mostly outside."""
     left, top, size = window
-    corner = torch.tensor((left, top))
+    boxes, corner = true.boxes, torch.tensor((left, top))
     low = (boxes[:, :2] - boxes[:, 2:] / 2 - corner) / size
     high = (boxes[:, :2] + boxes[:, 2:] / 2 - corner) / size
     whole = (high - low).prod(1)
     low, high = low.clamp(0.0, 1.0), high.clamp(0.0, 1.0)
     kept = (high - low).prod(1) > _LEAST_SHARE * whole
-    return torch.cat(((low + high) / 2, high - low), 1)[kept], kinds[kept]
+    inside = torch.cat(((low + high) / 2, high - low), 1)
+    return replace(true, boxes=inside, solids=enlarged(true.solids, left, top, size)).of(kept)
+
+
+def _mirrored(true: Targets) -> Targets:
+    """Returns the objects of a mirrored picture."""
+    boxes = torch.cat((1.0 - true.boxes[:, :1], true.boxes[:, 1:]), 1)
+    return replace(true, boxes=boxes, solids=mirrored(true.solids))
 
 
 # --- Tests ------------------------------------------------------------------------------------------------------------
@@ -147,39 +176,51 @@ def detected_boxes(model: Detector, pictures: FrameSet, *, most: int | None = No
             detections = model(*inputs(batch, where))
         height, width = batch.semantic.shape[1:]
         scale = np.array((width, height, width, height), dtype=np.float64)
-        for boxes, centred, scores in zip(
-            batch.boxes, detections.boxes.cpu().numpy(), detections.scores.cpu().numpy(), strict=True
-        ):
-            corners = np.concatenate((centred[:, :2] - centred[:, 2:] / 2, centred[:, :2] + centred[:, 2:] / 2), axis=1)
-            true = np.stack([boxes[name] for name in ("left", "top", "right", "bottom")], axis=1).astype(np.float64)
-            found.append(
-                PictureBoxes(
-                    true=true,
-                    kinds=kinds_of(boxes),
-                    ignored=boxes["pixels"] < LEAST_PIXELS,
-                    detected=np.repeat(corners * scale, len(KINDS), axis=0),  # each query may be of any kind
-                    detected_kinds=np.tile(np.arange(len(KINDS)), len(corners)),
-                    scores=scores.astype(np.float64).ravel(),
-                )
-            )
+        parts = (detections.boxes, detections.scores, detections.solids)
+        for boxes, centred, scores, solids in zip(batch.boxes, *(part.cpu().numpy() for part in parts), strict=True):
+            found.append(_compared(boxes, centred, scores, solids, scale, focals_of(model.config)))
     return found
 
 
+def corners_of(centred: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Returns left, top, right and bottom (n, 4) of boxes (n, 4) with middle x and y, width and height."""
+    half = centred[:, 2:] / 2
+    return np.concatenate((centred[:, :2] - half, centred[:, :2] + half), axis=1)
+
+
+def _compared(
+    boxes: NDArray[np.void],
+    centred: NDArray[np.float32],
+    scores: NDArray[np.float32],
+    solids: NDArray[np.float32],
+    scale: NDArray[np.float64],
+    focals: Focals,
+) -> PictureBoxes:
+    """Returns the true and the detected boxes of a picture; each query may be of any kind."""
+    return PictureBoxes(
+        true=np.stack([boxes[name] for name in ("left", "top", "right", "bottom")], axis=1).astype(np.float64),
+        kinds=kinds_of(boxes),
+        ignored=boxes["pixels"] < LEAST_PIXELS,
+        spaces=np.stack([boxes[name] for name in SPACE_COLUMNS], axis=1).astype(np.float64),
+        detected=np.repeat(corners_of(centred) * scale, len(KINDS), axis=0),
+        detected_kinds=np.tile(np.arange(len(KINDS)), len(centred)),
+        scores=scores.astype(np.float64).ravel(),
+        detected_spaces=np.repeat(spaces_of(solids, focals), len(KINDS), axis=0),
+    )
+
+
 def object_figures(pictures: Sequence[PictureBoxes]) -> dict[str, float]:
-    """Returns AP50 and AP50:95 over the kinds with a true box, AP50 of each kind, and the number of true boxes."""
+    """Returns AP50 and AP50:95 over the kinds with a true box, AP50 of each kind, and the number of true boxes.
+
+    Of the boxes in space: average precision by places, and the mean errors, see `metrics`.
+    """
     precisions = average_precisions(pictures)
-    figures = {"ap50": float(precisions[0]), "ap50_95": float(precisions.mean())}
+    figures = {
+        "ap50": float(precisions[0]), "ap50_95": float(precisions.mean()),
+        "ap_place": place_precision(pictures), **space_errors(pictures, turned=TURNED),
+    }  # fmt: skip
     for number, kind in enumerate(KINDS):
-        single = [_only(picture, number) for picture in pictures]
+        single = [picture.of_kind(number) for picture in pictures]
         figures[f"ap50_{kind.name.lower()}"] = float(average_precisions(single, (0.5,))[0])
         figures[f"boxes_{kind.name.lower()}"] = float(sum(int((~picture.ignored).sum()) for picture in single))
     return figures
-
-
-def _only(picture: PictureBoxes, kind: int) -> PictureBoxes:
-    """Returns the boxes of one kind."""
-    true, found = picture.kinds == kind, picture.detected_kinds == kind
-    return PictureBoxes(
-        picture.true[true], picture.kinds[true], picture.ignored[true], picture.detected[found],
-        picture.detected_kinds[found], picture.scores[found],
-    )  # fmt: skip

@@ -191,7 +191,8 @@ class _Run:
     def keep(self, epochs: list[VisionEpoch]) -> None:
         """Writes the best weights first: after an interruption in between, the epoch is trained again."""
         if epochs[-1].best == epochs[-1].number:
-            checkpoints.save(self._folder / BEST_FILE, self._learner.model, {**self._about, "epoch": len(epochs)})
+            of_epoch = {"epoch": len(epochs), "figures": dict(epochs[-1].figures)}
+            checkpoints.save(self._folder / BEST_FILE, self._learner.model, {**self._about, **of_epoch})
         about = {**self._about, "epochs": [asdict(epoch) for epoch in epochs]}
         checkpoints.save(self._folder / LAST_FILE, self._learner.model, about, self._optimiser)
 

@@ -12,7 +12,7 @@ from dorothie_gym.baselines.vision.detector import Detector, DetectorConfig
 from dorothie_gym.baselines.vision.metrics import average_precisions
 from dorothie_gym.baselines.vision.object_learner import ObjectLearner, detected_boxes, object_figures, targets
 from dorothie_gym.baselines.vision.training import train_learner
-from tests.baselines.vision.pictures import frame_set, session_frames
+from tests.baselines.vision.pictures import CAR_TURN, frame_set, session_frames
 
 TINY = DetectorConfig(
     width=128, height=64, queries=5, encoder_layers=1, decoder_layers=2, size=32, feed_forward=32, heads=1, encoded=4,
@@ -98,25 +98,40 @@ def test_queries_have_the_size_of_the_config():
 def test_targets_are_middles_and_sizes_and_leave_out_small_objects():
     session = session_frames(1)
     box = session.boxes_of(0)
-    found, kinds = targets(box, 1, 128, 64)
+    found = targets(box, replace(TINY, least_pixels=1))
     left, top = int(box["left"][0]), int(box["top"][0])
-    assert found[0].tolist() == pytest.approx([(left + 12) / 128, (top + 8) / 64, 24 / 128, 16 / 64])
-    assert kinds.tolist() == [0]
-    assert len(targets(box, 24 * 16 + 1, 128, 64)[0]) == 0
+    assert found.boxes[0].tolist() == pytest.approx([(left + 12) / 128, (top + 8) / 64, 24 / 128, 16 / 64])
+    assert found.kinds.tolist() == [0] and found.known.tolist() == [True]
+    assert found.solids[0, :2].tolist() == pytest.approx([(left + 12) / 128, (top + 8) / 64], abs=1e-6)
+    assert found.solids[0, 2:6].exp().tolist() == pytest.approx([10.0, 4.0, 1.8, 1.5], rel=1e-5)
+    assert found.solids[0, 6:].tolist() == pytest.approx([np.sin(CAR_TURN), np.cos(CAR_TURN)], abs=1e-6)
+    assert len(targets(box, replace(TINY, least_pixels=24 * 16 + 1)).boxes) == 0
 
 
 def test_enlarged_part_moves_boxes_with_the_pixels():
     session = session_frames(1, seed=5)
     box = session.boxes_of(0)
     window = (0.1, 0.2, 0.7)
-    _, _, semantic = object_learner._part(
-        torch.zeros(3, 64, 128), torch.zeros(64, 128), torch.from_numpy(session.semantic[0].astype(np.int64)), window
-    )
-    true, kinds = targets(box, 1, 128, 64)
-    moved, _ = object_learner._boxes_in(true, kinds, window)
+    _, depth, semantic = object_learner._part(
+        torch.zeros(3, 64, 128), torch.from_numpy(session.depth[0].astype(np.float32)),
+        torch.from_numpy(session.semantic[0].astype(np.int64)), window,
+    )  # fmt: skip
+    moved = object_learner._in_part(targets(box, TINY), window)
     rows, columns = np.nonzero(semantic.numpy() == box["kind"][0])
     drawn = [(columns.min() + columns.max() + 1) / 256, (rows.min() + rows.max() + 1) / 128]
-    assert moved[0, :2].tolist() == pytest.approx(drawn, abs=0.02)
+    assert moved.boxes[0, :2].tolist() == pytest.approx(drawn, abs=0.02)
+    assert moved.solids[0, :2].tolist() == pytest.approx(drawn, abs=0.02)  # this car's middle is that of its box
+    shown = float(depth[int(rows.mean()), int(columns.mean())])
+    assert float(moved.solids[0, 2].exp()) == pytest.approx(shown, rel=1e-3)  # as near as its pixels look
+    assert moved.solids[0, 3:].tolist() == targets(box, TINY).solids[0, 3:].tolist()  # its size and side seen stay
+
+
+def test_training_learns_places_sizes_and_headings(tmp_path):
+    pictures = frame_set(3, 4)
+    trained, _ = run(tmp_path, replace(TINY, epochs=40, learning_rate=4e-3, zoom=1.0))
+    found, guessed = (object_figures(detected_boxes(model, pictures)) for model in (trained.model, learner().model))
+    assert found["ap_place"] > 0.3 > guessed["ap_place"]
+    assert found["range_error"] < 0.1 and found["size_error"] < 0.2 and found["heading_error"] < 60.0
 
 
 def test_published_config_has_the_published_sizes():

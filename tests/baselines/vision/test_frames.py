@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -75,6 +76,33 @@ def test_labels_belong_to_the_pictures(corpus, tmp_path):
         for box in boxes:
             inside = semantic[box["top"] : box["bottom"], box["left"] : box["right"]]
             assert (inside == box["kind"]).sum() >= box["pixels"] // 2
+
+
+def test_boxes_in_space_contain_the_pixels_and_project_around_the_boxes(corpus, tmp_path):
+    sampling = replace(SMALL, spacing=2.0, wait=0.5, pixels=12)
+    pictures = load_frames(Corpus.load(corpus), sampling, folder=tmp_path)["train"].take(range(8))
+    width, height = sampling.width, sampling.height
+    compared = 0
+    for boxes, depth, semantic in zip(pictures.boxes, pictures.depth, pictures.semantic, strict=True):
+        for box in boxes[boxes["z"] > 4.0]:
+            signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * [
+                box["length"],
+                box["width"],
+                box["height"],
+            ]
+            c, s = np.cos(box["heading"]), np.sin(box["heading"])
+            pitch = np.radians(sampling.camera.mount.pitch)
+            ahead, aside, up = signs[:, 0] * c - signs[:, 1] * s, signs[:, 0] * s + signs[:, 1] * c, signs[:, 2]
+            z = box["z"] + ahead * np.cos(pitch) + up * np.sin(pitch)
+            x, y = box["x"] + aside, box["y"] - (up * np.cos(pitch) - ahead * np.sin(pitch))
+            columns, rows = width / 2 + width / 2 * x / z, height / 2 + width / 2 * y / z  # 90 degrees wide
+            assert columns.min() - 1.0 <= box["left"] and box["right"] <= columns.max() + 1.0
+            assert rows.min() - 1.0 <= box["top"] and box["bottom"] <= rows.max() + 1.0
+            inside = (slice(box["top"], box["bottom"]), slice(box["left"], box["right"]))
+            shown = depth[inside][semantic[inside] == box["kind"]]
+            assert ((shown > z.min() - 0.1) & (shown < z.max() + 0.1)).any()
+            compared += 1
+    assert compared > 5
 
 
 def test_pictures_are_drawn_once_and_equal_in_other_processes(corpus, tmp_path, monkeypatch):

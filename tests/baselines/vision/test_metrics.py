@@ -3,13 +3,24 @@ import math
 import numpy as np
 import pytest
 
-from dorothie_gym.baselines.vision.metrics import PictureBoxes, PixelScores, average_precisions, box_overlaps
+from dorothie_gym.baselines.vision.metrics import (
+    PictureBoxes,
+    PixelScores,
+    average_precisions,
+    best_threshold,
+    box_overlaps,
+    place_precision,
+    space_errors,
+)
 from dorothie_gym.ontology import ObjectClass
 
 BOX, FAR = (10.0, 10.0, 20.0, 20.0), (50.0, 50.0, 60.0, 60.0)
 
 
-def boxes(true, detected, scores, kinds=None, detected_kinds=None, ignored=None):
+CAR = (1.0, 0.5, 20.0, 4.0, 2.0, 1.5, 0.1)  # x, y, z, length, width, height, heading
+
+
+def boxes(true, detected, scores, kinds=None, detected_kinds=None, ignored=None, spaces=None, detected_spaces=None):
     return PictureBoxes(
         true=np.array(true, float).reshape(-1, 4),
         kinds=np.array(kinds or [0] * len(true), int),
@@ -17,6 +28,8 @@ def boxes(true, detected, scores, kinds=None, detected_kinds=None, ignored=None)
         detected=np.array(detected, float).reshape(-1, 4),
         detected_kinds=np.array(detected_kinds or [0] * len(detected), int),
         scores=np.array(scores, float),
+        spaces=np.array(spaces or [CAR] * len(true), float).reshape(-1, 7),
+        detected_spaces=np.array(detected_spaces or [CAR] * len(detected), float).reshape(-1, 7),
     )
 
 
@@ -80,3 +93,47 @@ def test_detections_of_all_pictures_are_ranked_together():
 def test_higher_thresholds_demand_closer_boxes():
     close = average_precisions([boxes([BOX], [(10.0, 10.0, 20.0, 17.2)], [0.9])])
     assert close.tolist() == [1.0] * 5 + [0.0] * 5  # an overlap of 0.72
+
+
+def moved(x=0.0, y=0.0, z=0.0, heading=0.0, longer=1.0):
+    return (CAR[0] + x, CAR[1] + y, CAR[2] + z, CAR[3] * longer, CAR[4], CAR[5], CAR[6] + heading)
+
+
+def test_places_up_to_two_metres_away_are_right_whatever_the_boxes_in_the_picture():
+    found = {
+        away: place_precision([boxes([BOX], [FAR], [0.9], detected_spaces=[moved(z=away)])]) for away in (1.9, 2.1)
+    }
+    assert found == {1.9: 1.0, 2.1: 0.0}
+    assert (
+        place_precision([boxes([BOX], [BOX], [0.9], detected_spaces=[moved(y=5.0)])]) == 1.0
+    )  # the height is left out
+
+
+def test_errors_of_boxes_in_space_are_of_the_detections_that_are_right_in_the_picture():
+    picture = boxes(
+        [BOX, FAR], [BOX, (80.0, 80.0, 90.0, 90.0)], [0.9, 0.8],
+        detected_spaces=[moved(x=3.0, z=4.0, heading=2.0 * math.pi + 0.5, longer=2.0), moved(x=50.0)],
+    )  # fmt: skip
+    found = space_errors([picture], turned=(0,))
+    assert found["place_error"] == pytest.approx(5.0) and found["range_error"] == pytest.approx(4.0 / 20.0)
+    assert found["size_error"] == pytest.approx(0.5)  # the box is twice as long
+    assert found["heading_error"] == pytest.approx(math.degrees(0.5))
+    assert math.isnan(space_errors([picture], turned=())["heading_error"])
+
+
+def test_errors_without_a_right_detection_are_unknown():
+    assert all(math.isnan(error) for error in space_errors([boxes([BOX], [FAR], [0.9])], turned=(0,)).values())
+    assert all(math.isnan(error) for error in space_errors([], turned=(0,)).values())
+
+
+def test_best_threshold_leaves_out_the_unsure_mistakes():
+    picture = boxes([BOX, FAR], [BOX, FAR, (80.0, 0.0, 90.0, 9.0), (0.0, 80.0, 9.0, 90.0)], [0.9, 0.4, 0.3, 0.2])
+    assert best_threshold([picture]) == (0.4, 1.0)
+    missed = boxes([BOX, FAR], [BOX, (80.0, 0.0, 90.0, 9.0)], [0.4, 0.3])
+    assert best_threshold([missed]) == (0.4, pytest.approx(2.0 / 3.0))  # one of one, and one of two
+    assert best_threshold([boxes([BOX], [FAR], [0.9])]) == (1.0, 0.0)
+
+
+def test_best_threshold_takes_all_detections_of_a_score():
+    picture = boxes([BOX], [BOX, FAR], [0.5, 0.5])
+    assert best_threshold([picture]) == (0.5, pytest.approx(2.0 / 3.0))
