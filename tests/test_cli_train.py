@@ -24,6 +24,10 @@ runner = CliRunner()
         (["train", "segformer", "--config", "huge"], "there is no config 'huge'; choose from small, paper"),
         (["train", "segformer", "--device", "abacus"], "the device 'abacus' cannot be used"),
         (["train", "detr", "--inputs", "guessed"], "there are no inputs 'guessed'; choose from predicted, true"),
+        (["train", "bert", "--detector", "here"], "--detector is for models of detections only"),
+        (["train", "segformer", "--detector", "here"], "--detector is for models of detections only"),
+        (["train", "toto-detections"], "run first: dorothie-gym train detr"),
+        (["table", "--models", "toto,et-detections"], "run first: dorothie-gym train detr"),
         (["train", "detr"], "run first: dorothie-gym train segformer"),
     ],
 )

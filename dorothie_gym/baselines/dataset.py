@@ -14,7 +14,7 @@ from torch import Tensor
 from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, text_encoder, text_table
 from dorothie_gym.baselines.model_io import TASKS, Examples
 from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, Sight, VisibleBoxes, build, points
-from dorothie_gym.errors import SessionError
+from dorothie_gym.errors import CheckpointError, SessionError
 from dorothie_gym.recording import Fold
 from dorothie_gym.user_cache import cache_folder
 
@@ -24,10 +24,30 @@ TRAIN: Final = "train"
 VALIDATION: Final = "val"
 TEST: Final = "test"
 
-Objects: TypeAlias = Literal["record", "boxes"]
-"""Source of the objects around the ego: all near ones in the record, or those that the camera on the car shows."""
+Objects: TypeAlias = Literal["record", "boxes", "detections"]
+"""Source of the objects around the ego: all near ones in the record, those of them that the camera on the car shows, or
+those that a trained detector finds in its pictures."""
 
-_SIGHTS: Final[dict[Objects, Sight | None]] = {"record": None, "boxes": VisibleBoxes()}
+
+def sight_of(objects: Objects, detector: Path | None = None) -> Sight | None:
+    """Returns a source of objects; None for the record.
+
+    Args:
+        objects: the source.
+        detector: folder of the trained detector, for "detections".
+
+    Raises:
+        CheckpointError: there is no such training, or it cannot be used.
+    """
+    if objects == "record":
+        return None
+    if objects == "boxes":
+        return VisibleBoxes()
+    if detector is None:
+        raise CheckpointError("models of detections need the folder of a trained detector; give --detector")
+    from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes  # here: it needs transformers
+
+    return DetectedBoxes(detector)
 
 
 class Dataset:
@@ -46,7 +66,7 @@ class Dataset:
         self.columns = columns
         self.encoder = encoder
         self._cache, self._corpus = cache, corpus
-        self._others: dict[Objects, Dataset] = {}
+        self._others: dict[tuple[Objects, Path | None], Dataset] = {}
         self._examples: dict[tuple[str, BatchSpec], Examples] = {}
 
     @classmethod
@@ -64,25 +84,29 @@ class Dataset:
         cache = cache_folder()
         return cls(build(corpus), text_encoder(encoder), None if cache is None else cache / _TABLES, corpus)
 
-    def seeing(self, objects: Objects, on_session: Callable[[], object] | None = None) -> Dataset:
+    def seeing(
+        self, objects: Objects, on_session: Callable[[], object] | None = None, detector: Path | None = None
+    ) -> Dataset:
         """Returns the dataset with the objects of a source; of this one if that is the record.
 
         Args:
             objects: the source.
             on_session: called after each session whose pictures were drawn.
+            detector: folder of the trained detector, for "detections".
 
         Raises:
             SessionError: the corpus cannot be read again.
+            CheckpointError: the detector is missing or cannot be used.
         """
-        sight = _SIGHTS[objects]
+        sight = sight_of(objects, detector)
         if sight is None:
             return self
-        if objects not in self._others:
+        if (objects, detector) not in self._others:
             if self._corpus is None:
                 raise SessionError("the dataset has no corpus whose pictures could be drawn")
             columns = build(self._corpus, sight=sight, on_session=on_session)
-            self._others[objects] = Dataset(columns, self.encoder, self._cache)
-        return self._others[objects]
+            self._others[objects, detector] = Dataset(columns, self.encoder, self._cache)
+        return self._others[objects, detector]
 
     def about(self) -> dict[str, object]:
         """Returns the identity of the features in JSON types; part of every checkpoint and every result."""

@@ -60,6 +60,7 @@ class Experiment:
         seed: seed of weights, order and dropout.
         out: parent of the folders of all trainings.
         strict: whether RfN points hide the earlier acts of the Co-Wizard's own utterance.
+        detector: folder of the trained detector, for models of detections.
     """
 
     corpus: Path
@@ -69,6 +70,7 @@ class Experiment:
     seed: int
     out: Path
     strict: bool = False
+    detector: Path | None = None
 
     def __str__(self) -> str:
         return f"{self.model} ({self.size}), seed {self.seed}"
@@ -77,6 +79,11 @@ class Experiment:
     def row(self) -> ModelEntry:
         """Entry of the model in the table."""
         return find_row(self.model)
+
+    def material(self, every: Dataset, on_session: Callable[[], object] | None = None) -> Dataset:
+        """Returns the dataset with the objects of this model; arguments and errors as of `Dataset.seeing`."""
+        objects = self.row.objects
+        return every.seeing(objects, on_session, self.detector if objects == "detections" else None)
 
     @property
     def folder(self) -> Path:
@@ -92,7 +99,7 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
         SessionError: the corpus lacks a fold.
         OSError: the folder cannot be written.
     """
-    material = material.seeing(job.row.objects)
+    material = job.material(material)
     about = {"model": job.row.name, "version": __version__, **material.about()}
     if job.row.kind in ("ppo", "cloning"):
         return _run_policy(job, about)
@@ -329,8 +336,8 @@ def run_experiments(
     threads = torch.get_num_threads()
     trainer = _ExperimentWorker(jobs[0].corpus, jobs[0].encoder)
     material = trainer.load()
-    for objects in sorted({job.row.objects for job in jobs}):
-        _ = material.seeing(objects, on_session).vectors  # other processes find them in the cache
+    for job in jobs:
+        _ = job.material(material, on_session).vectors  # other processes find them in the cache
     if not alone:
         yield from run_tasks(trainer.prepare, jobs, workers=min(workers, len(jobs)))
         return
@@ -377,10 +384,20 @@ def table_experiments(
     seeds: int = 5,
     rows: Sequence[ModelEntry] = ROWS,
     strict: bool = False,
+    detector: Path | None = None,
 ) -> list[Experiment]:
     """Returns the trainings of a table, seed by seed: the first complete table exists after one seed."""
     return [
-        Experiment(corpus=corpus, encoder=encoder, model=row.command, size=size, seed=seed, out=out, strict=strict)
+        Experiment(
+            corpus=corpus,
+            encoder=encoder,
+            model=row.command,
+            size=size,
+            seed=seed,
+            out=out,
+            strict=strict,
+            detector=detector,
+        )
         for seed in range(seeds)
         for row in rows
         if not row.missing

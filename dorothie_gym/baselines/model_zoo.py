@@ -117,13 +117,16 @@ ROWS: Final[tuple[ModelEntry, ...]] = (
 """Models of the paper's table, in its order; then TOTO with another clock, shallow models, policies, and the Junction
 Reader. TOTO without the current utterance stands beside the paper's row without its sound."""
 
+_SEEN: Final[Mapping[str, Objects]] = MappingProxyType({"oracle boxes": "boxes", "detections": "detections"})
+
 CAMERA_ROWS: Final = tuple(
-    replace(row, name=f"{row.name} (oracle boxes)", command=f"{row.command}-boxes", objects="boxes")
+    replace(row, name=f"{row.name} ({name})", command=f"{row.command}-{objects}", objects=objects)
+    for name, objects in _SEEN.items()
     for row in ROWS
     if row.command in ("toto", "detector", "et", "et-bert")
 )
-"""Models whose objects are those that the camera on the car shows. They are trained where they are named: pictures of a
-corpus take minutes."""
+"""Models whose objects are those that the camera on the car shows, or that a trained detector finds in its pictures.
+They are trained where they are named: pictures of a corpus take minutes."""
 
 
 class EpisodicTransformer(TOTO):

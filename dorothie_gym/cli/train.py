@@ -27,11 +27,15 @@ from dorothie_gym.cli.train_vision import VISION_MODELS, train_vision
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.experiment import Experiment
+    from dorothie_gym.baselines.model_zoo import ModelEntry
     from dorothie_gym.baselines.trainer import Epoch
     from dorothie_gym.benchmark import ResultsTable
 
 RUNS = Path("runs")
 """Default folder of trainings; it contains one folder per corpus."""
+
+_DETECTOR = Path("detr", "small", "seed-0")
+_NOT_OF_DETECTIONS = "--detector is for models of detections only, such as toto-detections"
 
 CorpusOption = Annotated[
     Path | None,
@@ -53,6 +57,13 @@ PixelSource = Annotated[
 Epochs = Annotated[
     int | None, typer.Option(min=1, max=10_000, help="segformer and detr: number of epochs; default that of the size.")
 ]
+Detector = Annotated[
+    Path | None,
+    typer.Option(
+        "--detector", metavar="DIR",
+        help="Models of detections: folder of the trained detector; default OUT/detr/small/seed-0.",
+    ),
+]  # fmt: skip
 Encoder = Annotated[
     str, typer.Option(help="Text encoder: auto (minilm if installed, else hashing), hashing, minilm, bert.")
 ]
@@ -86,6 +97,7 @@ def train(
     device: Device = None,
     inputs: PixelSource = None,
     epochs: Epochs = None,
+    detector: Detector = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a model with several seeds, test it, and print its scores.
@@ -94,6 +106,8 @@ def train(
     recorded sessions.
     """
     if model in VISION_MODELS:
+        if detector is not None:
+            fail(_NOT_OF_DETECTIONS)
         with _reporting_errors():
             folder, where = _places(corpus, out)
             train_vision(
@@ -112,8 +126,13 @@ def train(
         row = find_row(model)
         if row.missing:
             fail(f"{row.name} cannot be trained: {row.missing}")
+        if detector is not None and row.objects != "detections":
+            fail(_NOT_OF_DETECTIONS)
         folder, where = _places(corpus, out)
-        jobs = table_experiments(folder, where, encoder=encoder, size=size, seeds=seeds, rows=[row], strict=strict)
+        jobs = table_experiments(
+            folder, where, encoder=encoder, size=size, seeds=seeds, rows=[row], strict=strict,
+            detector=_checked_detector(detector or where / _DETECTOR, [row]),
+        )  # fmt: skip
         results = _run(jobs, workers, quiet=as_json)
         table, _ = gather_table(jobs, floors=False)
     if as_json:
@@ -139,6 +158,7 @@ def table(
     out: Out = None,
     workers: Workers = None,
     strict: Strict = False,
+    detector: Detector = None,
     as_json: AsJson = False,
 ) -> None:
     """Train all models that are not trained yet, and write the paper's results table with its figures beside ours.
@@ -155,7 +175,10 @@ def table(
 
         rows = ROWS if models == "all" else [find_row(name.strip()) for name in models.split(",")]
         folder, where = _places(corpus, out)
-        jobs = table_experiments(folder, where, encoder=encoder, size=size, seeds=seeds, rows=rows, strict=strict)
+        jobs = table_experiments(
+            folder, where, encoder=encoder, size=size, seeds=seeds, rows=rows, strict=strict,
+            detector=_checked_detector(detector or where / _DETECTOR, rows),
+        )  # fmt: skip
         results = _run(jobs, workers, quiet=as_json)
         made, predictions = gather_table(jobs)
         write_predictions(where / PREDICTIONS, predictions)
@@ -213,6 +236,15 @@ def _progress(
             progress.update(bar, description=f"Pictures of {drawn} session{'s'[: drawn > 1]} drawn")
 
         yield on_epoch, on_job, on_session
+
+
+def _checked_detector(folder: Path, rows: Sequence[ModelEntry]) -> Path:
+    """Returns the folder of a detector; raises `CheckpointError` if a row needs it and it cannot be used."""
+    from dorothie_gym.baselines.dataset import sight_of
+
+    for row in rows:
+        sight_of(row.objects, folder)
+    return folder
 
 
 def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:

@@ -20,12 +20,14 @@ def test_a_row_is_found_by_its_command_and_by_its_name():
     assert find_row("toto-no-map-knowledge") is find_row("TOTO (- Map Knowledge)")
 
 
-def test_rows_that_see_by_the_camera_differ_in_their_objects_only():
-    assert {row.command for row in CAMERA_ROWS} == {"toto-boxes", "detector-boxes", "et-boxes", "et-bert-boxes"}
-    for row in CAMERA_ROWS:
-        base = find_row(row.command.removesuffix("-boxes"))
-        assert (row.objects, base.objects) == ("boxes", "record")
-        assert row.change is base.change and row.name == f"{base.name} (oracle boxes)"
+@pytest.mark.parametrize(("objects", "name"), [("boxes", "oracle boxes"), ("detections", "detections")])
+def test_rows_that_see_by_the_camera_differ_in_their_objects_only(objects, name):
+    rows = {row.command.removesuffix(f"-{objects}"): row for row in CAMERA_ROWS if row.objects == objects}
+    assert set(rows) == {"toto", "detector", "et", "et-bert"}
+    for command, row in rows.items():
+        base = find_row(command)
+        assert base.objects == "record"
+        assert row.change is base.change and row.name == f"{base.name} ({name})"
 
 
 def test_an_unknown_row_is_refused_with_the_names_of_all():

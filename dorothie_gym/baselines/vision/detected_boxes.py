@@ -1,0 +1,232 @@
+"""Objects that a trained detector finds in the pictures of a recorded session, as rows of `ACTOR_DTYPE`.
+
+Nothing of the recorded actors gets in: place, heading and size are those of the box in space, numbers begin anew in
+each picture, and no speed is known, because nothing is followed from picture to picture.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dorothie_gym.baselines import checkpoints
+from dorothie_gym.baselines.trainer import BEST_FILE
+from dorothie_gym.baselines.vision.detector import KINDS, Detector
+from dorothie_gym.baselines.vision.experiment import load_detector, load_segformer
+from dorothie_gym.baselines.vision.object_learner import focals_of
+from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
+from dorothie_gym.baselines.vision.segformer import SegFormer, normalised
+from dorothie_gym.baselines.vision.solids import spaces_of
+from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.camera.pose import View
+from dorothie_gym.camera.recorded_pictures import RecordedPictures
+from dorothie_gym.camera.scene_cache import builder_digest
+from dorothie_gym.errors import CheckpointError, SessionError
+from dorothie_gym.files import replacing
+from dorothie_gym.maps import Town
+from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.recording import ActorKind, Session
+from dorothie_gym.recording.surroundings import ACTOR_DTYPE, Rows, SceneTable
+
+CYCLIST_WIDTH: Final = 1.0
+"""Width below which a vehicle counts as a cyclist: the detector does not tell them apart [m]."""
+
+OBJECTS_FOLDER: Final = "objects"
+"""Folder beside the weights of a detector, with what it found in sessions."""
+
+_AT_ONCE: Final = 8  # pictures
+_FORMAT: Final = 1
+_KEPT_DTYPE: Final = np.dtype([("record", np.int64), *((name, ACTOR_DTYPE[name]) for name in ACTOR_DTYPE.names or ())])
+_ACTORS: Final = {
+    ObjectClass.VEHICLES: ActorKind.VEHICLE,
+    ObjectClass.PEDESTRIAN: ActorKind.PEDESTRIAN,
+    ObjectClass.STATIC: ActorKind.PROP,
+}
+
+
+@dataclass(frozen=True)
+class DetectedBoxes:
+    """Objects that a trained detector finds, which reads the classes and depths that its SegFormer predicts.
+
+    Detections count from the score on that had the best F1 in the validation pictures. What is found in a session is
+    kept in a folder beside the weights.
+
+    Attributes:
+        detector: folder of its training, `OUT/detr/<size>/seed-<n>`; the SegFormer's is beside it in `OUT`.
+
+    Raises:
+        CheckpointError: a training is missing, or the detector reads true classes and depths or those of another
+            SegFormer.
+    """
+
+    detector: Path
+
+    def __post_init__(self) -> None:
+        about = self._about
+        if about.get("inputs") != "predicted":
+            raise CheckpointError(
+                f"{self.detector}: reads true classes and depths; choose a detector trained with --inputs predicted"
+            )
+        if about.get("segformer") != self._digests[1]:
+            raise CheckpointError(f"{self.detector}: was trained with another SegFormer than that in {self.segformer}")
+
+    @property
+    def segformer(self) -> Path:
+        """Folder of the SegFormer."""
+        where = self.detector.absolute()
+        return where.parents[2] / "segformer" / where.parent.name / where.name
+
+    @functools.cached_property
+    def _about(self) -> dict[str, Any]:
+        path = self.detector / BEST_FILE
+        if not path.is_file():
+            raise CheckpointError(f"{path}: is missing; run first: dorothie-gym train detr, or name its --detector")
+        return checkpoints.about(path)
+
+    @functools.cached_property
+    def _digests(self) -> tuple[str, str]:
+        """Digests of the weights of detector and SegFormer."""
+        paths = (self.detector / BEST_FILE, self.segformer / BEST_FILE)
+        if not paths[1].is_file():
+            raise CheckpointError(f"{paths[1]}: is missing; the detector in {self.detector} reads its predictions")
+        return checkpoints.sha256_of(paths[0]), checkpoints.sha256_of(paths[1])
+
+    @property
+    def threshold(self) -> float:
+        """Least score of a detection."""
+        figures = self._about.get("figures")
+        found = figures.get("threshold") if isinstance(figures, dict) else None
+        if not isinstance(found, float):
+            raise CheckpointError(f"{self.detector / BEST_FILE}: has no threshold; delete it and train again")
+        return found
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """Digest of the weights and of the sources that draw pictures.
+
+        Raises:
+            SessionError: the sources cannot be read.
+        """
+        if (pictures := builder_digest()) is None:
+            raise SessionError("the sources of the camera cannot be read; use the objects of the record")
+        return f"detections {_FORMAT} {' '.join(self._digests)} {pictures} torch {torch.__version__}"
+
+    @functools.cached_property
+    def _models(self) -> tuple[SegFormer, Detector]:
+        device = torch.device("cpu")
+        return load_segformer(self.segformer, device), load_detector(self.detector, device)
+
+    def actors(self, session: Session, town: Town) -> SceneTable:
+        """Returns what is found in pictures at the session's records of actors.
+
+        Records before the first frame of the car and after the last one get no objects.
+
+        Raises:
+            SessionError: the session has no frames of the car, or no surroundings.
+            OSError: the folder beside the weights cannot be written.
+        """
+        table = session.scene.actors
+        name = hashlib.sha256(f"{self.digest} {session.digest} {town.name}".encode()).hexdigest()
+        kept = self.detector / OBJECTS_FOLDER / f"{name}.npy"
+        rows = _recall(kept)
+        if rows is None:
+            found = list(self._found(session, town))
+            rows = np.concatenate([np.empty(0, _KEPT_DTYPE), *found])
+            kept.parent.mkdir(exist_ok=True)
+            with replacing(kept, shared=True) as path, path.open("wb") as file:
+                np.save(file, rows, allow_pickle=False)
+        counts = np.bincount(rows["record"], minlength=len(table))
+        actors = np.empty(len(rows), ACTOR_DTYPE)
+        for column in ACTOR_DTYPE.names or ():
+            actors[column] = rows[column]
+        return SceneTable(table.frames, np.concatenate(([0], np.cumsum(counts))).astype(np.int64), actors)
+
+    def _found(self, session: Session, town: Town) -> Iterator[Rows]:
+        """Yields what is found at the records, of `_KEPT_DTYPE`."""
+        config = self._models[1].config
+        camera = CameraConfig(width=config.width, height=config.height, outputs=(CameraOutput.RGB,))
+        pictures = RecordedPictures(session, town, camera)
+        frames = session.scene.actors.frames
+        inside = np.flatnonzero((frames >= pictures.first_frame) & (frames <= pictures.last_frame))
+        threads = torch.get_num_threads()
+        torch.set_num_threads(1)  # equal weights find equal objects, whatever the number of processors
+        try:
+            for records in np.array_split(inside, max(math.ceil(len(inside) / _AT_ONCE), 1)):
+                if len(records):
+                    yield from self._found_at(records.tolist(), pictures, frames)
+        finally:
+            torch.set_num_threads(threads)
+
+    def _found_at(
+        self, records: Sequence[int], pictures: RecordedPictures, frames: NDArray[np.int64]
+    ) -> Iterator[Rows]:
+        """Yields what is found in the pictures of some records."""
+        reader, detector = self._models
+        drawn, views = [], []
+        for record in records:
+            picture = pictures.picture(int(frames[record]))
+            assert picture.rgb is not None
+            drawn.append(picture.rgb.copy())
+            views.append(picture.view)
+        rgb = np.stack(drawn)
+        semantic, depth = predict_pixels(reader, rgb)
+        depth = depth.astype(np.float16).astype(np.float32)  # as in training
+        with torch.inference_mode():
+            found = detector(
+                normalised(torch.from_numpy(rgb)), torch.from_numpy(depth), torch.from_numpy(semantic).long()
+            )
+        spaces = spaces_of(found.solids.numpy(), focals_of(detector.config))
+        for k, (record, view) in enumerate(zip(records, views, strict=True)):
+            heading = pictures.pose(int(frames[record])).heading
+            actors = actors_at(found.scores[k].numpy(), spaces[k], view, heading, self.threshold)
+            rows = np.empty(len(actors), _KEPT_DTYPE)
+            rows["record"] = record
+            for column in ACTOR_DTYPE.names or ():
+                rows[column] = actors[column]
+            yield rows
+
+
+def actors_at(
+    scores: NDArray[np.floating], spaces: NDArray[np.float64], view: View, heading: float, threshold: float
+) -> Rows:
+    """Returns the objects in a picture, the surest first, as rows of `ACTOR_DTYPE`.
+
+    Args:
+        scores: (q, k) sureness of the kinds of each query.
+        spaces: (q, 7) boxes in space, `SPACE_COLUMNS`.
+        view: projection of the picture.
+        heading: of the camera [rad].
+        threshold: least score of an object.
+    """
+    best = scores.max(axis=1)
+    chosen = np.argsort(-best, kind="stable")
+    chosen = chosen[best[chosen] >= threshold]
+    aside, down, ahead, length, width, _, turned = spaces[chosen].T
+    places = view.origin + np.stack((aside, -down, ahead), axis=1) @ view.axes
+    rows = np.zeros(len(chosen), ACTOR_DTYPE)
+    rows["key"] = np.arange(1, len(chosen) + 1)
+    kinds = scores[chosen].argmax(axis=1)
+    rows["kind"] = np.array([_ACTORS[kind].value for kind in KINDS])[kinds]
+    rows["kind"][(rows["kind"] == ActorKind.VEHICLE) & (width < CYCLIST_WIDTH)] = ActorKind.CYCLIST
+    rows["x"], rows["y"] = places[:, 0], places[:, 1]
+    rows["heading"] = (turned + heading + math.pi) % (2.0 * math.pi) - math.pi
+    rows["length"], rows["width"] = length, width
+    return rows
+
+
+def _recall(path: Path) -> Rows | None:
+    """Returns the rows in a file; None if it is missing or damaged."""
+    try:
+        rows = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError):
+        return None
+    return rows if rows.dtype == _KEPT_DTYPE and rows.ndim == 1 else None
