@@ -83,7 +83,7 @@ class DetectorConfig:
     epochs: int = 12
     zoom: float = 0.5
     least_pixels: int = 32
-    solid_loss: float = 0.5
+    solid_loss: float = 0.1
 
     def __post_init__(self) -> None:
         if self.width % 32 or self.height % 32 or min(self.width, self.height) < 64:
@@ -189,6 +189,7 @@ class Detector(nn.Module):
             nn.Linear(config.size, config.size), nn.ReLU(), nn.Linear(config.size, config.size), nn.ReLU(),
             nn.Linear(config.size, SOLID),
         )  # fmt: skip
+        self.detr.model.backbone.requires_grad_(True)  # the library freezes it, as if it were trained already
         self._start_heads()
         self.register_state_dict_post_hook(_drop_shared)  # type: ignore[no-untyped-call]
         self.register_load_state_dict_pre_hook(_add_shared)  # type: ignore[no-untyped-call]
