@@ -12,10 +12,12 @@ from dorothie_gym.dialogue.conversation import (
 from dorothie_gym.dialogue.dialogue_act_classifier import act_of, guess_act, guess_spans
 from dorothie_gym.dialogue.directions import RouteTurn
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT, EXPECTATIONS, Exchange, ExchangeState, ExchangeTracker
+from dorothie_gym.dialogue.intentions import CommunicativeFunction, Intention
 from dorothie_gym.dialogue.lexicon import Lexicon, load_lexicon
 from dorothie_gym.dialogue.nlg import MAX_CHARACTERS, word_act, word_acts
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.phrases import Register
+from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition, encode_meaning, find_meaning, read_meaning
 from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle, draw_style
 from dorothie_gym.dialogue.transactions import Annotator
@@ -23,20 +25,25 @@ from dorothie_gym.errors import PhraseFileError
 
 __all__ = [
     "ANSWER_TIMEOUT",
+    "ASKED",
     "EXPECTATIONS",
     "MAX_CHARACTERS",
     "SHORTEST_SPAN",
     "WORDS_PER_SECOND",
     "Annotator",
     "AsrChannel",
+    "CommunicativeFunction",
     "Conversation",
     "Direction",
     "Exchange",
     "ExchangeState",
     "ExchangeTracker",
+    "Intention",
     "Lexicon",
     "ParsedText",
     "PhraseFileError",
+    "Predicate",
+    "Proposition",
     "Recogniser",
     "Register",
     "RouteTurn",
@@ -47,9 +54,12 @@ __all__ = [
     "WordingContext",
     "act_of",
     "draw_style",
+    "encode_meaning",
+    "find_meaning",
     "guess_act",
     "guess_spans",
     "load_lexicon",
+    "read_meaning",
     "speech_seconds",
     "understand",
     "word_act",

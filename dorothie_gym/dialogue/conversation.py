@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from dorothie_gym.copying import shared
+from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.ontology import DialogueAct, Role
 
 WORDS_PER_SECOND = 2.7
@@ -37,10 +38,12 @@ class Span:
     Attributes:
         text: words of the span; never blank.
         act: the dialogue act (move and slot values).
+        meaning: propositions that the speaker states, asks or asks for; empty if they are not known.
     """
 
     text: str
     act: DialogueAct
+    meaning: tuple[Proposition, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.text.strip():

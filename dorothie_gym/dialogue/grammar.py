@@ -16,6 +16,7 @@ from dorothie_gym.dialogue.phrases import (
     parse_phrase,
     split_alternatives,
 )
+from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.dialogue.talk_files import TalkSection, alternatives_of, parse_talk_files, read_talk_files
 from dorothie_gym.errors import OntologyError, PhraseFileError
 from dorothie_gym.ontology import (
@@ -45,7 +46,10 @@ SLOT_FIELDS: Mapping[str, Slot] = {
 }
 """Gaps that are filled by slot values, with their slot."""
 
-CONTEXT_FIELDS = frozenset({"side", "nth", "speed", "distance", "past", "dropped"})
+CONTENT_FIELDS = frozenset({"seconds", "feature", "purpose", "person", "item", "cause"})
+"""Gaps that are filled by the arguments of the content of the same names."""
+
+CONTEXT_FIELDS = frozenset({"side", "nth", "speed", "distance", "past", "dropped"}) | CONTENT_FIELDS
 """Gaps that are filled by the wording; `side` is a direction, left or right."""
 
 SPOKEN_SLOTS = (Slot.ACTION, Slot.LANDMARK, Slot.STREET, Slot.OBJECT, Slot.STATUS)
@@ -107,6 +111,7 @@ class Grammar:
         markers: openers, closers and alarms by (kind, speaker, move).
         joints: links between two acts of one utterance, by (previous move, move).
         fillers: filled pauses.
+        clauses: clauses that state a proposition, by its topic ("red", "not goal"), with "past " in front for the past.
     """
 
     templates: Mapping[DialogueMove, tuple[Template, ...]]
@@ -115,6 +120,7 @@ class Grammar:
     markers: Mapping[tuple[str, Role, DialogueMove], DiscourseMarker]
     joints: Mapping[tuple[DialogueMove, DialogueMove], Phrase]
     fillers: Phrase
+    clauses: Mapping[str, Phrase]
 
 
 @functools.cache
@@ -149,6 +155,7 @@ class _Builder:
     markers: dict[tuple[str, Role, DialogueMove], DiscourseMarker] = field(default_factory=dict)
     joints: dict[tuple[DialogueMove, DialogueMove], Phrase] = field(default_factory=dict)
     fillers: Phrase = Phrase("uh", frozenset(), frozenset())
+    clauses: dict[str, Phrase] = field(default_factory=dict)
 
     def build(self) -> Grammar:
         files = parse_talk_files(self.texts)
@@ -162,7 +169,9 @@ class _Builder:
                 ) from error
         self._check()
         templates = {move: tuple(self.templates[move]) for move in DialogueMove}
-        return Grammar(templates, dict(self.actions), dict(self.tails), self.markers, self.joints, self.fillers)
+        return Grammar(
+            templates, dict(self.actions), dict(self.tails), self.markers, self.joints, self.fillers, self.clauses
+        )
 
     def _take(self, section: TalkSection) -> None:
         kind, *words = section.words
@@ -181,6 +190,9 @@ class _Builder:
                 self.markers[kind, parse_role(words[0]), parse_move(word)] = marker
         elif kind == "filler":
             self.fillers = self._phrase(section)
+        elif kind == "clause":
+            Predicate(words[-1])
+            self.clauses[" ".join(words)] = self._phrase(section)
         elif kind == "join":
             for before in words[0].split(","):
                 for after in words[1].split(","):

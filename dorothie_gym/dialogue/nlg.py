@@ -177,7 +177,8 @@ class _Sentence:
         body = template.body.phrase.say(realizer)
         body = self._decorated(body, template)
         close = template.close.say(realizer)
-        missing = realizer.values.keys() - template.covers if act.move is not _IRRELEVANT else ()
+        whole = act.move is _IRRELEVANT or "cause" in template.needs  # a cause says all that the act names
+        missing = () if whole else realizer.values.keys() - template.covers
         for slot in SPOKEN_SLOTS if missing else ():
             if slot in missing:
                 tail = self._tail(slot)

@@ -12,6 +12,7 @@ from dorothie_gym.dialogue.directions import RouteTurn, WordLists, find_ordinal,
 from dorothie_gym.dialogue.entity_recognition import Mention, find_names
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
 from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals
+from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology import (
@@ -120,6 +121,7 @@ class ParsedText:
         further: whether the car is to continue for a short distance.
         affirms: True for an initial yes, False for an initial no.
         question: whether the text contains a question mark.
+        asked: proposition that a question is about, if the words tell; other questions are told by their slot values.
     """
 
     text: str
@@ -145,6 +147,7 @@ class ParsedText:
     further: bool = False
     affirms: bool | None = None
     question: bool = False
+    asked: Proposition | None = None
 
     @property
     def direction(self) -> Direction | None:
@@ -204,6 +207,7 @@ def understand(text: str) -> ParsedText:
         further=_FURTHER.search(joined) is not None,
         affirms=_affirms(words, lists),
         question="?" in words,
+        asked=_asked(masked),
     )
 
 
@@ -309,6 +313,25 @@ def _question_patterns() -> tuple[tuple[SlotValue, re.Pattern[str]], ...]:
         except re.error as error:
             raise PhraseFileError(f"cues.yaml: asked.{name}: {error}") from error
     return tuple(patterns)
+
+
+@functools.cache
+def _questions() -> tuple[tuple[re.Pattern[str], Proposition], ...]:
+    """Returns the patterns of questions, with what they ask; the first that fits decides."""
+    found = []
+    for number, row in enumerate(read_data("cues.yaml").get("questions", [])):
+        where = f"cues.yaml: questions[{number}]"
+        try:
+            pattern = re.compile("|".join(strings(f"{where}.cues", row["cues"])))
+            found.append((pattern, Proposition.from_json(row["asks"], f"{where}.asks")))
+        except (re.error, ValueError) as error:
+            raise PhraseFileError(f"{where}: {error}") from error
+    return tuple(found)
+
+
+def _asked(masked: str) -> Proposition | None:
+    sentence = masked.strip(" ,?")
+    return next((asked for pattern, asked in _questions() if pattern.search(sentence)), None)
 
 
 _QUESTION_WORDS = frozenset({"what", "which", "where", "what's", "where's", "how", "wheres", "whats", "where'd"})

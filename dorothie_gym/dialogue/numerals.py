@@ -55,6 +55,27 @@ def cardinal(number: int) -> str:
     return str(number)
 
 
+def duration(seconds: float) -> str:
+    """Returns the words for a time as people round it, e.g. 100 s -> "a minute and a half"; at most 25 % off.
+
+    Raises:
+        ValueError: if `seconds` is negative or not finite.
+    """
+    if not 0.0 <= seconds < float("inf"):
+        raise ValueError(f"seconds must not be negative, but finite, not {seconds}")
+    if seconds < 105.0:
+        return next(words for limit, words in _SHORT_TIMES if seconds < limit)
+    minutes = round(seconds / 60.0)
+    return f"{cardinal(minutes)} minutes"
+
+
+_SHORT_TIMES = (
+    (12.0, "ten seconds"), (17.0, "fifteen seconds"), (25.0, "twenty seconds"), (38.0, "half a minute"),
+    (52.0, "forty-five seconds"), (75.0, "a minute"), (105.0, "a minute and a half"),
+)  # fmt: skip
+"""Words for times below a limit [s]."""
+
+
 def ordinal(number: int) -> str:
     """Returns the ordinal word, e.g. 2 -> "second"; 1 to 9.
 

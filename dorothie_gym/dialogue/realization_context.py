@@ -5,8 +5,12 @@ from __future__ import annotations
 import enum
 import functools
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from dorothie_gym.ontology import DialogueMove, LandmarkName, SlotValue, StreetName
+
+if TYPE_CHECKING:
+    from dorothie_gym.dialogue.propositions import Proposition
 
 
 class Direction(enum.StrEnum):
@@ -33,6 +37,7 @@ class Wording:
         past: landmark to drive past before the action.
         dropped: landmark abandoned in favour of another one in the act.
         topic: topic of the utterance ("fog", "wrong_way", ...); selects the templates marked with it, if any.
+        content: proposition that the act is about; its arguments fill gaps such as {time} and {cause}.
 
     Raises:
         ValueError: if a field is out of its range; names the field.
@@ -48,6 +53,7 @@ class Wording:
     past: LandmarkName | None = None
     dropped: LandmarkName | None = None
     topic: str | None = None
+    content: Proposition | None = None
 
     def __post_init__(self) -> None:
         if self.direction is not None:
@@ -73,7 +79,8 @@ class Wording:
             "dropped": self.dropped is not None,
             "here": self.here,
         }
-        return frozenset(name for name, is_known in found.items() if is_known)
+        told = () if self.content is None else (name for name, _ in self.content.arguments)
+        return frozenset((*(name for name, is_known in found.items() if is_known), *told))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,8 +12,9 @@ import numpy as np
 
 from dorothie_gym.dialogue.grammar import SPOKEN_SLOTS, load_grammar
 from dorothie_gym.dialogue.lexicon import load_lexicon
-from dorothie_gym.dialogue.numerals import cardinal, ordinal
+from dorothie_gym.dialogue.numerals import cardinal, duration, ordinal
 from dorothie_gym.dialogue.phrases import Register, manner_of
+from dorothie_gym.dialogue.propositions import Argument, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle
 from dorothie_gym.ontology import (
@@ -178,6 +179,26 @@ class SlotRealizer:
         """Returns the name of a landmark of the wording."""
         return self.pick(load_lexicon().forms(landmark or LandmarkName.UNKNOWN, "say"))
 
+    def argument(self, name: str) -> Argument:
+        """Returns an argument of the content."""
+        content = self._wording.content
+        value = None if content is None else content.get(name)
+        assert value is not None  # a template is chosen only if the content has its gaps
+        return value
+
+    def duration(self) -> str:
+        """Returns the time of the content in words."""
+        seconds = self.argument("seconds")
+        assert isinstance(seconds, int)
+        return duration(seconds)
+
+    def clause(self) -> str:
+        """Returns the clause that states the cause of the content."""
+        cause = self.argument("cause")
+        assert isinstance(cause, Proposition)
+        tense = "past " if self._wording.topic == "because_then" else ""
+        return load_grammar().clauses[f"{tense}{'not ' * cause.negated}{cause.predicate}"].say(self)
+
     def past(self) -> str:
         """Returns the name of the landmark to drive past."""
         return self.place(self._wording.past)
@@ -229,6 +250,12 @@ _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
         "distance": SlotRealizer.distance,
         "past": SlotRealizer.past,
         "dropped": SlotRealizer.dropped,
+        "seconds": SlotRealizer.duration,
+        "cause": SlotRealizer.clause,
+        "feature": lambda realizer: str(realizer.argument("feature")),
+        "purpose": lambda realizer: str(realizer.argument("purpose")),
+        "person": lambda realizer: str(realizer.argument("person")),
+        "item": lambda realizer: str(realizer.argument("item")),
     }
 )
 

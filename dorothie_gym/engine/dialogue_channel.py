@@ -114,7 +114,7 @@ class DialogueChannel:
     def say(self, role: Role, speech: Speech, now: float) -> str | None:
         """Starts or continues an utterance at a time [s]; returns the reason of a refusal."""
         text = speech.text.strip() or self._worded(speech.act, role)
-        return self._conversation.say(role, Span(text, speech.act), now)
+        return self._conversation.say(role, Span(text, speech.act, speech.meaning), now)
 
     def note(self, landmark: LandmarkName, status: GoalStatus) -> None:
         """Updates the annotation with a change of a subgoal's status, which ends transactions."""
@@ -165,6 +165,7 @@ class DialogueChannel:
                 "span": span.text,
                 "move": span.act.move.label,
                 "slots": {label: list(values) for label, values in span.act.slot_labels().items()},
+                **({"meaning": [said.to_json() for said in span.meaning]} if span.meaning else {}),
                 "exchange": exchange,
                 "transaction": transaction,
                 "start": round(utterance.start, 3),

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Generic, Self, TypeVar
 
 import numpy as np
 
-from dorothie_gym.dialogue import SpeakerStyle, Wording, WordingContext, speech_seconds, word_acts
+from dorothie_gym.dialogue import (
+    CommunicativeFunction,
+    Intention,
+    Proposition,
+    SpeakerStyle,
+    Wording,
+    WordingContext,
+    speech_seconds,
+    word_acts,
+)
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
 from dorothie_gym.policies.policy import DecisionClock, replace
@@ -41,6 +51,7 @@ class Remark:
     Attributes:
         act: move and slots.
         wording: particulars for the words.
+        meaning: propositions that are stated, asked or asked for.
         text: the words, if they are chosen already.
         joined: whether it is said in the same breath as the remark before.
         urgent: whether it may be said without leaving the other speaker time to answer.
@@ -49,6 +60,7 @@ class Remark:
 
     act: DialogueAct
     wording: Wording = field(default_factory=Wording)
+    meaning: tuple[Proposition, ...] = ()
     text: str = ""
     joined: bool = False
     urgent: bool = False
@@ -67,6 +79,43 @@ def remark(
     return Remark(
         act=DialogueAct.of(move, *values),
         wording=wording if wording is not None else Wording(),
+        joined=joined,
+        urgent=urgent,
+        expires=expires,
+    )
+
+
+def intend(
+    function: CommunicativeFunction,
+    content: Proposition | None = None,
+    *,
+    elided: Collection[str] = (),
+    wording: Wording | None = None,
+    joined: bool = False,
+    urgent: bool = False,
+    expires: float = math.inf,
+) -> Remark:
+    """Returns the remark that carries out an intention.
+
+    Args:
+        function: what is done with the content.
+        content: what is stated, asked, asked for or answered; None where there is no content.
+        elided: arguments of the content that are left out of the words.
+        wording: further particulars for the words; where no topic is given it is the predicate of the content, with
+            "not_" in front if it is negated.
+        joined: as of `Remark`.
+        urgent: as of `Remark`.
+        expires: as of `Remark`.
+    """
+    intention = Intention(function=function, content=content, elided=frozenset(elided))
+    particulars = Wording() if wording is None else wording
+    if content is not None:
+        topic = particulars.topic or f"{'not_' * content.negated}{content.predicate}"
+        particulars = dataclasses.replace(particulars, content=intention.spoken, topic=topic)
+    return Remark(
+        act=intention.act,
+        wording=particulars,
+        meaning=() if content is None else (content,),
         joined=joined,
         urgent=urgent,
         expires=expires,
@@ -166,7 +215,7 @@ class SpeechState:
             first = queue[0]
         end = now + speaking + speech_seconds(first.text)
         pause = ANSWER_TIME if first.act.move in _WANTS_ANSWER else PAUSE
-        return Speech(act=first.act, text=first.text), replace(
+        return Speech(act=first.act, text=first.text, meaning=first.meaning), replace(
             self,
             queue=queue[1:],
             quiet_until=end + pause,

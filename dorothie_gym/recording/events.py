@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from dorothie_gym.dialogue import Proposition, read_meaning
 from dorothie_gym.errors import OntologyError, SessionError, short_repr
 from dorothie_gym.ontology import DialogueAct, ObjectClass, PhysicalAction, Role, parse_act, parse_physical_action
 from dorothie_gym.recording.file_names import MAX_FRAME
@@ -20,7 +21,8 @@ class EventType(enum.StrEnum):
     DIALOGUE_MOVE = "DialogueMove"
     """One dialogue act: utterance (number), text (of the whole utterance), span (words of this act), move, slots
     ({slot label: [value labels]}), exchange (number or null), start and end [s]; if known, transaction
-    (number) and recognised (words that a speech recogniser returned for the whole utterance)."""
+    (number), recognised (words that a speech recogniser returned for the whole utterance) and meaning (the
+    propositions of the span, see `dialogue.propositions`)."""
     PHYSICAL_ACTION = "PhysicalAction"
     """Effective action of the Co-Wizard: action (label), angle (degrees, positive left, or null), up (or
     null)."""
@@ -119,6 +121,7 @@ class MoveRecord:
         flagged: whether it is a prediction point.
         transaction: number of the transaction; None if unknown.
         recognised: words that a speech recogniser returned for the whole utterance; None without a recogniser.
+        meaning: propositions that the speaker states, asks or asks for; empty if they are not known.
     """
 
     index: int
@@ -134,6 +137,7 @@ class MoveRecord:
     flagged: bool
     transaction: int | None = None
     recognised: str | None = None
+    meaning: tuple[Proposition, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,7 +225,16 @@ def move_record(event: Event, index: int, where: str = "event") -> MoveRecord:
         flagged=event.flagged,
         transaction=data.if_given("transaction", data.integer),
         recognised=data.if_given("recognised", data.text),
+        meaning=_meaning(data),
     )
+
+
+def _meaning(data: Fields) -> tuple[Proposition, ...]:
+    rows = data.if_given("meaning", data.anything)
+    try:
+        return () if rows is None else read_meaning(rows, "field 'meaning'")
+    except ValueError as error:
+        raise SessionError(f"{data.where}: {error}") from None
 
 
 def action_record(event: Event, index: int, where: str = "event") -> ActionRecord:

@@ -20,6 +20,9 @@ _ONE_BYTE = "bB?"
 
 _FLAGS = b"\0\1"
 
+OPTIONAL_FIELDS = frozenset({"meaning"})
+"""Text fields that an action dict may leave out; they are then empty."""
+
 
 class ActionFieldTable:
     """Bounds of the fields of an action space.
@@ -61,11 +64,12 @@ class ActionReader:
         self._action, self._table = action, table
         if action.keys() != table.known:
             fields = ", ".join(table.names)
-            missing = [name for name in table.names if name not in action]
+            missing = [name for name in table.names if name not in action and name not in OPTIONAL_FIELDS]
             if missing:
                 raise ValueError(f"field {missing[0]!r} is missing; the fields are {fields}")
             unknown = [name for name in action if name not in table.known]
-            raise ValueError(f"field {short_repr(unknown[0])} is unknown; the fields are {fields}")
+            if unknown:
+                raise ValueError(f"field {short_repr(unknown[0])} is unknown; the fields are {fields}")
 
     def integer(self, name: str) -> int:
         """Returns an integer field; raises `ValueError` if it is no integer or out of range."""
@@ -113,7 +117,7 @@ class ActionReader:
     def text(self, name: str) -> str:
         """Returns a text field; raises `ValueError` for another type, excess length or characters outside the space."""
         length, characters = self._table.texts[name]
-        value = self._action[name]
+        value = self._action.get(name, "") if name in OPTIONAL_FIELDS else self._action[name]
         if type(value) is str and not value:
             return value
         if not isinstance(value, str):

@@ -16,6 +16,9 @@ TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " 
 UTTERANCE_LENGTH = 160
 """Greatest length of one span of an utterance [characters]."""
 
+MEANING_LENGTH = 640
+"""Greatest length of the propositions of one span, as JSON [characters]."""
+
 MESSAGE_LENGTH = 240
 """Greatest length of a message of the Ad-Wizard [characters]."""
 

@@ -8,15 +8,16 @@ from dorothie_gym.policies import ScriptedCoWizard, ScriptedParticipant
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import policy_seed
 from dorothie_gym.policies.speech import SpeechState
 
 
-def state_of(**style: float) -> CoWizardState:
+def start(**style: float) -> tuple[CoWizardState, CoWizardView]:
     traits = {"echoes": 0.0, "checks": 0.0, "announces": 0.0, "silent": 0.0} | style
     env = DuoWizardEnv(town="brookside")
-    env.reset(seed=0)
-    return CoWizardState(
+    observations, _ = env.reset(seed=0)
+    state = CoWizardState(
         seed=0,
         town=env.town,
         style=CoWizardStyle(**traits),
@@ -24,11 +25,12 @@ def state_of(**style: float) -> CoWizardState:
         speech=SpeechState(role=Role.CO_WIZARD),
         intentions=Intentions(speed=40, usual=40),
     )
+    return state, CoWizardView.read(observations["co_wizard"], env.town)
 
 
 def heard_moves(words: str, action: ActionValue, seed: int, **style: float) -> list[DialogueMove]:
-    state = state_of(**style)
-    acknowledge(state, action, understand(words), np.random.default_rng(seed))
+    state, view = start(**style)
+    acknowledge(state, view, action, understand(words), np.random.default_rng(seed))
     return [item.act.move for item in state.speech.queue]
 
 
@@ -37,8 +39,8 @@ def test_silent_style_does_not_acknowledge():
 
 
 def test_echo_names_direction():
-    state = state_of(echoes=1.0)
-    acknowledge(state, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5))
+    state, view = start(echoes=1.0)
+    acknowledge(state, view, ActionValue.J_TURN, understand("left at the next one"), np.random.default_rng(5))
     named = [item for item in state.speech.queue if item.act.slots]
     assert named and named[0].wording.direction is Direction.LEFT
 
@@ -52,7 +54,14 @@ def test_stop_is_never_checked():
 
 @pytest.mark.parametrize(("rambles", "expected"), [(0.0, 0), (1.0, 1)])
 def test_only_rambling_style_mentions_plan(rambles, expected):
-    assert len(plan_remark(state_of(rambles=rambles), np.random.default_rng(1))) == expected
+    assert len(plan_remark(*start(rambles=rambles), np.random.default_rng(1))) == expected
+
+
+def test_plan_is_not_mentioned_twice_in_a_row():
+    state, view = start(rambles=1.0)
+    state.say(*plan_remark(state, view, np.random.default_rng(1)))
+    _, state.speech = state.speech.speak(0.0, 0.0, np.random.default_rng(1))
+    assert plan_remark(state, view, np.random.default_rng(1)) == ()
 
 
 def test_speaker_style_depends_on_seed_only():

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import understand
+from dorothie_gym.dialogue import Predicate, Proposition, understand, word_act
 from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, ObjectClass, PhysicalAction, Slot
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, ObjectClass, PhysicalAction, Role, Slot
 from dorothie_gym.policies.co_wizard.answers import answer_open
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -13,6 +13,8 @@ from dorothie_gym.spaces import Motion
 from tests.policies.test_co_wizard import Talk
 
 M = DialogueMove
+
+DRIVING = {"motion": np.int64(Motion.DRIVING), "hazard": np.int64(0), "speed": np.full(1, 8.0)}
 
 
 def on_the_way() -> Talk:
@@ -42,11 +44,33 @@ def test_standstill_is_explained_by_hazard():
 
 def test_stop_for_red_light_is_remembered_as_reason():
     talk = on_the_way()
-    since = float(view_of(talk).time) - 9.0
-    resting = talk.state.commands.resting(since, ObjectClass.TRAFFIC_LIGHT)
-    talk.state.commands = replace(resting, standing_since=since)
+    red = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT)
+    talk.state.commands = replace(talk.state.commands, standing_since=view_of(talk).time - 9.0).with_reason(red)
     stopped = view_of(talk, motion=np.int64(Motion.STOPPED), speed=np.zeros(1))
     assert answer(talk, stopped, ActionValue.STOP).slots == {ObjectClass.TRAFFIC_LIGHT}
+
+
+def test_reason_for_a_stop_is_told_in_the_past_when_the_car_drives_again():
+    talk = on_the_way()
+    red, now = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT), view_of(talk).time
+    talk.state.commands = replace(talk.state.commands, standing_since=None, stood_until=now - 5.0).with_reason(red)
+    driving = view_of(talk, **DRIVING)
+    assert answer(talk, driving, ActionValue.STOP).slots == {ObjectClass.TRAFFIC_LIGHT}
+    reply = talk.state.speech.queue[0]
+    (because,) = reply.meaning
+    assert because.predicate is Predicate.BECAUSE and because.get("cause") == red
+    assert because.get("at") == round(now - 5.0)
+    text = word_act(reply.act, Role.CO_WIZARD, np.random.default_rng(0), reply.wording)
+    assert "was red" in text.lower()
+
+
+def test_stop_long_ago_is_not_explained_by_its_reason():
+    talk = on_the_way()
+    red, now = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT), view_of(talk).time
+    talk.state.commands = replace(talk.state.commands, standing_since=None, stood_until=now - 300.0).with_reason(red)
+    answer(talk, view_of(talk, **DRIVING), ActionValue.STOP)
+    (said,) = talk.state.speech.queue[0].meaning
+    assert said == Proposition.of(Predicate.STANDS, action=ActionValue.STOP, negated=True)
 
 
 def test_u_turn_is_explained_by_goal():

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import ParsedText, Wording
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import ParsedText, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove
+from dorothie_gym.policies.co_wizard.judgement import seconds_to_goal
 from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.speech import Remark, intend, remark
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
 """Actions that are carried out at once and therefore never checked."""
 
 
-def acknowledge(state: CoWizardState, action: ActionValue, words: ParsedText, rng: np.random.Generator) -> None:
+def acknowledge(
+    state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText, rng: np.random.Generator
+) -> None:
     """Acknowledges an instruction: not at all, with a word, by repeating it, or by checking it.
 
     Args:
         state: working copy of the state.
+        view: observation.
         action: action that was asked for.
         words: words of the instruction.
         rng: random generator of the decision.
@@ -39,7 +45,7 @@ def acknowledge(state: CoWizardState, action: ActionValue, words: ParsedText, rn
     else:
         move = DialogueMove.CONFIRM if rng.random() < state.config.confirms else DialogueMove.ACKNOWLEDGE
         taken = remark(move, wording=Wording(topic="taken"))
-        state.say(taken, *plan_remark(state, rng, joined=True))
+        state.say(taken, *plan_remark(state, view, rng, joined=True))
 
 
 def _repeated(action: ActionValue, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
@@ -53,18 +59,28 @@ def _repeated(action: ActionValue, wording: Wording, rng: np.random.Generator) -
     return words, remark(DialogueMove.EXPLAIN, action, wording=wording, joined=True)
 
 
-def plan_remark(state: CoWizardState, rng: np.random.Generator, *, joined: bool = False) -> tuple[Remark, ...]:
+def plan_remark(
+    state: CoWizardState, view: CoWizardView, rng: np.random.Generator, *, joined: bool = False
+) -> tuple[Remark, ...]:
     """Returns a remark about the present plan, or nothing, by chance.
 
     Args:
         state: working copy of the state.
+        view: observation.
         rng: random generator of the decision.
         joined: whether the remark continues the one before.
     """
     if rng.random() > state.style.rambles:
         return ()
-    if state.route.progress is not None and state.beliefs.exact:
-        topic = "plan" if rng.random() < 0.4 else "eta"
+    goal, seconds = state.beliefs.goal, seconds_to_goal(state, view)
+    elided: tuple[str, ...] = ("place",)
+    if seconds is not None and rng.random() < 0.6:
+        content = Proposition.of(Predicate.ARRIVES_IN, place=goal, seconds=seconds)
+    elif state.route.progress is not None and state.beliefs.exact:
+        content = Proposition.of(Predicate.HAS_ROUTE, place=goal)
+    elif goal is not None:
+        content = Proposition.of(Predicate.KNOWS, place=goal, negated=True)
     else:
-        topic = "search" if state.beliefs.goal is not None else "idle"
-    return (remark(DialogueMove.EXPLAIN, wording=Wording(topic=topic), joined=joined),)
+        content, elided = Proposition.of(Predicate.GOAL, negated=True), ()
+    repeated = any(content.predicate is known.predicate for item in state.speech.said for known in item.meaning)
+    return () if repeated else (intend(Function.INFORM, content, elided=elided, joined=joined),)

@@ -1,4 +1,4 @@
-"""Answers of the Co-Wizard to questions."""
+"""Answers of the Co-Wizard to questions, from what it believes."""
 
 from __future__ import annotations
 
@@ -6,86 +6,127 @@ import itertools
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, ParsedText, Wording
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, Wording
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
-    DialogueMove,
     LandmarkName,
     ObjectClass,
-    PhysicalAction,
     Slot,
-    SlotValue,
     StreetName,
 )
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
-from dorothie_gym.policies.co_wizard.initiative import ANNOUNCED, visibility_topic
+from dorothie_gym.policies.co_wizard.judgement import (
+    believes,
+    reason_to_stand,
+    reason_to_turn_round,
+    seconds_to_goal,
+    visibility_topic,
+)
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.route_progress import direction_of
-from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.spaces import Motion
+
+_ABOUT_THE_GOAL = frozenset(
+    {Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY, Predicate.ARRIVED, Predicate.KNOWS}
+)
+
+RECENT_STOP = 45.0
+"""Time after a standstill within which the reason for it can be asked for [s]."""
 
 
 def answer_yes_no(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Answers a yes/no question."""
-    objects, landmarks, actions = act.values(Slot.OBJECT), act.values(Slot.LANDMARK), act.values(Slot.ACTION)
-    if ActionValue.LIGHT_CHANGE in actions:
+    """Answers a yes/no question by what the Co-Wizard believes of it."""
+    asked = asked_proposition(act, words)
+    if asked is None:
+        state.say(intend(Function.UNCERTAIN_ANSWER))
+    elif asked.predicate is Predicate.LIGHTS_ON:
         _answer_lights(state, view)
-        return
-    topic = None
-    if objects:
-        topic = "seen"
-        yes = any(thing.kind in objects for thing in view.objects) or view.hazard in objects
-    elif landmarks:
-        topic = "known"
-        yes = any(mark.name in landmarks for mark in view.landmarks)
-    elif actions:
-        topic = "doing"
-        yes = _present_action(view) in actions
     else:
-        progress = state.route.progress
-        yes = progress is not None and progress.left(view.station) < state.config.close_distance
-    more = _visibility_reason(view, rng) if objects and not yes else plan_remark(state, rng, joined=True)
-    answer = remark(DialogueMove.REPLY_Y if yes else DialogueMove.REPLY_N, wording=Wording(topic=topic))
-    state.say(answer, *more)
+        state.say(judged(state, view, asked), *_more(state, view, asked, rng))
+
+
+def asked_proposition(act: DialogueAct, words: ParsedText) -> Proposition | None:
+    """Returns what a yes/no question asks; None if that cannot be told."""
+    if words.asked is not None:
+        return words.asked
+    objects, landmarks, actions = act.values(Slot.OBJECT), act.values(Slot.LANDMARK), act.values(Slot.ACTION)
+    streets = act.values(Slot.STREET)
+    if ActionValue.LIGHT_CHANGE in actions:
+        return Proposition.of(Predicate.LIGHTS_ON)
+    if objects:
+        return Proposition.of(Predicate.SEES, object=objects[0])
+    if landmarks and streets:
+        return Proposition.of(Predicate.LOCATED, place=landmarks[0], street=streets[0])
+    if landmarks:
+        return Proposition.of(Predicate.KNOWS, place=landmarks[0])
+    if actions:
+        return Proposition.of(Predicate.DOES, action=actions[0])
+    return Proposition.of(Predicate.ON_STREET, street=streets[0]) if streets else None
+
+
+def judged(state: CoWizardState, view: CoWizardView, asked: Proposition) -> Remark:
+    """Returns the answer to whether a proposition is true: yes, no, or that the Co-Wizard does not know."""
+    if asked.predicate in _ABOUT_THE_GOAL and asked.get("place") is None:
+        asked = Proposition.of(asked.predicate, negated=asked.negated, place=state.beliefs.goal)
+    held = believes(state, view, asked)
+    elided = [name for name, _ in asked.arguments]
+    if held is None:
+        return intend(Function.UNCERTAIN_ANSWER, asked, elided=elided)
+    answer = Function.AFFIRMATIVE_ANSWER if held else Function.NEGATIVE_ANSWER
+    return intend(answer, asked if held else asked.opposite, elided=elided)
 
 
 def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
     """Answers a question about the head lights, which also asks for them to be switched on."""
     state.intentions = state.intentions.with_lights(True)
-    state.say(remark(DialogueMove.REPLY_Y if view.lights else DialogueMove.REPLY_N))
+    state.say(judged(state, view, Proposition.of(Predicate.LIGHTS_ON)))
     if not view.lights:
-        wording = Wording(lights=True)
-        state.say(remark(DialogueMove.EXPLAIN, ActionValue.LIGHT_CHANGE, wording=wording, joined=True))
+        on = Proposition.of(Predicate.WILL, action=ActionValue.LIGHT_CHANGE)
+        state.say(intend(Function.INFORM, on, wording=Wording(lights=True), joined=True))
 
 
-def _visibility_reason(view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
+def _more(
+    state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator
+) -> tuple[Remark, ...]:  # fmt: skip
+    """Returns what is added to an answer, by chance: why something is not seen, or the time to the goal."""
+    if asked.predicate is Predicate.SEES and not believes(state, view, asked):
+        return _poor_view(view, rng)
+    if asked.predicate in (Predicate.CLOSE, Predicate.RIGHT_WAY, Predicate.KNOWS, Predicate.HAS_ROUTE):
+        return plan_remark(state, view, rng, joined=True)
+    return ()
+
+
+def _poor_view(view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns a remark about the condition that limits the view, if there is one, by chance."""
     topic = visibility_topic(view)
     if topic is None or rng.random() < 0.3:
         return ()
-    return (remark(DialogueMove.EXPLAIN, wording=Wording(topic=topic), joined=True),)
+    content = Proposition.of(Predicate.VISIBILITY, negated=True)
+    return (intend(Function.INFORM, content, wording=Wording(topic=topic), joined=True),)
 
 
-def _present_action(view: CoWizardView) -> ActionValue:
-    if view.standing:
-        return ActionValue.STOP
-    return ANNOUNCED.get(view.manoeuvre or PhysicalAction.LANE_FOLLOW, ActionValue.LANE_FOLLOW)
+# --- open questions ---------------------------------------------------------------------------------------------------
 
 
 def answer_open(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Answers an open question."""
-    actions, landmarks = act.values(Slot.ACTION), act.values(Slot.LANDMARK)
-    if ActionValue.STOP in actions:
+    asked, actions, landmarks = words.asked, act.values(Slot.ACTION), act.values(Slot.LANDMARK)
+    if asked is not None and asked.predicate is Predicate.ARRIVES_IN:
+        _say_time(state, view)
+    elif ActionValue.STOP in actions:
         _explain_standing(state, view)
     elif ActionValue.U_TURN in actions:
-        _explain_u_turn(state)
+        _explain(state, Proposition.of(Predicate.DOES, action=ActionValue.U_TURN), reason_to_turn_round(state, view))
     elif ObjectClass.QUERIED in act.values(Slot.OBJECT):
         _name_objects(state, view)
     elif ActionValue.QUERIED in actions:
@@ -93,87 +134,103 @@ def answer_open(
     elif landmarks:
         mark = next((mark for mark in view.landmarks if mark.name in landmarks), None)
         if mark is None or mark.street is StreetName.UNKNOWN:
-            state.say(remark(DialogueMove.REPLY_U))
+            state.say(intend(Function.UNCERTAIN_ANSWER))
         else:
-            state.say(remark(DialogueMove.REPLY_W, mark.street))
+            located = Proposition.of(Predicate.LOCATED, place=mark.name, street=mark.street)
+            state.say(intend(Function.ANSWER, located, elided=("place",)))
     else:
         _name_street(state, view)
 
 
+def _say_time(state: CoWizardState, view: CoWizardView) -> None:
+    """Answers when the car will be at its goal."""
+    seconds = seconds_to_goal(state, view)
+    if seconds is None:
+        state.say(intend(Function.UNCERTAIN_ANSWER))
+        return
+    arrival = Proposition.of(Predicate.ARRIVES_IN, place=state.beliefs.goal, seconds=seconds)
+    state.say(intend(Function.ANSWER, arrival, elided=("place",)))
+
+
 def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
-    commands, goal = state.commands, state.beliefs.goal
-    reason = view.hazard if view.hazard is not ObjectClass.UNLABELED else commands.rest_for
-    standing = view.time - (commands.standing_since if commands.standing_since is not None else view.time)
-    recent = view.hazard is reason or standing < state.config.long_standstill
-    if reason is not ObjectClass.UNLABELED and recent:
-        state.dialogue = state.dialogue.after_explaining_hazard(view.time)
-        state.say(remark(DialogueMove.REPLY_W, reason))
-    elif state.intentions.arrived and goal is not None:
-        state.say(remark(DialogueMove.QUERY_YN, goal))
-    elif goal is None and state.intentions.directive is None:
-        state.say(remark(DialogueMove.QUERY_W, LandmarkName.QUERIED))
-    else:
-        if not state.intentions.arrived:
+    """Answers why the car stands, or has just stood."""
+    commands, stands = state.commands, Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
+    if view.standing or view.motion is Motion.HAZARD:
+        reason = reason_to_stand(state, view) or commands.reason
+        if reason is not None and reason.predicate is Predicate.GOAL:
+            state.say(intend(Function.SET_QUESTION, Proposition.of(Predicate.GOAL, place=LandmarkName.QUERIED)))
+            return
+        if reason is None and not state.intentions.arrived:
             state.intentions = state.intentions.resumed()
-        state.say(remark(DialogueMove.REPLY_U))
-
-
-def _explain_u_turn(state: CoWizardState) -> None:
-    if state.dialogue.detour_asked_at is not None or state.route.blocked:
-        state.say(remark(DialogueMove.REPLY_W, ObjectClass.STATIC))
-    elif state.beliefs.goal is not None and state.beliefs.exact:
-        state.say(remark(DialogueMove.REPLY_W, state.beliefs.goal, wording=Wording(topic="behind")))
+        if reason is not None:
+            state.dialogue = state.dialogue.after_explaining_hazard(view.time)
+        _explain(state, stands, reason)
+    elif view.time - commands.stood_until < RECENT_STOP:
+        _explain(state, stands, commands.reason, at=round(commands.stood_until))
     else:
-        state.say(remark(DialogueMove.REPLY_W, wording=Wording(topic="instructed")))
+        state.say(intend(Function.ANSWER, stands.opposite, elided=("action",)))
+
+
+def _explain(state: CoWizardState, effect: Proposition, cause: Proposition | None, at: int | None = None) -> None:
+    """Answers why something is so, or was so at a time [s]; says so where the reason is not known."""
+    if cause is None:
+        state.say(intend(Function.UNCERTAIN_ANSWER))
+        return
+    because = Proposition.of(Predicate.BECAUSE, effect=effect, cause=cause, at=at)
+    elided = ("effect",) if at is None else ("effect", "at")
+    topic = "because" if at is None else "because_then"
+    state.say(intend(Function.ANSWER, because, elided=elided, wording=Wording(topic=topic)))
 
 
 def _name_objects(state: CoWizardState, view: CoWizardView) -> None:
-    things = tuple(dict.fromkeys(thing.kind for thing in view.objects))[:2] or (ObjectClass.ROAD,)
-    state.say(remark(DialogueMove.REPLY_W, *things, wording=Wording(topic="seen")))
+    things = tuple(dict.fromkeys(thing.kind for thing in view.objects))[:2]
+    if not things:
+        state.say(intend(Function.ANSWER, Proposition.of(Predicate.SEES, object=ObjectClass.ROAD)))
+    for number, thing in enumerate(things):
+        state.say(intend(Function.ANSWER, Proposition.of(Predicate.SEES, object=thing), joined=number > 0))
 
 
 def _name_way(state: CoWizardState, view: CoWizardView) -> None:
-    turns = _next_turns(state, view)
-    if state.intentions.directive is None and turns:
-        for k, (values, side) in enumerate(turns):
-            wording = Wording(direction=side, topic="plan")
-            state.say(remark(DialogueMove.REPLY_W, *values, wording=wording, joined=k > 0))
-        return
-    way, progress = wanted_exit(state, view), state.route.progress
-    if way is None:
-        if progress is None:
-            state.say(remark(DialogueMove.REPLY_U))
-        else:
+    plan = () if state.intentions.directive is not None else _next_turns(state, view)
+    if not plan:
+        way, progress = wanted_exit(state, view), state.route.progress
+        if way is not None:
+            street = street_of(view.raw, state.town, way.lane)
+            plan = (_planned(direction_of(way), street),)
+        elif progress is not None:
             action = ActionValue.U_TURN if progress.changes_before(None) else ActionValue.LANE_FOLLOW
-            state.say(remark(DialogueMove.REPLY_W, action, wording=Wording(topic="plan")))
-        return
-    direction = direction_of(way)
-    street = street_of(view.raw, state.town, way.lane)
+            plan = (Proposition.of(Predicate.WILL, action=action),)
+        else:
+            state.say(intend(Function.UNCERTAIN_ANSWER))
+            return
+    for number, step in enumerate(plan):
+        direction = step.get("direction")
+        wording = Wording(direction=direction if isinstance(direction, Direction) else None, topic="plan")
+        state.say(intend(Function.ANSWER, step, wording=wording, joined=number > 0))
+
+
+def _planned(direction: Direction, street: StreetName) -> Proposition:
+    """Returns the statement that the car will leave a junction in a direction."""
     action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
-    slots: list[SlotValue] = [action]
-    if street is not StreetName.UNKNOWN:
-        slots.append(street)
-    wording = Wording(direction=direction, topic="plan")
-    state.say(remark(DialogueMove.REPLY_W, *slots, wording=wording))
+    named = None if street is StreetName.UNKNOWN else street
+    return Proposition.of(Predicate.WILL, action=action, direction=direction, street=named)
 
 
-def _next_turns(state: CoWizardState, view: CoWizardView) -> list[tuple[list[SlotValue], Direction]]:
-    """Returns the next turns of the route to the left or right, at most two: slots and direction of each."""
+def _next_turns(state: CoWizardState, view: CoWizardView) -> tuple[Proposition, ...]:
+    """Returns the next turns of the route to the left or right, at most two."""
     progress = state.route.progress
     if progress is None or progress.turns_round_first(state.town, view.station):
-        return []
-    found: list[tuple[list[SlotValue], Direction]] = []
-    for crossing in itertools.islice(progress.crossings(state.town, view.station), state.config.plan_junctions):
-        street = street_of(view.raw, state.town, crossing.exit.lane)
-        if crossing.direction in (Direction.LEFT, Direction.RIGHT):
-            values: list[SlotValue] = [ActionValue.J_TURN]
-            found.append((values + [street] * (street is not StreetName.UNKNOWN), crossing.direction))
-    return found[:2]
+        return ()
+    crossings = itertools.islice(progress.crossings(state.town, view.station), state.config.plan_junctions)
+    turns = [crossing for crossing in crossings if crossing.direction in (Direction.LEFT, Direction.RIGHT)]
+    return tuple(
+        _planned(crossing.direction, street_of(view.raw, state.town, crossing.exit.lane)) for crossing in turns[:2]
+    )
 
 
 def _name_street(state: CoWizardState, view: CoWizardView) -> None:
     street = street_of(view.raw, state.town, view.lane)
     if street is StreetName.UNKNOWN:
-        state.say(remark(DialogueMove.REPLY_U))
+        state.say(intend(Function.UNCERTAIN_ANSWER))
     else:
-        state.say(remark(DialogueMove.REPLY_W, street))
+        state.say(intend(Function.ANSWER, Proposition.of(Predicate.ON_STREET, street=street)))

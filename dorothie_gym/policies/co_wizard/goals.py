@@ -117,7 +117,7 @@ def set_goal(
             values.append(mark.street)
         move = DialogueMove.CONFIRM if rng.random() < 0.4 else DialogueMove.ACKNOWLEDGE
         words = remark(move, *values, wording=Wording(topic="taken"))
-        state.say(words, *plan_remark(state, rng, joined=True))
+        state.say(words, *plan_remark(state, view, rng, joined=True))
 
 
 def _set_unknown_goal(

@@ -18,19 +18,13 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
+from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, visibility_topic
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.observation_parser import is_dark, is_foggy, is_rainy, nearest_landmark, street_of
+from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import Choice, direction_of
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion, Physical
-
-ANNOUNCED = {
-    PhysicalAction.J_TURN: ActionValue.J_TURN,
-    PhysicalAction.U_TURN: ActionValue.U_TURN,
-    PhysicalAction.LANE_SWITCH: ActionValue.LANE_SWITCH,
-}
-"""Manoeuvres that the Co-Wizard names, and the slot value of each."""
 
 _WEATHER_OBJECTS = {
     "fog": (ObjectClass.ROAD_LINE, ObjectClass.ROAD),
@@ -101,7 +95,7 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
         _propose_way(state, view, choice, rng)
     else:
         state.dialogue = state.dialogue.with_proposal(None)
-        first = plan_remark(state, rng)
+        first = plan_remark(state, view, rng)
         state.say(*first, remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=bool(first)))
 
 
@@ -138,7 +132,7 @@ def _propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: 
         values.append(street)
     move = DialogueMove.QUERY_YN if rng.random() < 0.7 else DialogueMove.CHECK
     state.dialogue = state.dialogue.with_proposal(Directive(direction=direction, junction=choice.junction))
-    first = plan_remark(state, rng)
+    first = plan_remark(state, view, rng)
     question = remark(move, *values, wording=Wording(direction=direction), joined=bool(first))
     state.say(*first, question)
 
@@ -199,16 +193,7 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
     values: tuple[SlotValue, ...] = (hazard,)
     if resting or rng.random() < 0.3:
         values = (ActionValue.STOP, hazard)
-    state.say(remark(DialogueMove.EXPLAIN, *values), *plan_remark(state, rng, joined=True))
-
-
-def visibility_topic(view: CoWizardView) -> str | None:
-    """Returns the condition that limits the view: "fog", "rain" or "night"; None for clear weather by day."""
-    if is_foggy(view.raw):
-        return "fog"
-    if is_rainy(view.raw):
-        return "rain"
-    return "night" if is_dark(view.raw) else None
+    state.say(remark(DialogueMove.EXPLAIN, *values), *plan_remark(state, view, rng, joined=True))
 
 
 def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -258,7 +243,7 @@ def announce_action(
     spoken = not state.speech.idle or view.speaking > 0.0
     if physical is None or spoken or state.intentions.directive is not None:
         return
-    action = ANNOUNCED.get(physical.action)
+    action = NAMED_ACTIONS.get(physical.action)
     if action is None or state.intentions.wish is not None or rng.random() > state.style.announces:
         return
     values: list[SlotValue] = [action]

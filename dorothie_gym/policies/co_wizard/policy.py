@@ -13,6 +13,7 @@ from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, rest
 from dorothie_gym.policies.co_wizard.goals import note_plan, recognise_goal, search_on
 from dorothie_gym.policies.co_wizard.initiative import announce_action, scene_of, take_initiative
+from dorothie_gym.policies.co_wizard.judgement import reason_to_stand
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
 from dorothie_gym.policies.co_wizard.understanding_update import listen
@@ -103,6 +104,8 @@ def respond(decision: PendingDecision, physical: Physical | None) -> CoWizardAct
         physical: physical action of the decision.
     """
     state, view, rng = decision
+    if view.standing:
+        state.commands = state.commands.with_reason(reason_to_stand(state, view))
     announce_action(state, view, physical, rng)
     take_initiative(state, view, rng)
     scene = None if state.speech.idle else scene_of(state, view)

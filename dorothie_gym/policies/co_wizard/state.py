@@ -10,7 +10,7 @@ import enum
 import math
 from dataclasses import dataclass, field
 
-from dorothie_gym.dialogue import Direction
+from dorothie_gym.dialogue import Direction, Proposition
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import (
     GoalStatus,
@@ -63,6 +63,7 @@ class DialogueState:
         idle_since: start of the period without any task or instruction [s].
         steered_at: time of the last navigation instruction [s].
         stop_instructed_at: time of the last instruction to stop [s].
+        u_turn_instructed_at: time of the last instruction to turn round [s].
         proposed: turn proposed to the participant and not answered yet.
         offer: place proposed as the first destination and not answered yet.
         proposes_slowing: whether a proposal to slow down has not been answered yet.
@@ -79,6 +80,7 @@ class DialogueState:
     idle_since: float = 0.0
     steered_at: float = -math.inf
     stop_instructed_at: float = -math.inf
+    u_turn_instructed_at: float = -math.inf
     proposed: Directive | None = None
     offer: LandmarkName | None = None
     proposes_slowing: bool = False
@@ -110,6 +112,10 @@ class DialogueState:
     def after_stop_instruction(self, now: float) -> DialogueState:
         """Records an instruction to stop at `now` [s]."""
         return replace(self, stop_instructed_at=now)
+
+    def after_u_turn_instruction(self, now: float) -> DialogueState:
+        """Records an instruction to turn round at `now` [s]."""
+        return replace(self, u_turn_instructed_at=now)
 
     def busy(self, now: float) -> DialogueState:
         """Restarts the period without a task at `now` [s]."""
@@ -384,6 +390,8 @@ class CommandState:
 
     Attributes:
         standing_since: start of the present standstill [s]; None while the car moves.
+        reason: why the car stands, or stood last, as far as the Co-Wizard knows.
+        stood_until: end of the last standstill [s].
         turn_sent: lane and angle of the last turn commanded [-, degrees].
         turn_sent_at: time of that command [s].
         manoeuvre_sent_at: time of the last lane switch or U-turn command [s].
@@ -394,6 +402,8 @@ class CommandState:
     """
 
     standing_since: float | None = 0.0
+    reason: Proposition | None = None
+    stood_until: float = -math.inf
     turn_sent: tuple[int, int] = (-1, 0)
     turn_sent_at: float = -math.inf
     manoeuvre_sent_at: float = -math.inf
@@ -405,8 +415,12 @@ class CommandState:
     def observed(self, now: float, *, standing: bool) -> CommandState:
         """Brings the standstill up to date."""
         if not standing:
-            return self if self.standing_since is None else replace(self, standing_since=None)
-        return replace(self, standing_since=now) if self.standing_since is None else self
+            return self if self.standing_since is None else replace(self, standing_since=None, stood_until=now)
+        return replace(self, standing_since=now, reason=None) if self.standing_since is None else self
+
+    def with_reason(self, reason: Proposition | None) -> CommandState:
+        """Notes why the car stands; a reason that is not known any more stays."""
+        return self if reason is None or reason == self.reason else replace(self, reason=reason)
 
     def after_stop(self, now: float) -> CommandState:
         """Records a Stop command."""

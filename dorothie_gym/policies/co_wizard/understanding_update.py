@@ -117,7 +117,7 @@ def _instruction(
                 state.route = state.route.with_progress(None)
         for action in actions:
             _OBEYED[action](state, view, act, words)
-        acknowledge(state, actions[0], words, rng)
+        acknowledge(state, view, actions[0], words, rng)
     elif streets:
         _instructed_street(state, view, streets[0])
     elif state.dialogue.detour_asked_at is not None:
@@ -217,7 +217,7 @@ def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
     guided = state.beliefs.goal is not None and not state.beliefs.exact
     creeping = guided and view.time - state.dialogue.stop_instructed_at < state.config.recent_stop
     state.intentions = state.intentions.turning_round(view.time + state.config.wish_time, creeping=creeping)
-    state.dialogue = state.dialogue.with_detour_question(None)
+    state.dialogue = state.dialogue.with_detour_question(None).after_u_turn_instruction(view.time)
 
 
 def _do_switch(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
@@ -311,7 +311,7 @@ def _reply(
         if not state.beliefs.exact:
             state.route = state.route.with_progress(None)
         _do_turn(state, view, act, words)
-        acknowledge(state, ActionValue.J_TURN, words, rng)
+        acknowledge(state, view, ActionValue.J_TURN, words, rng)
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         _reply_with_place(state, view, act, rng)
     elif view.time - state.dialogue.asked_at < state.config.answer_time and words.order is None and not act.slots:
@@ -377,7 +377,7 @@ def _check(
     if streets and not landmarks:
         right = street_of(view.raw, state.town, view.lane) in streets
     move = DialogueMove.CONFIRM if right else DialogueMove.REPLY_N
-    state.say(remark(move), *plan_remark(state, rng, joined=True))
+    state.say(remark(move), *plan_remark(state, view, rng, joined=True))
 
 
 def _confusion(

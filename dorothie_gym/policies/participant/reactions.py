@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import Wording, WordingContext
+from dorothie_gym.dialogue import ASKED, CommunicativeFunction, Predicate, Proposition, Wording, WordingContext
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, StreetName, WeatherParameter
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
@@ -21,7 +21,7 @@ from dorothie_gym.policies.observation_parser import (
 )
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.speech import Remark, intend, remark
 
 LIGHTS_INTERVAL = 25.0
 """Time between remarks about the head lights [s]."""
@@ -200,6 +200,21 @@ def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     state.say(*options[int(rng.integers(len(options)))])
 
 
+def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> Remark:
+    """Returns a question about the drive that names nothing: what the car knows, or how it gets on."""
+    asked = [Proposition.of(predicate) for predicate in (Predicate.SAFE, Predicate.VISIBILITY, Predicate.RIGHT_WAY)]
+    asked += [Proposition.of(Predicate.LOCALISED), Proposition.of(Predicate.LOCALISED, negated=True)]
+    if state.task.goal is not None and not state.guidance.guiding:
+        place = state.task.goal.name
+        asked += [
+            Proposition.of(Predicate.CLOSE, place=place),
+            Proposition.of(Predicate.CLOSE, negated=True, place=place),
+        ]
+        asked.append(Proposition.of(Predicate.HAS_ROUTE, place=place))
+    chosen = asked[int(rng.integers(len(asked)))]
+    return intend(CommunicativeFunction.PROPOSITIONAL_QUESTION, chosen, elided=("place",))
+
+
 def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> list[tuple[Remark, ...]]:
     """Returns the remarks that are possible now; equal ones count several times."""
     goal = state.task.goal
@@ -207,9 +222,11 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
     found: list[tuple[Remark, ...]] = [
         *((remark(DialogueMove.IRRELEVANT),),) * 2,
         (remark(DialogueMove.IRRELEVANT), remark(DialogueMove.IRRELEVANT, joined=True)),
-        (remark(DialogueMove.QUERY_YN),),
+        (_question(state, view, rng),),
     ]
     if not state.guidance.guiding:
+        arrival = Proposition.of(Predicate.ARRIVES_IN, place=goal.name, seconds=ASKED)
+        found.append((intend(CommunicativeFunction.SET_QUESTION, arrival, elided=("place",)),))
         found.append((remark(DialogueMove.QUERY_W, ActionValue.QUERIED),))
         found.append((remark(DialogueMove.CHECK, goal.name),))
         found.append((remark(DialogueMove.QUERY_W, StreetName.QUERIED),))

@@ -1,0 +1,130 @@
+"""Intentions: what a speaker does with a proposition. The dialogue move follows from the intention, not from the words.
+
+The functions are those of ISO 24617-2 (Bunt et al., 2012) that occur between passenger and car. Each has a path through
+the decision tree of the annotators (`ontology.DECISION_TREE`), and thereby a move.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from dorothie_gym.copying import shared
+from dorothie_gym.dialogue.propositions import Proposition
+from dorothie_gym.ontology import DialogueAct, DialogueMove, SlotValue, walk
+
+
+class CommunicativeFunction(enum.StrEnum):
+    """What a speaker does with a proposition; the names are those of ISO 24617-2 where it has one."""
+
+    # initiatives
+    REQUEST = "request"
+    """Asks for an action, directly or indirectly: "turn left", "you should be turning left"."""
+    INFORM = "inform"
+    """Says something that nobody has asked for."""
+    PROPOSITIONAL_QUESTION = "propositional_question"
+    """Asks whether the proposition is true."""
+    SET_QUESTION = "set_question"
+    """Asks for the argument that is left open, or for one of two: "before or after?"."""
+    CHECK_QUESTION = "check_question"
+    """Asks whether something inferred is right."""
+    OFFER = "offer"
+    """Proposes an own action and asks for consent: "shall I find another way?"."""
+    FEEDBACK_ELICITATION = "feedback_elicitation"
+    """Asks whether the other one is following: "did you get that?"."""
+    # responses about the talk
+    POSITIVE_FEEDBACK = "positive_feedback"
+    """Shows that a message has arrived: "okay", "got it", also by repeating a part of it."""
+    NEGATIVE_FEEDBACK = "negative_feedback"
+    """Shows that a message has not arrived or was not understood."""
+    # responses about the drive
+    CORRECTION = "correction"
+    """Amplifies or repairs what was said before: "I said turn around"."""
+    ACCEPT = "accept"
+    """Takes on what was asked for: "will do", "KFC it is"."""
+    CONFIRM = "confirm"
+    """Verifies what was checked: "that's it"."""
+    AFFIRMATIVE_ANSWER = "affirmative_answer"
+    """Answers yes, or consents to an offer."""
+    NEGATIVE_ANSWER = "negative_answer"
+    """Answers no, denies what was checked, or declines an offer."""
+    UNCERTAIN_ANSWER = "uncertain_answer"
+    """Answers that the answer is unknown or unsure."""
+    ANSWER = "answer"
+    """Answers a set question."""
+    # anything else
+    OTHER = "other"
+    """Has nothing to do with the drive."""
+
+    @property
+    def move(self) -> DialogueMove:
+        """The dialogue move of the function."""
+        return _MOVES[self]
+
+
+_TALK, _DRIVE = "only about the talk", "about the drive"
+_OPENS, _REACTS = "it opens something", "it reacts to something"
+
+TREE_ANSWERS: Final[Mapping[CommunicativeFunction, tuple[str, ...]]] = MappingProxyType(
+    {
+        CommunicativeFunction.REQUEST: (_OPENS, "a command"),
+        CommunicativeFunction.INFORM: (_OPENS, "a statement"),
+        CommunicativeFunction.FEEDBACK_ELICITATION: (_OPENS, "a question", "whether the other side is following"),
+        CommunicativeFunction.CHECK_QUESTION: (_OPENS, "a question", "whether something inferred is right"),
+        CommunicativeFunction.PROPOSITIONAL_QUESTION: (
+            _OPENS, "a question", "something the speaker cannot infer", "yes or no",
+        ),
+        CommunicativeFunction.OFFER: (_OPENS, "a question", "something the speaker cannot infer", "yes or no"),
+        CommunicativeFunction.SET_QUESTION: (_OPENS, "a question", "something the speaker cannot infer", "any other"),
+        CommunicativeFunction.POSITIVE_FEEDBACK: (_REACTS, _TALK, "it did"),
+        CommunicativeFunction.NEGATIVE_FEEDBACK: (_REACTS, _TALK, "it did not"),
+        CommunicativeFunction.CORRECTION: (_REACTS, _DRIVE, "amplifies or repairs it"),
+        CommunicativeFunction.ACCEPT: (_REACTS, _DRIVE, "accepts or verifies it"),
+        CommunicativeFunction.CONFIRM: (_REACTS, _DRIVE, "accepts or verifies it"),
+        CommunicativeFunction.AFFIRMATIVE_ANSWER: (_REACTS, _DRIVE, "answers it", "yes"),
+        CommunicativeFunction.NEGATIVE_ANSWER: (_REACTS, _DRIVE, "answers it", "no"),
+        CommunicativeFunction.UNCERTAIN_ANSWER: (_REACTS, _DRIVE, "answers it", "unknown or unsure"),
+        CommunicativeFunction.ANSWER: (_REACTS, _DRIVE, "answers it", "anything else"),
+        CommunicativeFunction.OTHER: ("nothing to do with the drive",),
+    }
+)  # fmt: skip
+"""Answers that lead from the root of the decision tree to the move of each function."""
+
+_MOVES: Final = MappingProxyType({function: walk(answers) for function, answers in TREE_ANSWERS.items()})
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
+class Intention:
+    """What a speaker wants to do by one span of an utterance.
+
+    Attributes:
+        function: what is done.
+        content: the proposition that it is done with: stated, asked, asked for, answered; None where there is none, as
+            in "okay".
+        elided: arguments of the content that the other one knows, and that are left out of the words and the slots:
+            the effect in an answer to "why did we stop?".
+    """
+
+    function: CommunicativeFunction
+    content: Proposition | None = None
+    elided: frozenset[str] = frozenset()
+
+    @property
+    def spoken(self) -> Proposition | None:
+        """The content without what is left out of the words."""
+        return None if self.content is None else self.content.without(*self.elided)
+
+    @property
+    def slots(self) -> frozenset[SlotValue]:
+        """Slot values of the spoken content."""
+        spoken = self.spoken
+        return frozenset() if spoken is None else spoken.slots()
+
+    @property
+    def act(self) -> DialogueAct:
+        """The dialogue act: the move by the decision tree, the slots by the spoken content."""
+        return DialogueAct(self.function.move, self.slots)

@@ -1,0 +1,208 @@
+"""What the Co-Wizard believes: the truth of a proposition, and the answer to an open one, by its own observations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from dorothie_gym.dialogue import Predicate, Proposition
+from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass, PhysicalAction, StreetName
+from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.observation_parser import is_dark, is_foggy, is_rainy, street_of
+from dorothie_gym.policies.route_progress import light_ahead
+from dorothie_gym.policies.travel_time import travel_time
+from dorothie_gym.spaces import Motion
+
+NAMED_ACTIONS: Final = {
+    PhysicalAction.J_TURN: ActionValue.J_TURN,
+    PhysicalAction.U_TURN: ActionValue.U_TURN,
+    PhysicalAction.LANE_SWITCH: ActionValue.LANE_SWITCH,
+}
+"""Manoeuvres that the Co-Wizard names, and the slot value of each."""
+
+_OBEYED_WITHIN: Final = 15.0  # time from an instruction to what it causes [s]
+
+Belief = Callable[[CoWizardState, CoWizardView, Proposition], bool | None]
+"""Returns whether a proposition without negation is true; None if the Co-Wizard does not know."""
+
+
+def believes(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    """Returns whether the Co-Wizard holds a proposition for true; None if it does not know."""
+    belief = _BELIEFS.get(said.predicate)
+    held = None if belief is None else belief(state, view, said)
+    return held if held is None else held is not said.negated
+
+
+def seconds_to_goal(state: CoWizardState, view: CoWizardView) -> int | None:
+    """Returns the expected time until the car stops at the goal [s]; None if its place is unknown or the car halts."""
+    progress = state.route.progress
+    if progress is None or not state.beliefs.exact or state.intentions.halted:
+        return None
+    seconds = travel_time(state.town, progress, view.station, view.time, view.speed)
+    return round(seconds) if math.isfinite(seconds) else None
+
+
+def is_localised(view: CoWizardView, most: float) -> bool:
+    """Returns whether the variance of the position is at most `most` [m^2]."""
+    covariance = view.raw["pose_covariance"]
+    return float(covariance[0][0]) + float(covariance[1][1]) <= most
+
+
+def visibility_topic(view: CoWizardView) -> str | None:
+    """Returns the condition that limits the view: "fog", "rain" or "night"; None for clear weather by day."""
+    if is_foggy(view.raw):
+        return "fog"
+    if is_rainy(view.raw):
+        return "rain"
+    return "night" if is_dark(view.raw) else None
+
+
+def sees_far(view: CoWizardView) -> bool:
+    """Returns whether neither fog, heavy rain nor darkness limits the view."""
+    return visibility_topic(view) is None
+
+
+def is_red_ahead(state: CoWizardState, view: CoWizardView) -> bool:
+    """Returns whether the next traffic light on the way is near and not green."""
+    return light_ahead(state.town, view.lane, view.station, view.time) not in (None, LightColour.GREEN)
+
+
+def present_action(view: CoWizardView) -> ActionValue:
+    """Returns what the car is doing."""
+    if view.standing:
+        return ActionValue.STOP
+    return NAMED_ACTIONS.get(view.manoeuvre or PhysicalAction.LANE_FOLLOW, ActionValue.LANE_FOLLOW)
+
+
+# --- beliefs by predicate ---------------------------------------------------------------------------------------------
+
+
+def _sees(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    kind, place = said.get("object"), said.get("place")
+    if isinstance(kind, ObjectClass):
+        return any(thing.kind is kind for thing in view.objects) or view.hazard is kind
+    if isinstance(place, LandmarkName):
+        x, y = view.position
+        return any(mark.name is place and math.hypot(mark.x - x, mark.y - y) < 45.0 for mark in view.landmarks)
+    return None
+
+
+def _is_on_street(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    here = street_of(view.raw, state.town, view.lane)
+    if here is StreetName.UNKNOWN or not is_localised(view, state.config.lost_variance):
+        return None
+    return here is said.get("street")
+
+
+def _is_located(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    marks = [mark for mark in view.landmarks if mark.name is said.get("place")]
+    return any(mark.street is said.get("street") for mark in marks) if marks else None
+
+
+def _is_close(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    progress = state.route.progress
+    if progress is None or not state.beliefs.exact or not _about_goal(state, said):
+        return None
+    return progress.left(view.station) < state.config.close_distance
+
+
+def _knows(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    place = said.get("place") or state.beliefs.goal
+    if place is None:
+        return False
+    return any(mark.name is place and mark.place not in state.beliefs.ruled_out for mark in view.landmarks)
+
+
+def _has_route(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    return state.route.progress is not None and bool(state.route.progress.legs) and _about_goal(state, said)
+
+
+def _is_right_way(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    progress = state.route.progress
+    if progress is None or not state.beliefs.exact:
+        return None
+    return not progress.astray
+
+
+def _is_red(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    return is_red_ahead(state, view)
+
+
+def _is_safe(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    return view.hazard is ObjectClass.UNLABELED and sees_far(view) and is_localised(view, state.config.lost_variance)
+
+
+def _does(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    action = said.get("action")
+    return present_action(view) is action if isinstance(action, ActionValue) else None
+
+
+def _is_arrived(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    return state.intentions.arrived and view.standing and _about_goal(state, said)
+
+
+def _about_goal(state: CoWizardState, said: Proposition) -> bool:
+    return said.get("place") in (None, state.beliefs.goal)
+
+
+_BELIEFS: Final[dict[Predicate, Belief]] = {
+    Predicate.SEES: _sees,
+    Predicate.ON_STREET: _is_on_street,
+    Predicate.LOCATED: _is_located,
+    Predicate.CLOSE: _is_close,
+    Predicate.KNOWS: _knows,
+    Predicate.HAS_ROUTE: _has_route,
+    Predicate.RIGHT_WAY: _is_right_way,
+    Predicate.RED: _is_red,
+    Predicate.SAFE: _is_safe,
+    Predicate.DOES: _does,
+    Predicate.ARRIVED: _is_arrived,
+    Predicate.STANDS: lambda state, view, said: view.standing,
+    Predicate.LOCALISED: lambda state, view, said: is_localised(view, state.config.lost_variance),
+    Predicate.VISIBILITY: lambda state, view, said: sees_far(view),
+    Predicate.LIGHTS_ON: lambda state, view, said: view.lights,
+    Predicate.GOAL: lambda state, view, said: state.beliefs.goal is not None and _about_goal(state, said),
+    Predicate.HINDERS: lambda state, view, said: view.motion is Motion.HAZARD and view.hazard is said.get("object"),
+}
+
+
+# --- reasons ----------------------------------------------------------------------------------------------------------
+
+
+def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | None:
+    """Returns why the car stands now, as the Co-Wizard knows from what it does; None if it cannot tell."""
+    intentions, commands, goal = state.intentions, state.commands, state.beliefs.goal
+    resting = view.time < commands.rest_until
+    hazard = view.hazard if view.motion is Motion.HAZARD else commands.rest_for if resting else ObjectClass.UNLABELED
+    if intentions.arrived and goal is not None:
+        return Proposition.of(Predicate.ARRIVED, place=goal)
+    if state.dialogue.detour_asked_at is not None:
+        return Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
+    if hazard is ObjectClass.TRAFFIC_LIGHT:
+        return Proposition.of(Predicate.RED, object=hazard) if is_red_ahead(state, view) else None
+    if hazard is not ObjectClass.UNLABELED:
+        return Proposition.of(Predicate.HINDERS, object=hazard)
+    since = view.time if commands.standing_since is None else commands.standing_since
+    if intentions.halted and since - state.dialogue.stop_instructed_at < _OBEYED_WITHIN:
+        return Proposition.of(Predicate.TOLD, action=ActionValue.STOP)
+    if goal is None and intentions.directive is None:
+        return Proposition.of(Predicate.GOAL, negated=True)
+    if view.motion is Motion.WAITING or intentions.pausing:
+        return Proposition.of(Predicate.HAS_ROUTE, negated=True)
+    return None
+
+
+def reason_to_turn_round(state: CoWizardState, view: CoWizardView) -> Proposition | None:
+    """Returns why the car turns round now; None if the Co-Wizard cannot tell."""
+    goal = state.beliefs.goal
+    told = view.time - state.dialogue.u_turn_instructed_at < state.config.wish_time + _OBEYED_WITHIN
+    if state.intentions.wish is Wish.U_TURN or told:
+        return Proposition.of(Predicate.TOLD, action=ActionValue.U_TURN)
+    if state.route.blocked:
+        return Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
+    if goal is not None and state.beliefs.exact:
+        return Proposition.of(Predicate.BEHIND, place=goal)
+    return None
