@@ -59,6 +59,9 @@ def stats(
     behaviour: Annotated[
         bool, typer.Option("--behaviour", help="Test the claims of the paper about the behaviour of speakers.")
     ] = False,
+    talk: Annotated[
+        bool, typer.Option("--talk", help="Truth, reasons, arrival times and answers of what is said.")
+    ] = False,
     check: Annotated[
         bool, typer.Option("--check", help="Check the consistency of the annotation; exit code 1 if it has faults.")
     ] = False,
@@ -69,7 +72,9 @@ def stats(
     maps: Maps = None,
 ) -> None:
     """Print statistics of a corpus: table 2 of the paper, majority baselines and diversity, from the events."""
-    _check_choice(folder, kappa, picture=picture is not None, phenomena=phenomena, behaviour=behaviour, check=check)
+    _check_choice(
+        folder, kappa, picture=picture is not None, phenomena=phenomena, behaviour=behaviour, talk=talk, check=check
+    )
     if picture is not None:
         picture = PICTURE if picture == Path(OWN_NAME) else picture
         check_picture(picture)
@@ -87,6 +92,8 @@ def stats(
             _phenomena(corpus, as_json=as_json)
         elif behaviour:
             _behaviour(corpus, as_json=as_json)
+        elif talk:
+            _talk(corpus, as_json=as_json)
         else:
             _count(corpus, picture, as_json=as_json)
 
@@ -252,6 +259,23 @@ def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
     console.print(
         f"{len(corpus)} sessions, drawn {RESAMPLES:,} times; docs/statistics.md defines the comparisons.", style="dim"
     )
+
+
+def _talk(corpus: Corpus, *, as_json: bool) -> None:
+    from dorothie_gym.analysis.talk import talk_checks_of
+
+    found = talk_checks_of(corpus)
+    if as_json:
+        print_json({"sessions": len(corpus), **found.to_json()})
+        return
+    shown = Table(box=None, pad_edge=False)
+    for title in ("what is said", "right", "of"):
+        shown.add_column(title, justify="left" if title == "what is said" else "right", no_wrap=True)
+    for title, right, cases in found.rows():
+        shown.add_row(title, "-" if right is None else f"{100.0 * right:.1f} %", str(cases))
+    console = stdout()
+    console.print(shown)
+    console.print(f"{len(corpus)} sessions; docs/statistics.md defines the figures.", style="dim")
 
 
 def _check(corpus: Corpus, *, as_json: bool) -> None:

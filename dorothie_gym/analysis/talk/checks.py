@@ -1,0 +1,190 @@
+"""Figures of what is said in a corpus: each a share of the cases that the records can decide, with their number."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final
+
+from dorothie_gym.analysis.exception_attribution import handled_by, kind_of
+from dorothie_gym.analysis.talk.session_world import SessionWorld
+from dorothie_gym.analysis.talk.truth import agrees, is_true
+from dorothie_gym.analysis.units import Units
+from dorothie_gym.dialogue import ASKED, Predicate, Proposition
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.catalogue import find_town
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
+from dorothie_gym.recording import Corpus, EventType, MoveRecord, Session
+
+TALKED_ABOUT_WITHIN: Final = 45.0
+"""Time within which an exception is talked about [s]."""
+
+ANSWERED_WITHIN: Final = 10.0
+"""Time within which an answer belongs to a question [s]."""
+
+SAME_ORDERS: Final = 3
+"""Number of equal orders in a row that make a loop."""
+
+_FACTUAL: Final = frozenset(
+    {
+        DialogueMove.EXPLAIN, DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM,
+        DialogueMove.ACKNOWLEDGE, DialogueMove.CLARIFY,
+    }
+)  # fmt: skip
+_YES_NO: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N})
+_ANSWERS: Final = _YES_NO | {DialogueMove.REPLY_W}
+_QUESTIONS: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CHECK})
+
+SHARES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "truth": "statements that are true",
+        "causes": "reasons that are right",
+        "arrival_times": "arrival times within a factor of 1.5",
+        "yes_no_answers": "yes and no that are right",
+        "relevance": "answers to what was asked",
+        "loops": "sessions without an order given three times in a row",
+    }
+)
+"""Titles of the figures besides those of the exceptions."""
+
+_EXCEPTIONS: Final = "exceptions/"
+
+
+@dataclass
+class TalkChecks:
+    """Counts of a corpus.
+
+    Attributes:
+        right: number of cases that are right, by figure; exceptions as "exceptions/KIND".
+        cases: number of cases that can be decided.
+    """
+
+    right: Counter[str] = field(default_factory=Counter)
+    cases: Counter[str] = field(default_factory=Counter)
+
+    def add(self, figure: str, right: bool | None) -> None:
+        """Counts a case; None for one that the records cannot decide."""
+        if right is not None:
+            self.right[figure] += right
+            self.cases[figure] += 1
+
+    def share(self, figure: str) -> float | None:
+        """Returns the share of right cases in [0, 1]; None without a case."""
+        return self.right[figure] / self.cases[figure] if self.cases[figure] else None
+
+    def rows(self) -> Iterator[tuple[str, float | None, int]]:
+        """Yields title, share and number of cases of each figure."""
+        for figure, title in SHARES.items():
+            yield title, self.share(figure), self.cases[figure]
+        for name in sorted(name for name in self.cases if name.startswith(_EXCEPTIONS)):
+            kind = name.removeprefix(_EXCEPTIONS).replace("_", " ")
+            yield f"exceptions talked about: {kind}", self.share(name), self.cases[name]
+
+    def to_json(self) -> dict[str, object]:
+        """Returns each share, and the number of its cases as `NAME_n`; exceptions by kind."""
+        rows: dict[str, object] = {}
+        for figure in SHARES:
+            rows[figure], rows[f"{figure}_n"] = self.share(figure), self.cases[figure]
+        kinds = sorted(name.removeprefix(_EXCEPTIONS) for name in self.cases if name.startswith(_EXCEPTIONS))
+        rows["exceptions"] = {kind: self.share(_EXCEPTIONS + kind) for kind in kinds}
+        rows["exceptions_n"] = {kind: self.cases[_EXCEPTIONS + kind] for kind in kinds}
+        return rows
+
+
+def talk_checks_of(corpus: Corpus) -> TalkChecks:
+    """Returns the figures of a corpus."""
+    checks = TalkChecks()
+    for entry in corpus.entries:
+        session = entry.load()
+        check_session(checks, session, find_town(session.header.town, entry.maps))
+    return checks
+
+
+def check_session(checks: TalkChecks, session: Session, town: Town | None) -> None:
+    """Adds the cases of a session; of one in an unknown town (None), those that need no map."""
+    if town is not None and len(session.trajectory):
+        _check_claims(checks, SessionWorld(session, town))
+    _check_answers(checks, session)
+    _check_exceptions(checks, session)
+    checks.add("loops", not has_loop(session))
+
+
+def _check_claims(checks: TalkChecks, world: SessionWorld) -> None:
+    """Holds what is stated against the world."""
+    for move in world.session.moves():
+        for said in move.meaning if move.act.move in _FACTUAL else ():
+            right = is_true(world, said, move.start, move.speaker)
+            if said.predicate is Predicate.BECAUSE:
+                checks.add("causes", right)
+            if said.predicate is Predicate.ARRIVES_IN:
+                _check_time(checks, world, move, said)
+            else:
+                checks.add("truth", right)
+            if move.act.move in _YES_NO:
+                checks.add("yes_no_answers", right)
+
+
+def _check_time(checks: TalkChecks, world: SessionWorld, move: MoveRecord, said: Proposition) -> None:
+    place, seconds = said.get("place"), said.get("seconds")
+    arrival = world.arrival(move.start, place) if isinstance(place, LandmarkName) else None
+    if arrival is not None and isinstance(seconds, int):
+        checks.add("arrival_times", agrees(seconds, arrival - move.start))
+
+
+def _check_answers(checks: TalkChecks, session: Session) -> None:
+    """Checks whether answers are about what was asked."""
+    asked: MoveRecord | None = None
+    for move in session.moves():
+        if move.act.move in _QUESTIONS and move.meaning:
+            asked = move
+        elif asked is not None and move.speaker is not asked.speaker and move.act.move in _ANSWERS and move.meaning:
+            if move.start - asked.end <= ANSWERED_WITHIN:
+                checks.add("relevance", _is_about(move.meaning[0], asked.meaning[0]))
+            asked = None
+
+
+def _is_about(answer: Proposition, question: Proposition) -> bool:
+    """Returns whether an answer's proposition is the one that was asked, filled in or denied."""
+    if answer.predicate is Predicate.BECAUSE:
+        effect = answer.get("effect")
+        return isinstance(effect, Proposition) and effect.predicate is question.predicate
+    same = all(answer.get(name) in (None, value) for name, value in question.arguments if not _is_open(value))
+    return answer.predicate is question.predicate and same
+
+
+def _is_open(value: object) -> bool:
+    return value is ASKED or getattr(value, "label", "") == "Queried"
+
+
+def _check_exceptions(checks: TalkChecks, session: Session) -> None:
+    """Checks which exceptions are talked about in time."""
+    units = Units(session)
+    starts = {unit.id: unit.start for unit in units.exchanges}
+    talked: dict[int, float] = {}  # start of the first exchange about each event
+    for number, event in handled_by(units).items():
+        talked[id(event)] = min(starts[number], talked.get(id(event), math.inf))
+    for event in session.of_type(EventType.EXCEPTION):
+        kind = kind_of(event)
+        if kind is None or kind.name.startswith("DELETE") or event.data.get("on") is False:
+            continue
+        name = str(event.data.get("sensor") or event.data.get("weather") or kind.name.lower())
+        checks.add(_EXCEPTIONS + name, talked.get(id(event), math.inf) - event.time <= TALKED_ABOUT_WITHIN)
+
+
+def has_loop(session: Session) -> bool:
+    """Returns whether a speaker gave the same order `SAME_ORDERS` times in a row, with nothing else in between."""
+    last: Mapping[Role, tuple[DialogueAct, int]] = {}
+    for move in session.moves():
+        act = move.act
+        if act.move is not DialogueMove.INSTRUCT:
+            continue
+        turns = ActionValue.LANE_FOLLOW not in act.values(Slot.ACTION) and act.values(Slot.ACTION)
+        before, count = last.get(move.speaker, (None, 0))
+        count = count + 1 if turns and before == act else 1
+        last = {**last, move.speaker: (act, count)}
+        if count >= SAME_ORDERS:
+            return True
+    return False

@@ -1,0 +1,212 @@
+"""Recorded world of a session: what was the case at a time."""
+
+from __future__ import annotations
+
+import bisect
+import functools
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import Place, router
+from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.ontology import (
+    ActionValue,
+    GoalStatus,
+    LandmarkName,
+    ObjectClass,
+    PhysicalAction,
+    Role,
+    Sensor,
+    WeatherParameter,
+)
+from dorothie_gym.recording import FRAME_RATE, Event, EventType, Session
+from dorothie_gym.recording.header import LandmarkRow
+from dorothie_gym.recording.surroundings import ActorKind
+
+STANDING_SPEED: Final = 0.5  # [m/s]
+_LIGHT_SIGHT: Final = 60.0  # distance of the light that a standing car waits for [m]
+
+
+class SessionWorld:
+    """World of a recorded session.
+
+    Attributes:
+        session: the session.
+        town: its town.
+    """
+
+    def __init__(self, session: Session, town: Town) -> None:
+        self.session, self.town = session, town
+        self._rows = session.trajectory
+
+    # --- the car ------------------------------------------------------------------------------------------------------
+
+    def row(self, time: float) -> np.void:
+        """Returns the row of the trajectory at a time [s], the nearest within the session."""
+        place = int(np.searchsorted(self._rows["frame"], round(time * FRAME_RATE)))
+        return self._rows[min(place, len(self._rows) - 1)]  # type: ignore[no-any-return]
+
+    def position(self, time: float) -> tuple[float, float]:
+        """Returns where the car is at a time [s] (x, y) [m]."""
+        row = self.row(time)
+        return float(row["x"]), float(row["y"])
+
+    def speed(self, time: float) -> float:
+        """Returns the speed of the car at a time [s], in m/s."""
+        return float(self.row(time)["speed"])
+
+    def stands(self, time: float) -> bool:
+        """Returns whether the car stands at a time [s]."""
+        return self.speed(time) < STANDING_SPEED
+
+    def place(self, time: float) -> Place:
+        """Returns lane of the car and distance along it at a time [s]."""
+        lane = int(self.row(time)["lane"])
+        return lane, float(self.town.lanes[lane].project(np.array(self.position(time)))[0])
+
+    def street(self, time: float) -> str | None:
+        """Returns the label of the name of the street that the car is on; None if it has none."""
+        index = self.town.lanes[int(self.row(time)["lane"])].street
+        names = self.session.header.street_names
+        return names[index] if 0 <= index < len(names) else None
+
+    def bearing(self, time: float, x: float, y: float) -> float:
+        """Returns the angle between the heading of the car and a point, in 0..180 [degrees]."""
+        row = self.row(time)
+        away = math.atan2(y - float(row["y"]), x - float(row["x"]))
+        return abs(wrap_degrees(math.degrees(away - float(row["heading"]))))
+
+    def way_to(self, time: float, landmark: LandmarkRow) -> float:
+        """Returns the length of the shortest way from the car to a landmark [m]; infinity if there is none."""
+        route = router(self.town).route(self.place(time), (landmark["lane"], landmark["station"]))
+        return route.length if route is not None else math.inf
+
+    def light_is_red(self, time: float) -> bool:
+        """Returns whether the next traffic light on the lanes ahead, if near, is not green at a time [s]."""
+        lane, station = self.place(time)
+        ahead = -station
+        for _ in range(6):
+            ahead += self.town.lanes[lane].length
+            if ahead > _LIGHT_SIGHT:
+                return False
+            colour = self.town.light(lane, time)
+            if colour is not None:
+                return colour is not LightColour.GREEN
+            following = self.town.exits(lane)
+            if len(following) != 1:
+                return False
+            lane = following[0].connector if following[0].connector >= 0 else following[0].lane
+        return False
+
+    def lights_on(self, time: float) -> bool:
+        """Returns whether the head lights are on at a time [s]; they are off at first."""
+        switched = [
+            action.up
+            for action in self.session.physical_actions
+            if action.action is PhysicalAction.LIGHT_CHANGE and action.frame <= time * FRAME_RATE
+        ]
+        return bool(switched and switched[-1])
+
+    # --- the surroundings ---------------------------------------------------------------------------------------------
+
+    def weather(self, time: float, parameter: WeatherParameter) -> float:
+        """Returns a parameter of the weather at a time [s], in its unit."""
+        table = self.session.scene.weather
+        place = bisect.bisect_right(table.frames.tolist(), round(time * FRAME_RATE)) - 1
+        if place < 0:
+            return parameter.clear_noon
+        return float(table.rows[int(table.offsets[place])][parameter.value])
+
+    def distance_of(self, time: float, kinds: Sequence[ActorKind]) -> float:
+        """Returns the distance of the nearest recorded actor of some kinds at a time [m]; infinity if there is none."""
+        table = self.session.scene.actors
+        place = bisect.bisect_right(table.frames.tolist(), round(time * FRAME_RATE)) - 1
+        if place < 0:
+            return math.inf
+        rows = table.rows[int(table.offsets[place]) : int(table.offsets[place + 1])]
+        rows = rows[np.isin(rows["kind"], [int(kind) for kind in kinds])]
+        x, y = self.position(time)
+        return float(np.hypot(rows["x"] - x, rows["y"] - y).min()) if len(rows) else math.inf
+
+    def hazards(self, time: float, around: float) -> set[str]:
+        """Returns the labels of the objects that the car brakes for within some seconds of a time [s]."""
+        found: set[str] = set()
+        for begun, ended, reason in self._hazards:
+            if begun - around <= time <= ended + around:
+                found.add(reason)
+        return found
+
+    @functools.cached_property
+    def _hazards(self) -> list[tuple[float, float, str]]:
+        found: list[tuple[float, float, str]] = []
+        begun: dict[str, float] = {}
+        for event in self.session.of_type(EventType.HAZARD_STOP, EventType.HAZARD_END):
+            reason = str(event.data.get("reason"))
+            if event.type is EventType.HAZARD_STOP:
+                begun.setdefault(reason, event.time)
+            elif reason in begun:
+                found.append((begun.pop(reason), event.time, reason))
+        return found + [(start, math.inf, reason) for reason, start in begun.items()]
+
+    def failed(self, time: float, sensor: Sensor) -> bool:
+        """Returns whether a sensor is faulty at a time [s]."""
+        switched = [
+            bool(event.data.get("on"))
+            for event in self.session.of_type(EventType.EXCEPTION)
+            if event.data.get("sensor") == sensor.value and event.time <= time
+        ]
+        return bool(switched and switched[-1])
+
+    # --- tasks --------------------------------------------------------------------------------------------------------
+
+    def landmarks(self, name: LandmarkName) -> list[LandmarkRow]:
+        """Returns the landmarks of a name."""
+        return [row for row in self.session.header.landmarks if row["name"] == name.label]
+
+    @functools.cached_property
+    def changes(self) -> tuple[Event, ...]:
+        """Changes of the subgoals, in order."""
+        return self.session.of_type(EventType.SUBGOAL)
+
+    def arrival(self, time: float, name: LandmarkName) -> float | None:
+        """Returns the time of the next arrival, if it is at a landmark of a name and no task changes before [s]."""
+        following = next((event for event in self.changes if event.time > time), None)
+        if following is None or following.data.get("landmark") != name.label:
+            return None
+        arrived = following.data.get("cause") == "arrival"
+        return following.time if arrived and following.data.get("status") == GoalStatus.COMPLETE.label else None
+
+    def arrived_at(self, time: float, name: LandmarkName) -> bool:
+        """Returns whether the car stands at a landmark of a name, or has arrived there in the last half minute."""
+        x, y = self.position(time)
+        near = any(math.hypot(row["x"] - x, row["y"] - y) < 25.0 for row in self.landmarks(name))
+        done = any(
+            event.data.get("landmark") == name.label and 0.0 <= time - event.time < 30.0 for event in self.changes
+        )  # fmt: skip
+        return done or (near and self.stands(time))
+
+    def told_to(self, time: float, action: ActionValue, within: float) -> bool:
+        """Returns whether the participant has named an action within some seconds before a time [s]."""
+        return any(
+            action in move.act.slots and 0.0 <= time - move.end <= within
+            for move in self.session.moves(Role.PARTICIPANT)
+        )
+
+    def goal_named(self, time: float) -> bool:
+        """Returns whether the participant has named a place to go to since the last task was finished."""
+        since = max((event.time for event in self.changes if event.time <= time), default=0.0)
+        named = (move for move in self.session.moves(Role.PARTICIPANT) if since - 1.0 <= move.end <= time)
+        return any(isinstance(value, LandmarkName) for move in named for value in move.act.slots)
+
+
+ACTORS: Final = {
+    ObjectClass.VEHICLES: (ActorKind.VEHICLE,),
+    ObjectClass.PEDESTRIAN: (ActorKind.PEDESTRIAN,),
+    ObjectClass.STATIC: (ActorKind.PROP,),
+}
+"""Kinds of recorded actors by the class by which they are seen."""

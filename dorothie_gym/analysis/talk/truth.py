@@ -1,0 +1,213 @@
+"""Truth of propositions, held against the recorded world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from dorothie_gym.analysis.talk.session_world import ACTORS, SessionWorld
+from dorothie_gym.dialogue import Predicate, Proposition
+from dorothie_gym.ontology import (
+    ActionValue,
+    LandmarkName,
+    ObjectClass,
+    Role,
+    Sensor,
+    StreetName,
+    WeatherParameter,
+)
+
+CLOSE, FAR = 130.0, 200.0
+"""Ways up to the first length count as short, and from the second on as long [m]; in between, both may be said."""
+
+SIGHT: Final = 120.0
+"""Largest distance of an actor that can be seen [m]."""
+
+TIME_FACTOR: Final = 1.5
+"""Largest ratio of a claimed and an actual time that agree; times up to `SHORT_TIME` agree in any case."""
+
+SHORT_TIME: Final = 15.0
+"""Differences of times that nobody minds [s]."""
+
+_FOG, _RAIN = 30.0, 50.0  # densities from which on the view may be called poor [%]
+_NOW: Final = 4.0  # time within which "now" may lie [s]
+_TOLD: Final = 60.0  # longest time between an order and what it explains [s]
+
+Evaluator = Callable[[SessionWorld, Proposition, float, Role], bool | None]
+"""Returns whether a proposition without negation is true at a time [s], said by a role; None if it is not recorded."""
+
+
+def is_true(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Returns whether a proposition is true; None if the record cannot tell.
+
+    Args:
+        world: the recorded world.
+        said: the proposition.
+        time: when it is said [s].
+        speaker: who says it.
+    """
+    evaluator = _EVALUATORS.get(said.predicate)
+    held = None if evaluator is None or said.asks else evaluator(world, said, time, speaker)
+    return held if held is None else held is not said.negated
+
+
+def is_right_cause(world: SessionWorld, cause: Proposition, effect: Proposition | None, time: float) -> bool | None:
+    """Returns whether a cause held when its effect did, at a time [s]; None if the record cannot tell."""
+    evaluator = _CAUSES.get(cause.predicate)
+    if evaluator is None:
+        return None
+    if effect is not None and effect.predicate is Predicate.STANDS:
+        stood = any(world.stands(time + shift) for shift in (-_NOW, -1.0, 0.0, 1.0, _NOW))
+        if not stood:
+            return False
+    held = evaluator(world, cause, time)
+    return held if held is None else held is not cause.negated
+
+
+def agrees(claimed: float, actual: float) -> bool:
+    """Returns whether a claimed time agrees with the actual one [s]."""
+    if abs(claimed - actual) <= SHORT_TIME:
+        return True
+    return claimed > 0.0 and actual > 0.0 and max(claimed / actual, actual / claimed) <= TIME_FACTOR
+
+
+# --- evaluators by predicate ------------------------------------------------------------------------------------------
+
+
+def _sees(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    kind = said.get("object")
+    actors = ACTORS.get(kind) if isinstance(kind, ObjectClass) else None
+    if actors is None:
+        return None
+    nearest = min(world.distance_of(time + shift, actors) for shift in (-_NOW, -2.0, 0.0))
+    return nearest <= SIGHT
+
+
+def _on_street(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    street = said.get("street")
+    if not isinstance(street, StreetName):
+        return None
+    names = {world.street(time + shift) for shift in (-_NOW, -2.0, 0.0)}
+    return street.label in names if names != {None} else None
+
+
+def _located(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    place, street = said.get("place"), said.get("street")
+    if not isinstance(place, LandmarkName) or not isinstance(street, StreetName):
+        return None
+    names = world.session.header.street_names
+    return any(
+        names[row["street"]] == street.label for row in world.landmarks(place) if 0 <= row["street"] < len(names)
+    )
+
+
+def _arrives_in(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    place, seconds = said.get("place"), said.get("seconds")
+    if not isinstance(place, LandmarkName) or not isinstance(seconds, int):
+        return None
+    arrival = world.arrival(time, place)
+    return None if arrival is None else agrees(seconds, arrival - time)
+
+
+def _close(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    place = said.get("place")
+    rows = world.landmarks(place) if isinstance(place, LandmarkName) else []
+    if len(rows) != 1:  # several houses: which one is meant is not known
+        return None
+    way = world.way_to(time, rows[0])
+    return True if way <= CLOSE else False if way >= FAR else None
+
+
+def _knows(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    place = said.get("place")
+    rows = world.landmarks(place) if isinstance(place, LandmarkName) else []
+    if not rows or speaker is not Role.CO_WIZARD:
+        return None
+    hidden = [row["hidden"] for row in rows]
+    return None if any(hidden) and not all(hidden) else not any(hidden)
+
+
+def _visibility(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    fog, rain = (
+        world.weather(time, parameter) for parameter in (WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION)
+    )
+    dark = world.weather(time, WeatherParameter.SUN_ALTITUDE_ANGLE) < 5.0
+    faulty = world.failed(time, Sensor.BLUR) or world.failed(time, Sensor.VIEW)
+    return not (fog > _FOG or rain > _RAIN or dark or faulty)
+
+
+def _arrived(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    place = said.get("place")
+    return world.arrived_at(time, place) if isinstance(place, LandmarkName) else None
+
+
+def _because(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    cause, effect, at = said.get("cause"), said.get("effect"), said.get("at")
+    if not isinstance(cause, Proposition):
+        return None
+    when = float(at) if isinstance(at, int) else time
+    return is_right_cause(world, cause, effect if isinstance(effect, Proposition) else None, when)
+
+
+def _goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    return world.goal_named(time) if said.get("place") is None else None
+
+
+_EVALUATORS: Final[dict[Predicate, Evaluator]] = {
+    Predicate.SEES: _sees,
+    Predicate.ON_STREET: _on_street,
+    Predicate.LOCATED: _located,
+    Predicate.ARRIVES_IN: _arrives_in,
+    Predicate.CLOSE: _close,
+    Predicate.KNOWS: _knows,
+    Predicate.VISIBILITY: _visibility,
+    Predicate.ARRIVED: _arrived,
+    Predicate.BECAUSE: _because,
+    Predicate.GOAL: _goal,
+    Predicate.LIGHTS_ON: lambda world, said, time, speaker: world.lights_on(time),
+    Predicate.STANDS: lambda world, said, time, speaker: world.stands(time),
+    Predicate.LOCALISED: lambda world, said, time, speaker: None if world.failed(time, Sensor.GPS) else True,
+}
+
+
+# --- causes -----------------------------------------------------------------------------------------------------------
+
+
+def _red(world: SessionWorld, cause: Proposition, time: float) -> bool | None:
+    label = ObjectClass.TRAFFIC_LIGHT.label
+    shifts = (-_NOW, -2.0, 0.0)
+    return label in world.hazards(time, _NOW) or any(world.light_is_red(time + shift) for shift in shifts)
+
+
+def _hinders(world: SessionWorld, cause: Proposition, time: float) -> bool | None:
+    kind = cause.get("object")
+    return kind.label in world.hazards(time, 2.0 * _NOW) if isinstance(kind, ObjectClass) else None
+
+
+def _told(world: SessionWorld, cause: Proposition, time: float) -> bool | None:
+    action = cause.get("action")
+    return world.told_to(time, action, _TOLD) if isinstance(action, ActionValue) else None
+
+
+def _behind(world: SessionWorld, cause: Proposition, time: float) -> bool | None:
+    place = cause.get("place")
+    rows = world.landmarks(place) if isinstance(place, LandmarkName) else []
+    bearings = [world.bearing(time + shift, row["x"], row["y"]) for row in rows for shift in (-8.0, -_NOW, 0.0)]
+    return max(bearings) > 60.0 if bearings else None
+
+
+def _blocked(world: SessionWorld, cause: Proposition, time: float) -> bool | None:
+    nearest = min(world.distance_of(time + shift, ACTORS[ObjectClass.STATIC]) for shift in (-30.0, -15.0, -_NOW, 0.0))
+    return math.isfinite(nearest) and nearest < SIGHT
+
+
+_CAUSES: Final[dict[Predicate, Callable[[SessionWorld, Proposition, float], bool | None]]] = {
+    Predicate.RED: _red,
+    Predicate.HINDERS: _hinders,
+    Predicate.TOLD: _told,
+    Predicate.BEHIND: _behind,
+    Predicate.BLOCKED: _blocked,
+    Predicate.ARRIVED: lambda world, cause, time: _arrived(world, cause, time, Role.CO_WIZARD),
+    Predicate.GOAL: lambda world, cause, time: world.goal_named(time),
+}
