@@ -36,6 +36,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.recording import ActorKind, Session
 from dorothie_gym.recording.surroundings import ACTOR_DTYPE, Rows, SceneTable
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 
 CYCLIST_WIDTH: Final = 1.0
 """Width below which a vehicle counts as a cyclist: the detector does not tell them apart [m]."""
@@ -43,6 +44,7 @@ CYCLIST_WIDTH: Final = 1.0
 OBJECTS_FOLDER: Final = "objects"
 """Folder beside the weights of a detector, with what it found in sessions."""
 
+_SPACING: Final = 4  # records
 _AT_ONCE: Final = 8  # pictures
 _FORMAT: Final = 1
 _KEPT_DTYPE: Final = np.dtype([("record", np.int64), *((name, ACTOR_DTYPE[name]) for name in ACTOR_DTYPE.names or ())])
@@ -126,37 +128,39 @@ class DetectedBoxes:
         return load_segformer(self.segformer, device), load_detector(self.detector, device)
 
     def actors(self, session: Session, town: Town) -> SceneTable:
-        """Returns what is found in pictures at the session's records of actors.
+        """Returns what is found in pictures at the session's records of actors, as far as they are looked at.
 
-        Records before the first frame of the car and after the last one get no objects.
+        That is the last record before each event, which models read at their points, and every fourth of the others,
+        for the window before a point. Records outside the frames of the car get no objects.
 
         Raises:
             SessionError: the session has no frames of the car, or no surroundings.
             OSError: the folder beside the weights cannot be written.
         """
-        table = session.scene.actors
+        frames = session.scene.actors.frames
+        looks = looked_at(frames, np.array([event.frame for event in session.events], dtype=np.int64))
         name = hashlib.sha256(f"{self.digest} {session.digest} {town.name}".encode()).hexdigest()
         kept = self.detector / OBJECTS_FOLDER / f"{name}.npy"
         rows = _recall(kept)
         if rows is None:
-            found = list(self._found(session, town))
+            found = list(self._found(session, town, looks))
             rows = np.concatenate([np.empty(0, _KEPT_DTYPE), *found])
             kept.parent.mkdir(exist_ok=True)
             with replacing(kept, shared=True) as path, path.open("wb") as file:
                 np.save(file, rows, allow_pickle=False)
-        counts = np.bincount(rows["record"], minlength=len(table))
+        counts = np.bincount(rows["record"], minlength=len(frames))[looks]
         actors = np.empty(len(rows), ACTOR_DTYPE)
         for column in ACTOR_DTYPE.names or ():
             actors[column] = rows[column]
-        return SceneTable(table.frames, np.concatenate(([0], np.cumsum(counts))).astype(np.int64), actors)
+        return SceneTable(frames[looks], np.concatenate(([0], np.cumsum(counts))).astype(np.int64), actors)
 
-    def _found(self, session: Session, town: Town) -> Iterator[Rows]:
-        """Yields what is found at the records, of `_KEPT_DTYPE`."""
+    def _found(self, session: Session, town: Town, looks: NDArray[np.int64]) -> Iterator[Rows]:
+        """Yields what is found at some records, of `_KEPT_DTYPE`."""
         config = self._models[1].config
         camera = CameraConfig(width=config.width, height=config.height, outputs=(CameraOutput.RGB,))
         pictures = RecordedPictures(session, town, camera)
         frames = session.scene.actors.frames
-        inside = np.flatnonzero((frames >= pictures.first_frame) & (frames <= pictures.last_frame))
+        inside = looks[(frames[looks] >= pictures.first_frame) & (frames[looks] <= pictures.last_frame)]
         threads = torch.get_num_threads()
         torch.set_num_threads(1)  # equal weights find equal objects, whatever the number of processors
         try:
@@ -193,6 +197,17 @@ class DetectedBoxes:
             for column in ACTOR_DTYPE.names or ():
                 rows[column] = actors[column]
             yield rows
+
+
+def looked_at(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Returns the places (n,) of the records that are looked at, rising.
+
+    Args:
+        records: (k,) frames of the records, rising.
+        events: frames of the session's events.
+    """
+    last = np.searchsorted(records // FRAMES_PER_TENTH, events // FRAMES_PER_TENTH) - 1  # before the tenth of the event
+    return np.union1d(last[last >= 0], np.arange(0, len(records), _SPACING)).astype(np.int64)
 
 
 def actors_at(
