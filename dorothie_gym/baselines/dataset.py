@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Final, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Final, Literal, Self, TypeAlias
 
 import numpy as np
 import torch
@@ -15,8 +16,13 @@ from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, text_encoder
 from dorothie_gym.baselines.model_io import TASKS, Examples
 from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, Sight, VisibleBoxes, build, points
 from dorothie_gym.errors import CheckpointError, SessionError
-from dorothie_gym.recording import Fold
+from dorothie_gym.maps.catalogue import find_town
+from dorothie_gym.recording import Corpus, Fold
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.user_cache import cache_folder
+
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes
 
 _TABLES: Final = "texts"
 
@@ -58,14 +64,20 @@ class Dataset:
         encoder: encoder of its texts.
         cache: folder for vectors of texts; None for no cache.
         corpus: folder of the corpus, if it may be read again for objects of another source.
+        sight: source of the objects; None for the record.
     """
 
     def __init__(
-        self, columns: Columns, encoder: TextEncoder, cache: Path | None = None, corpus: Path | str | None = None
+        self,
+        columns: Columns,
+        encoder: TextEncoder,
+        cache: Path | None = None,
+        corpus: Path | str | None = None,
+        sight: Sight | None = None,
     ):
         self.columns = columns
         self.encoder = encoder
-        self._cache, self._corpus = cache, corpus
+        self._cache, self._corpus, self._sight = cache, corpus, sight
         self._others: dict[tuple[Objects, Path | None], Dataset] = {}
         self._examples: dict[tuple[str, BatchSpec], Examples] = {}
 
@@ -105,7 +117,7 @@ class Dataset:
             if self._corpus is None:
                 raise SessionError("the dataset has no corpus whose pictures could be drawn")
             columns = build(self._corpus, sight=sight, on_session=on_session)
-            self._others[objects, detector] = Dataset(columns, self.encoder, self._cache)
+            self._others[objects, detector] = Dataset(columns, self.encoder, self._cache, self._corpus, sight)
         return self._others[objects, detector]
 
     def about(self) -> dict[str, object]:
@@ -127,11 +139,53 @@ class Dataset:
             )
         return found
 
-    def examples(self, fold: str, spec: BatchSpec) -> Examples:
-        """Returns the points of a fold as tensors; computed once."""
+    def examples(self, fold: str, spec: BatchSpec, *, queries: bool = False) -> Examples:
+        """Returns the points of a fold as tensors; computed once.
+
+        Args:
+            fold: the fold.
+            spec: sizes.
+            queries: whether the inputs have the queries of the detector (N, q, d) at the last look, under "detector".
+        """
         if (fold, spec) not in self._examples:
             self._examples[fold, spec] = Examples.gather(self.columns, self.tables(fold), spec)
-        return self._examples[fold, spec]
+        found = self._examples[fold, spec]
+        return replace(found, inputs={**found.inputs, "detector": self._queries(fold)}) if queries else found
+
+    @property
+    def detector(self) -> DetectedBoxes:
+        """Detector that finds the objects; raises `ValueError` if they have another source."""
+        from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes  # here: it needs transformers
+
+        if not isinstance(self._sight, DetectedBoxes):
+            raise ValueError("the objects of this dataset are not those of a detector; there are no queries")
+        return self._sight
+
+    def _queries(self, fold: str) -> Tensor:
+        """Returns the queries (N, q, d) at the last look of all points of a fold, float16; 0 where there is none."""
+        columns, detector, tables = self.columns, self.detector, self.tables(fold)
+        session = np.concatenate([table.session for table in tables])
+        start, stop = (
+            np.concatenate([getattr(table, name) for table in tables]).astype(np.int64)
+            for name in ("frames_start", "frames_stop")
+        )
+        look = np.where(stop > start, columns.frames.look[np.maximum(stop - 1, 0)], -1)
+        found = torch.zeros(len(session), *detector.query_shape, dtype=torch.float16)
+        assert self._corpus is not None
+        entries = {entry.name: entry for entry in Corpus.load(self._corpus).entries}
+        for number in np.unique(session[look >= 0]).tolist():
+            entry = entries[columns.sessions.names[number]]
+            played = entry.load()
+            town = find_town(played.header.town, entry.maps)
+            if town is None or not len(played.scene.actors) or not len(played.trajectory):
+                continue
+            frames, values = detector.queries(played, town)
+            rows = np.flatnonzero((session == number) & (look >= 0))
+            tenths, wanted = frames // FRAMES_PER_TENTH, columns.looks.tenth[look[rows]]
+            place = np.searchsorted(tenths, wanted).clip(max=max(len(tenths) - 1, 0))
+            known = tenths[place] == wanted if len(tenths) else np.zeros(len(rows), dtype=np.bool_)
+            found[torch.from_numpy(rows[known])] = torch.from_numpy(values[place[known]])
+        return found
 
     @cached_property
     def vectors(self) -> Tensor:

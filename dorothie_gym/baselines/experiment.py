@@ -106,12 +106,12 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
     if job.row.kind == "shallow":
         return _run_shallow(job, material, about)
     model = make_model(job.row, job.size, material, job.seed, strict=job.strict)
-    spec = model.spec
+    examples = partial(material.examples, spec=model.spec, queries=job.row.queries)
     started = time.perf_counter(), time.process_time()
     trained = train(
         model,
-        material.examples(TRAIN, spec),
-        material.examples(VALIDATION, spec),
+        examples(TRAIN),
+        examples(VALIDATION),
         folder=job.folder,
         seed=job.seed,
         about=about,
@@ -125,11 +125,11 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
             facts = checked(done, _TrainingPage, kept)
         _describe(job, model, material, steps=facts["points"] * facts["epochs"], seconds=facts["seconds"])
         return done
-    predicted = predict(model, material.examples(TEST, spec))
+    predicted = predict(model, examples(TEST))
     rows = task_predictions(job, material.columns, material.tables(TEST), predicted)
     write_predictions(job.folder / PREDICTIONS_FILE, rows, about={**about, "config": model.config.to_json()})
     draw_loss_curves(trained.epochs, job.row.name, job.folder / CURVES_FILE)
-    validation = validation_scores(predict(model, material.examples(VALIDATION, spec)), material.tables(VALIDATION))
+    validation = validation_scores(predict(model, examples(VALIDATION)), material.tables(VALIDATION))
     result = {
         **about,
         **_training_facts(job, model, trained),

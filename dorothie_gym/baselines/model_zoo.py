@@ -49,6 +49,7 @@ class ModelEntry:
         change: function from TOTO's config to the model's; None for a policy, and if it cannot be run.
         missing: reason why it cannot be run, or empty.
         objects: source of the objects around the ego, see `Dataset.seeing`.
+        queries: whether the objects at the point are the queries of the detector, as in the paper.
         kind: "toto" (with ablations and rivals), "reader" (Junction Reader), a policy by "ppo" or "cloning", or
             "shallow" (scikit-learn, see `dorothie_gym.benchmark.shallow_models`).
     """
@@ -58,6 +59,7 @@ class ModelEntry:
     change: Change | None = None
     missing: str = ""
     objects: Objects = "record"
+    queries: bool = False
     kind: Kind = "toto"
 
 
@@ -119,14 +121,22 @@ Reader. TOTO without the current utterance stands beside the paper's row without
 
 _SEEN: Final[Mapping[str, Objects]] = MappingProxyType({"oracle boxes": "boxes", "detections": "detections"})
 
-CAMERA_ROWS: Final = tuple(
-    replace(row, name=f"{row.name} ({name})", command=f"{row.command}-{objects}", objects=objects)
-    for name, objects in _SEEN.items()
-    for row in ROWS
-    if row.command in ("toto", "detector", "et", "et-bert")
+CAMERA_ROWS: Final = (
+    *(
+        replace(row, name=f"{row.name} ({name})", command=f"{row.command}-{objects}", objects=objects)
+        for name, objects in _SEEN.items()
+        for row in ROWS
+        if row.command in ("toto", "detector", "et", "et-bert")
+    ),
+    *(
+        replace(row, name=f"{row.name} (queries)", command=f"{row.command}-queries", objects="detections", queries=True)
+        for row in ROWS
+        if row.command in ("toto", "detector")
+    ),
 )
-"""Models whose objects are those that the camera on the car shows, or that a trained detector finds in its pictures.
-They are trained where they are named: pictures of a corpus take minutes."""
+"""Models whose objects are those that the camera on the car shows, or that a trained detector finds in its pictures; or
+all queries of the detector at the point, as in the paper. They are trained where they are named: pictures of a corpus
+take minutes."""
 
 
 class EpisodicTransformer(TOTO):
@@ -154,7 +164,10 @@ def make_model(row: ModelEntry, size: str, material: Dataset, seed: int, *, stri
     if row.change is None:
         raise ValueError(f"{row.name} is no torch model: {row.missing or f'its kind is {row.kind}'}")
     torch.manual_seed(seed)
-    return build_model(row, replace(row.change(SIZES[size]()), strict=strict), material)
+    config = replace(row.change(SIZES[size]()), strict=strict)
+    if row.queries:
+        config = replace(config, detector=material.detector.query_shape)
+    return build_model(row, config, material)
 
 
 def build_model(row: ModelEntry, config: TOTOConfig, material: Dataset, spread: float | None = None) -> TOTO:

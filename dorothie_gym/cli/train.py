@@ -35,7 +35,7 @@ RUNS = Path("runs")
 """Default folder of trainings; it contains one folder per corpus."""
 
 _DETECTOR = Path("detr", "small", "seed-0")
-_NOT_OF_DETECTIONS = "--detector is for models of detections only, such as toto-detections"
+_NOT_OF_DETECTIONS = "--detector is for models of detections and queries only, such as toto-detections"
 
 CorpusOption = Annotated[
     Path | None,
@@ -61,7 +61,7 @@ Detector = Annotated[
     Path | None,
     typer.Option(
         "--detector", metavar="DIR",
-        help="Models of detections: folder of the trained detector; default OUT/detr/small/seed-0.",
+        help="Models of detections and queries: folder of the trained detector; default OUT/detr/small/seed-0.",
     ),
 ]  # fmt: skip
 Encoder = Annotated[

@@ -20,13 +20,21 @@ def test_a_row_is_found_by_its_command_and_by_its_name():
     assert find_row("toto-no-map-knowledge") is find_row("TOTO (- Map Knowledge)")
 
 
-@pytest.mark.parametrize(("objects", "name"), [("boxes", "oracle boxes"), ("detections", "detections")])
-def test_rows_that_see_by_the_camera_differ_in_their_objects_only(objects, name):
-    rows = {row.command.removesuffix(f"-{objects}"): row for row in CAMERA_ROWS if row.objects == objects}
-    assert set(rows) == {"toto", "detector", "et", "et-bert"}
+@pytest.mark.parametrize(
+    ("suffix", "name", "objects"),
+    [
+        ("boxes", "oracle boxes", "boxes"),
+        ("detections", "detections", "detections"),
+        ("queries", "queries", "detections"),
+    ],
+)
+def test_rows_that_see_by_the_camera_differ_in_their_objects_only(suffix, name, objects):
+    rows = {row.command.removesuffix(f"-{suffix}"): row for row in CAMERA_ROWS if row.command.endswith(f"-{suffix}")}
+    assert set(rows) == ({"toto", "detector"} if suffix == "queries" else {"toto", "detector", "et", "et-bert"})
     for command, row in rows.items():
         base = find_row(command)
-        assert base.objects == "record"
+        assert (base.objects, row.objects) == ("record", objects)
+        assert (base.queries, row.queries) == (False, suffix == "queries")
         assert row.change is base.change and row.name == f"{base.name} ({name})"
 
 

@@ -48,6 +48,8 @@ class BenchmarkModel:
         self.weights = folder / description.weights
         self.row = find_row(description.row)
         self.config = TOTOConfig.from_json(description.config)
+        if self.config.detector is not None:
+            raise ValueError(f"{folder}: reads the queries of a detector, which are known of recorded sessions only")
         with raising(ModelFileError):
             if self.weights.exists():
                 check_file(self.weights, MAX_WEIGHTS)

@@ -299,7 +299,7 @@ class TOTO(Model):
         """Returns a token for each object around the car, or one for all queries of a detector."""
         time = inputs["time"][:, None]
         if self.config.detector is not None:
-            token = self.queries(inputs["detector"].flatten(1))[:, None]  # (B, 1, d)
+            token = self.queries(inputs["detector"].flatten(1).to(self.queries.weight.dtype))[:, None]  # (B, 1, d)
             return token, torch.ones_like(time, dtype=torch.bool), time
         mask = inputs["objects_mask"]
         return self._object_tokens(inputs["kind"], inputs["values"]), mask, time.expand(mask.shape)

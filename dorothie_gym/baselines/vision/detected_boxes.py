@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -127,6 +127,12 @@ class DetectedBoxes:
         device = torch.device("cpu")
         return load_segformer(self.segformer, device), load_detector(self.detector, device)
 
+    @property
+    def query_shape(self) -> tuple[int, int]:
+        """Number of queries of the detector, and numbers of each."""
+        config = self._models[1].config
+        return config.queries, config.size
+
     def actors(self, session: Session, town: Town) -> SceneTable:
         """Returns what is found in pictures at the session's records of actors, as far as they are looked at.
 
@@ -138,42 +144,65 @@ class DetectedBoxes:
             OSError: the folder beside the weights cannot be written.
         """
         frames = session.scene.actors.frames
-        looks = looked_at(frames, np.array([event.frame for event in session.events], dtype=np.int64))
-        name = hashlib.sha256(f"{self.digest} {session.digest} {town.name}".encode()).hexdigest()
-        kept = self.detector / OBJECTS_FOLDER / f"{name}.npy"
-        rows = _recall(kept)
-        if rows is None:
-            found = list(self._found(session, town, looks))
-            rows = np.concatenate([np.empty(0, _KEPT_DTYPE), *found])
-            kept.parent.mkdir(exist_ok=True)
-            with replacing(kept, shared=True) as path, path.open("wb") as file:
-                np.save(file, rows, allow_pickle=False)
+        looks = looked_at(frames, _event_frames(session))
+        rows = self._recall(session, town)[0]
         counts = np.bincount(rows["record"], minlength=len(frames))[looks]
         actors = np.empty(len(rows), ACTOR_DTYPE)
         for column in ACTOR_DTYPE.names or ():
             actors[column] = rows[column]
         return SceneTable(frames[looks], np.concatenate(([0], np.cumsum(counts))).astype(np.int64), actors)
 
-    def _found(self, session: Session, town: Town, looks: NDArray[np.int64]) -> Iterator[Rows]:
-        """Yields what is found at some records, of `_KEPT_DTYPE`."""
+    def queries(self, session: Session, town: Town) -> tuple[NDArray[np.int64], NDArray[np.float16]]:
+        """Returns the queries (m, q, d) at the last record before each event, and the frames of these records (m,).
+
+        They are 0 outside the frames of the car. Errors as of `actors`.
+        """
+        frames = session.scene.actors.frames
+        return frames[before_events(frames, _event_frames(session))], self._recall(session, town)[1]
+
+    def _recall(self, session: Session, town: Town) -> tuple[Rows, NDArray[np.float16]]:
+        """Returns what was found in a session, of `_KEPT_DTYPE`, and its queries; found now where none are kept."""
+        name = hashlib.sha256(f"{self.digest} {session.digest} {town.name}".encode()).hexdigest()
+        paths = [self.detector / OBJECTS_FOLDER / f"{name}-{part}.npy" for part in ("objects", "queries")]
+        rows, queries = (_read(path) for path in paths)
+        records = before_events(session.scene.actors.frames, _event_frames(session))
+        shape = (len(records), *self.query_shape)
+        if rows is None or queries is None or rows.dtype != _KEPT_DTYPE or queries.shape != shape:
+            rows, queries = self._look(session, town, records)
+            paths[0].parent.mkdir(exist_ok=True)
+            for target, values in zip(paths, (rows, queries), strict=True):
+                with replacing(target, shared=True) as path, path.open("wb") as file:
+                    np.save(file, values, allow_pickle=False)
+        return rows, queries
+
+    def _look(
+        self, session: Session, town: Town, queried: NDArray[np.int64]
+    ) -> tuple[NDArray[np.void], NDArray[np.float16]]:
+        """Returns what is found in a session, and the queries at some of its records, rising."""
         config = self._models[1].config
         camera = CameraConfig(width=config.width, height=config.height, outputs=(CameraOutput.RGB,))
         pictures = RecordedPictures(session, town, camera)
         frames = session.scene.actors.frames
+        looks = looked_at(frames, _event_frames(session))
         inside = looks[(frames[looks] >= pictures.first_frame) & (frames[looks] <= pictures.last_frame)]
+        found, queries = [np.empty(0, _KEPT_DTYPE)], np.zeros((len(queried), *self.query_shape), np.float16)
         threads = torch.get_num_threads()
         torch.set_num_threads(1)  # equal weights find equal objects, whatever the number of processors
         try:
             for records in np.array_split(inside, max(math.ceil(len(inside) / _AT_ONCE), 1)):
                 if len(records):
-                    yield from self._found_at(records.tolist(), pictures, frames)
+                    rows, vectors = self._found_at(records.tolist(), pictures, frames)
+                    found += rows
+                    wanted = np.isin(records, queried)
+                    queries[np.searchsorted(queried, records[wanted])] = vectors[wanted]
         finally:
             torch.set_num_threads(threads)
+        return np.concatenate(found), queries
 
     def _found_at(
         self, records: Sequence[int], pictures: RecordedPictures, frames: NDArray[np.int64]
-    ) -> Iterator[Rows]:
-        """Yields what is found in the pictures of some records."""
+    ) -> tuple[list[Rows], NDArray[np.float16]]:
+        """Returns what is found in the pictures of some records, each of `_KEPT_DTYPE`, and the queries (n, q, d)."""
         reader, detector = self._models
         drawn, views = [], []
         for record in records:
@@ -188,6 +217,7 @@ class DetectedBoxes:
             found = detector(
                 normalised(torch.from_numpy(rgb)), torch.from_numpy(depth), torch.from_numpy(semantic).long()
             )
+        kept = []
         spaces = spaces_of(found.solids.numpy(), focals_of(detector.config))
         for k, (record, view) in enumerate(zip(records, views, strict=True)):
             heading = pictures.pose(int(frames[record])).heading
@@ -196,18 +226,28 @@ class DetectedBoxes:
             rows["record"] = record
             for column in ACTOR_DTYPE.names or ():
                 rows[column] = actors[column]
-            yield rows
+            kept.append(rows)
+        return kept, found.queries.numpy().astype(np.float16)
 
 
-def looked_at(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns the places (n,) of the records that are looked at, rising.
+def before_events(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Returns the places (n,) of the last records before the tenths of a second of events, rising.
 
     Args:
         records: (k,) frames of the records, rising.
         events: frames of the session's events.
     """
-    last = np.searchsorted(records // FRAMES_PER_TENTH, events // FRAMES_PER_TENTH) - 1  # before the tenth of the event
-    return np.union1d(last[last >= 0], np.arange(0, len(records), _SPACING)).astype(np.int64)
+    last = np.searchsorted(records // FRAMES_PER_TENTH, events // FRAMES_PER_TENTH) - 1
+    return np.unique(last[last >= 0])
+
+
+def looked_at(records: NDArray[np.int64], events: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Returns the places (n,) of the records that are looked at, rising; arguments as of `before_events`."""
+    return np.union1d(before_events(records, events), np.arange(0, len(records), _SPACING)).astype(np.int64)
+
+
+def _event_frames(session: Session) -> NDArray[np.int64]:
+    return np.array([event.frame for event in session.events], dtype=np.int64)
 
 
 def actors_at(
@@ -238,10 +278,9 @@ def actors_at(
     return rows
 
 
-def _recall(path: Path) -> Rows | None:
-    """Returns the rows in a file; None if it is missing or damaged."""
+def _read(path: Path) -> Any:
+    """Returns the array in a file; None if it is missing or damaged."""
     try:
-        rows = np.load(path, allow_pickle=False)
+        return np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError):
         return None
-    return rows if rows.dtype == _KEPT_DTYPE and rows.ndim == 1 else None

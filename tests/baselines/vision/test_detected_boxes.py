@@ -13,6 +13,8 @@ import torch
 pytest.importorskip("transformers")
 
 from dorothie_gym.baselines import checkpoints
+from dorothie_gym.baselines.dataset import Dataset
+from dorothie_gym.baselines.model_zoo import find_row, make_model
 from dorothie_gym.baselines.trainer import BEST_FILE
 from dorothie_gym.baselines.vision import detected_boxes
 from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes, actors_at, looked_at
@@ -159,6 +161,42 @@ def test_damaged_objects_are_found_again(session: Session, tmp_path: Path) -> No
     assert town is not None
     sight = DetectedBoxes(trained(tmp_path))
     first = sight.actors(session, town)
-    (kept,) = (sight.detector / detected_boxes.OBJECTS_FOLDER).iterdir()
-    kept.write_bytes(b"nothing")
+    kept = sorted((sight.detector / detected_boxes.OBJECTS_FOLDER).iterdir())
+    assert len(kept) == 2
+    for path in kept:
+        path.write_bytes(b"nothing")
     assert sight.actors(replace(session), town).equals(first)
+
+
+def test_queries_are_those_before_events_and_other_pictures_have_others(session: Session, tmp_path: Path) -> None:
+    town = find_town("brookside", None)
+    assert town is not None
+    frames, values = DetectedBoxes(trained(tmp_path)).queries(session, town)
+    assert values.shape == (len(frames), TINY.queries, TINY.size) and values.dtype == np.float16
+    first = session.scene.actors.frames
+    assert all(
+        frames[frames < event.frame // 3 * 3].max() == first[first < event.frame // 3 * 3].max()
+        for event in session.events
+        if event.frame > first[0] + 2
+    )
+    assert len({vectors.tobytes() for vectors in values}) == len(frames) > 1
+
+
+def test_model_reads_the_queries_at_the_last_look(session: Session, tmp_path: Path) -> None:
+    for fold in ("train", "val/seen"):
+        session.save(tmp_path / "corpus" / fold / "played")
+    detector = trained(tmp_path / "runs")
+    material = Dataset.load(tmp_path / "corpus", "hashing").seeing("detections", detector=detector)
+    row = find_row("toto-queries")
+    model = make_model(row, "small", material, 0).eval()
+    examples = material.examples("train", model.spec, queries=True)
+    inputs, _ = examples.take(torch.arange(len(examples)))
+    assert inputs["detector"].shape == (len(examples), TINY.queries, TINY.size)
+    seen = inputs["detector"].flatten(1).abs().sum(1) > 0
+    assert seen.any() and torch.equal(seen, inputs["window_mask"].any(1))
+    with torch.inference_mode():
+        before = model(inputs).move
+        after = model({**inputs, "detector": inputs["detector"] + 1.0}).move
+    assert before.isfinite().all() and not torch.equal(before[seen], after[seen])
+    with pytest.raises(ValueError, match="there are no queries"):
+        make_model(row, "small", Dataset.load(tmp_path / "corpus", "hashing"), 0)
