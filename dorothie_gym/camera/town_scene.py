@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.atlas import town_atlas, with_street_names
+from dorothie_gym.camera.atlas import STREET_NAMES, town_atlas, with_street_names
 from dorothie_gym.camera.cells import CellTable, sorted_by_cell
 from dorothie_gym.camera.first_person_camera import CameraScene
 from dorothie_gym.camera.ground.town_ground import Ground, build_ground
@@ -86,7 +86,7 @@ class SessionScene:
 
     Attributes:
         town: what stands in every session.
-        street_names: on the blades, by the indices of the streets.
+        street_names: on the blades, by the indices of the streets; blades without a name are empty.
         landmarks: of the session.
     """
 
@@ -98,9 +98,11 @@ class SessionScene:
     def camera_scene(self) -> CameraScene:
         """What a camera needs besides the overlay."""
         town = self.town
+        blades = int(town.mesh.textures.max(initial=0)) + 1 - STREET_NAMES
+        names = [*self.street_names, *[""] * (blades - len(self.street_names))]
         return CameraScene(
             town=town.mesh, cells=town.cells, ground=town.ground.arrays, lamps=town.lamps, bank=model_bank(),
-            atlas=with_street_names(town_atlas(), self.street_names),
+            atlas=with_street_names(town_atlas(), names),
         )  # fmt: skip
 
     @cached_property

@@ -108,6 +108,25 @@ def test_lamp_pixels_show_the_state_of_the_traffic_lights(
     assert len(seen) == 3
 
 
+def test_blades_without_a_name_are_empty(engine: SessionEngine, town_scene: TownScene) -> None:
+    """Records of other corpora have no names."""
+    whole, world = scene_of(engine, town_scene), engine.session.world
+    mesh = town_scene.mesh
+    row = int(np.argmax(mesh.textures))  # the blade of the last street that has one
+    x, y, z = mesh.corners[row].mean(axis=0).tolist()
+    way = -mesh.normals[row]
+    pose = CameraPose(x - 0.6 * float(way[0]), y - 0.6 * float(way[1]), z, math.atan2(way[1], way[0]))
+    pictures = []
+    for names in (whole.street_names, whole.street_names[:2], ()):
+        camera = SessionCamera(SessionScene(town_scene, names), SMALL)
+        picture = camera.render_from(pose, world.actors.arrays, world.weather, time=0.0).rgb
+        assert picture is not None
+        pictures.append(picture.astype(int))
+    named, few, none = pictures
+    np.testing.assert_array_equal(few, none)
+    assert np.abs(named - none).max() > 60  # letters
+
+
 def test_bodies_have_their_keys_as_instances(engine: SessionEngine, town_scene: TownScene) -> None:
     world = engine.session.world
     camera = SessionCamera(scene_of(engine, town_scene), SMALL)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 import shapely
@@ -22,6 +22,7 @@ from dorothie_gym.camera.ground.surface import (
     ROOF,
     Edges,
     GroundTriangles,
+    TunnelFloors,
     add_faces,
     add_sheet,
     find_edges,
@@ -38,6 +39,7 @@ COVER = 3.2
 _BEHIND = 1.0  # [m] of covered ground behind the pavements in a tunnel
 _FARTHEST_PAVEMENT = 14.0  # [m] from the edge of a lane in a tunnel to the outer edge of its pavement
 _KERB = 0.05  # [m] of road beyond the lanes there
+_TUNNELS = -1  # level
 _CELL = 8.0  # [m]
 _OVERLAP = 0.05  # [m] by which the floor of a tunnel continues in the open
 _UNDER = 0.3  # [m] of the walls of tunnels below their floors
@@ -99,15 +101,10 @@ def add_lids(builder: MeshBuilder, triangles: GroundTriangles) -> None:
     builder.triangles(covered - [0.0, 0.0, _LID], colour=_SHADED, kind=ObjectClass.WALL)
 
 
-class TunnelFloors(NamedTuple):
-    """Areas of the floors of tunnels, and of the pavements among them."""
-
-    area: BaseGeometry
-    pavements: BaseGeometry
-
-
-def tunnel_floors(town: Town, sheets: Sequence[Sheet], cover: BaseGeometry) -> TunnelFloors:
-    """Returns the floors of tunnels below covered ground, up to slightly beyond their mouths."""
+def tunnel_floors(town: Town, sheets: Sequence[Sheet], cover: BaseGeometry, field: HeightField) -> TunnelFloors | None:
+    """Returns the floors of tunnels below covered ground, up to slightly beyond their mouths; None without tunnels."""
+    if not any(sheet.level < 0 for sheet in sheets):
+        return None
     flat, lanes = [], []
     for sheet in sheets:
         if sheet.level < 0:
@@ -119,7 +116,8 @@ def tunnel_floors(town: Town, sheets: Sequence[Sheet], cover: BaseGeometry) -> T
     within = shapely.buffer(cover, _OVERLAP, join_style="mitre")
     area = tidy(only_areas(shapely.intersection(shapely.union_all([closed, *polygons_of(flat)]), within)))
     road = shapely.union_all([footprint(town, lanes, _KERB), *polygons_of(flat)])
-    return TunnelFloors(area, tidy(only_areas(shapely.intersection(area, shapely.difference(pavements, road)))))
+    behind = tidy(only_areas(shapely.intersection(area, shapely.difference(pavements, road))))
+    return TunnelFloors(area, behind, partial(field.road, level=_TUNNELS))
 
 
 def add_tunnel(
@@ -141,10 +139,12 @@ def add_tunnel(
     stepped = GroundTriangles(floor.corners.copy(), floor.areas)
     stepped.corners[floor.areas == Area.RAISED, :, 2] += KERB_HEIGHT
     add_sheet(builder, stepped.corners, number)
-    add_faces(builder, find_edges(stepped), shapely.Polygon())
+    add_faces(builder, find_edges(stepped))
     ceiling = floor.corners.copy()
     ceiling[..., 2] += _headroom(field, ceiling)
     builder.triangles(ceiling[:, ::-1], colour=_SHADED, kind=ObjectClass.WALL)
+    ends = find_edges(stepped).alone
+    _add_quads(builder, ends - [0.0, 0.0, _UNDER], ends, _CONCRETE, ObjectClass.WALL)  # at the mouths
     sides = find_edges(floor).alone
     inside = shapely.buffer(cover, -2.0 * _OVERLAP)
     shapely.prepare(inside)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +30,8 @@ BELOW_DECK = 0.3
 _SAME = 1e-4  # [m]
 _FOUNDATION = 6.0  # [m] of the walls over mouths of tunnels below the ground before them
 _THICKNESS = 0.02  # [m] of these walls
+_LINTEL = 0.06  # [m] of these walls below the ceiling
+_THRESHOLD = 1.0  # [m] of the end of the ground before a mouth, as seen from inside
 _KERB_FACE = 0.4  # [m]; higher faces are walls
 _KERB_COLOUR = (160, 158, 152)
 _WALL_COLOUR = (150, 148, 142)
@@ -129,29 +131,49 @@ def find_edges(triangles: GroundTriangles) -> Edges:
     )
 
 
-def add_faces(builder: MeshBuilder, edges: Edges, tunnels: BaseGeometry) -> None:
+class TunnelFloors(NamedTuple):
+    """Floors of tunnels.
+
+    Attributes:
+        area: of all of them.
+        pavements: area of those that are a kerb higher.
+        heights: of the roads (n,) at positions (n, 2) [m].
+    """
+
+    area: BaseGeometry
+    pavements: BaseGeometry
+    heights: Callable[[Array], Array]
+
+
+def add_faces(builder: MeshBuilder, edges: Edges, tunnels: TunnelFloors | None = None) -> None:
     """Adds kerbs and walls: the vertical faces between triangles of different heights.
 
     Args:
         builder: receives the triangles.
         edges: of the ground.
-        tunnels: area of the floors of tunnels, whose mouths are left open.
+        tunnels: whose mouths are left open, if there are any.
     """
-    shapely.prepare(tunnels)
+    if tunnels is not None:
+        shapely.prepare((tunnels.area, tunnels.pavements))
     apart = np.abs(edges.heights[:, 0] - edges.heights[:, 1]).max(axis=1) > _SAME
     places = np.concatenate((edges.ends * GRID, np.zeros((len(edges.ends), 2, 1))), axis=2)
     for rows, above in ((apart & _higher(edges, 0), 0), (apart & _higher(edges, 1), 1)):
         top, foot = places[rows].copy(), places[rows].copy()
         top[..., 2], foot[..., 2] = edges.heights[rows, above], edges.heights[rows, 1 - above]
         kinds = edges.areas[rows]
-        opening = (kinds[:, 1 - above] & Area.COVERED == 0) & (kinds[:, above] & Area.COVERED != 0)
-        opening &= shapely.contains_xy(tunnels, *top[..., :2].mean(axis=1).T)
-        kerb = np.where(kinds[:, 1 - above] == Area.FLAT, 0.0, KERB_HEIGHT)[opening, None]
-        foot[opening, :, 2] = np.maximum(
-            foot[opening, :, 2], np.minimum(foot[opening, :, 2] - kerb + PORTAL_HEIGHT, top[opening, :, 2] - ROOF)
-        )
         # seen from the lower side: from the left of the way if the first triangle is the higher one
         start, end = (1, 0) if above == 0 else (0, 1)
+        opening = (kinds[:, 1 - above] & Area.COVERED == 0) & (kinds[:, above] & Area.COVERED != 0)
+        if tunnels is not None and opening.any():
+            level, middle = kinds[:, 1 - above] == Area.FLAT, top[..., :2].mean(axis=1).T
+            opening &= np.where(
+                level, shapely.contains_xy(tunnels.area, *middle), shapely.contains_xy(tunnels.pavements, *middle)
+            )
+            _add_thresholds(builder, foot[opening][:, [end, start]])
+            ceiling = tunnels.heights(foot[opening, :, :2].reshape(-1, 2)).reshape(-1, 2) + PORTAL_HEIGHT
+            foot[opening, :, 2] = np.maximum(
+                foot[opening, :, 2], np.minimum(ceiling, top[opening, :, 2] - ROOF) - _LINTEL
+            )
         corners = np.stack((foot[:, start], top[:, start], top[:, end], foot[:, end]), axis=1)
         high = (top[..., 2] - foot[..., 2]).max(axis=1) > _KERB_FACE
         mouth = high & (kinds[:, above] & Area.COVERED != 0) & (kinds[:, 1 - above] & Area.COVERED == 0)
@@ -170,6 +192,13 @@ def add_faces(builder: MeshBuilder, edges: Edges, tunnels: BaseGeometry) -> None
             quads = corners[chosen]
             builder.triangles(quads[:, [0, 1, 2]], colour=colour, kind=kind)
             builder.triangles(quads[:, [0, 2, 3]], colour=colour, kind=kind)
+
+
+def _add_thresholds(builder: MeshBuilder, lines: Array) -> None:
+    """Adds the ends of the ground before mouths of tunnels (n, 2, 3) [m], whose floors may be lower."""
+    under = lines - [0.0, 0.0, _THRESHOLD]
+    builder.triangles(np.stack((under[:, 0], lines[:, 0], lines[:, 1]), 1), colour=_KERB_COLOUR, kind=ObjectClass.WALL)
+    builder.triangles(np.stack((under[:, 0], lines[:, 1], under[:, 1]), 1), colour=_KERB_COLOUR, kind=ObjectClass.WALL)
 
 
 def _higher(edges: Edges, which: int) -> NDArray[np.bool_]:

@@ -90,14 +90,14 @@ def build_ground(town: Town) -> Ground:
     edges = find_edges(triangles)
     builder = MeshBuilder()
     add_sheet(builder, triangles.corners, GROUND_SHEET)
-    tunnels = tunnel_floors(town, sheets, cover)
-    add_faces(builder, edges, tunnels.area)
+    tunnels = tunnel_floors(town, sheets, cover, field)
+    add_faces(builder, edges, tunnels)
     add_portals(builder, edges)
     add_lids(builder, triangles)
     for number, sheet in enumerate(sheets):
         if sheet.level > 0:
             add_bridge(builder, sheet, number, field, town, arrays)
-        elif sheet.level < 0:
+        elif tunnels is not None and sheet.level < 0:
             add_tunnel(builder, sheet.level, number, field, tunnels, cover)
     return Ground(builder.build(), arrays)
 
