@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Protocol
@@ -21,7 +21,7 @@ from dorothie_gym.sim.ego.motion_control import motion_of
 from dorothie_gym.spaces import LandmarkColumn, Motion, Observation, SubgoalColumn, plain_text
 from dorothie_gym.spaces.actions import NO_MOVE
 from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH
-from dorothie_gym.spaces.observations import MAX_UTTERANCE
+from dorothie_gym.spaces.observations import MAX_UTTERANCE, MESSAGE_KINDS
 from dorothie_gym.tasks import Landmark, TaskState
 
 Table = NDArray[np.float64]
@@ -130,10 +130,20 @@ class ObservationBuilder(Lookups):
         story = plain_text(scenario.storyboard.story, STORY_LENGTH)
         self._views.set_text(Role.PARTICIPANT, "story", story)
         self._views.set_text(Role.AD_WIZARD, "story", story)
+        subgoals = scenario.storyboard.subgoals[: len(ad_wizard["subgoals"])]
+        self._write_lines(Role.AD_WIZARD, "changes", (subgoal.change for subgoal in subgoals))
+        for kind in MESSAGE_KINDS:
+            messages = (getattr(subgoal.messages, kind) for subgoal in subgoals)
+            self._write_lines(Role.AD_WIZARD, f"{kind}_messages", (message and str(message) for message in messages))
+
+    def _write_lines(self, role: Role, field: str, lines: Iterable[str | None]) -> None:
+        """Writes a text with a line for each subgoal, empty for None."""
+        self._views.set_text(role, field, plain_text("\n".join(line or "" for line in lines), STORY_LENGTH))
 
     def _write_tasks(self) -> None:
-        tasks = plain_text("\n".join(self._task.description(i) for i in self._task.live), STORY_LENGTH)
-        self._views.set_text(Role.PARTICIPANT, "tasks", tasks)
+        rows = range(min(len(self._task.storyboard.subgoals), len(self._tables[Role.AD_WIZARD]["subgoals"])))
+        for role, numbers in ((Role.PARTICIPANT, self._task.live), (Role.AD_WIZARD, rows)):
+            self._write_lines(role, "tasks", map(self._task.description, numbers))
         for role, permissions in ((Role.PARTICIPANT, False), (Role.AD_WIZARD, True)):
             write_subgoals(self._tables[role]["subgoals"], self._task, permissions=permissions)
 

@@ -75,8 +75,10 @@ class RoleView:
         if message := seen.get("message", ""):
             self.add(SpokenLine(time=time, speaker=Role.AD_WIZARD, text=message))
         if "tasks" in seen:
-            live = np.flatnonzero(seen["subgoals"][:, SubgoalColumn.LIVE]).tolist()
-            self._descriptions.update(zip(live, seen["tasks"].split("\n"), strict=False))
+            table = seen["subgoals"]
+            live = np.flatnonzero(table[:, SubgoalColumn.LIVE]).tolist()
+            numbers = live if self.role is Role.PARTICIPANT else range(len(table))  # the Ad-Wizard reads all of them
+            self._descriptions.update(zip(numbers, seen["tasks"].split("\n"), strict=False))
 
     def add(self, line: SpokenLine) -> None:
         """Adds an utterance that the role has heard or spoken."""

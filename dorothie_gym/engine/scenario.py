@@ -16,7 +16,8 @@ from dorothie_gym.errors import did_you_mean, short_repr
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import StreetName
 from dorothie_gym.recording import SessionHeader
-from dorothie_gym.tasks import Storyboard, StoryboardTemplate, bind, load_template, template_names
+from dorothie_gym.recording.header import SubgoalRow
+from dorothie_gym.tasks import Storyboard, StoryboardTemplate, Subgoal, bind, load_template, template_names
 
 STREET_NAMES = tuple(
     name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY)
@@ -150,18 +151,22 @@ def header_of(scenario: Scenario, town: str, config: EnvConfig) -> SessionHeader
             }
             for landmark in storyboard.landmarks
         ],
-        subgoals=[
-            {
-                "description": subgoal.description,
-                "landmark": subgoal.landmark,
-                "after": subgoal.after,
-                "trigger": subgoal.trigger,
-                "delete": subgoal.delete,
-                "change": subgoal.change,
-            }
-            for subgoal in storyboard.subgoals
-        ],
+        subgoals=[_row_of(subgoal) for subgoal in storyboard.subgoals],
         story=storyboard.story,
         departure=scenario.departure,
         config=config.record(),
     )
+
+
+def _row_of(subgoal: Subgoal) -> SubgoalRow:
+    row = SubgoalRow(
+        description=subgoal.description,
+        landmark=subgoal.landmark,
+        after=subgoal.after,
+        trigger=subgoal.trigger,
+        delete=subgoal.delete,
+        change=subgoal.change,
+    )
+    if subgoal.reason is not None:
+        row["extra"] = {"reason": subgoal.reason}
+    return row

@@ -185,8 +185,8 @@ class ScriptedAdWizard(Policy[AdWizardState]):
 
     Of a storyboard that is not shipped, it plays every change of the task that the storyboard marks.
 
-    Every change of a task comes with a message that gives the participant a reason. Bad weather clears up, and
-    roadblocks are removed after a while.
+    Every change of a task comes with the message that the storyboard gives, or with one made of its texts. Bad weather
+    clears up, and roadblocks are removed after a while.
 
     Attributes:
         plays_tasks: whether it changes tasks.
@@ -241,7 +241,7 @@ class ScriptedAdWizard(Policy[AdWizardState]):
         now = scalar(observation, "time")
         action, state = _restore(state, observation, now)
         if action is None and self.plays_tasks and plays_every_exception(observation["story"]):
-            action = story_exception(observation, state.town, now, _story_is_due(state, now), rng)
+            action = story_exception(observation, state.town, now, _story_is_due(state, now))
             state = state if action is None else replace(state, last_at=now)
         if action is None:
             action, state = _play(state, observation, now, rng)
@@ -374,7 +374,7 @@ def _task(state: AdWizardState, observation: ObservationMapping, now: float, rng
     if not options:
         return None, state
     kind, subgoal = options[int(rng.integers(len(options)))]
-    message = task_message(kind, marks[subgoal.landmark].name, rng)
+    message = task_message(observation, kind, subgoal.index)
     return AdWizardAction(exception=kind, item=subgoal.index, message=message), state
 
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 
-import numpy as np
-
-from dorothie_gym.dialogue import load_lexicon
 from dorothie_gym.maps import Town
-from dorothie_gym.ontology import ExceptionKind, LandmarkName
+from dorothie_gym.ontology import ExceptionKind
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal, read_landmarks, read_subgoals
 from dorothie_gym.spaces import AdWizardAction, ObservationMapping
+from dorothie_gym.spaces.limits import MESSAGE_LENGTH
 from dorothie_gym.tasks import is_shipped_story
+from dorothie_gym.tasks.storyboard import BECAUSE
 
 PRESSING_DISTANCE = 150.0
 """Distance of the car from the place of a subgoal within which its exceptions are not postponed [m]."""
@@ -28,9 +28,7 @@ def plays_every_exception(story: str) -> bool:
     return bool(story) and not is_shipped_story(story)
 
 
-def story_exception(
-    observation: ObservationMapping, town: Town, now: float, due: bool, rng: np.random.Generator
-) -> AdWizardAction | None:
+def story_exception(observation: ObservationMapping, town: Town, now: float, due: bool) -> AdWizardAction | None:
     """Returns an exception that the storyboard marks and that is possible now; None for none.
 
     A subgoal is changed before it is deleted. An exception that will soon be impossible is not postponed: the car is
@@ -41,7 +39,6 @@ def story_exception(
         town: the map.
         now: time [s].
         due: whether an exception that can be postponed is due.
-        rng: random generator of the decision.
     """
     subgoals = read_subgoals(observation)
     marks = {mark.row: mark for mark in read_landmarks(observation, town)}
@@ -57,7 +54,7 @@ def story_exception(
     if not options or now < EARLIEST:
         return None
     kind, subgoal = options[0]
-    message = task_message(kind, marks[subgoal.landmark].name, rng)
+    message = task_message(observation, kind, subgoal.index)
     return AdWizardAction(exception=kind, item=subgoal.index, message=message)
 
 
@@ -75,37 +72,39 @@ def _is_near(observation: ObservationMapping, marks: Mapping[int, SeenLandmark],
     return mark is not None and math.hypot(mark.x - x, mark.y - y) < PRESSING_DISTANCE
 
 
-_SENDERS = ("Your friend texts", "A message comes in", "Your phone rings", "Your sister writes", "A call from home")
-
-_BODIES: Mapping[ExceptionKind, tuple[str, ...]] = {
-    ExceptionKind.TASK_TRIGGER: (
-        "could you stop at {landmark} as well?",
-        "there is one more thing to do at {landmark}.",
-        "please don't forget to come by {landmark} too.",
-        "can you fit in {landmark} on the way?",
-    ),
-    ExceptionKind.TASK_DELETE: (
-        "no need to go to {landmark} any more.",
-        "somebody else has taken care of {landmark}.",
-        "you can leave out {landmark} today.",
-    ),
-    ExceptionKind.TASK_CHANGE: (
-        "{landmark} does not work out, have a look at the new plan.",
-        "don't go to {landmark}, there is another place for that.",
-        "there is a change: not {landmark}, see your list.",
-    ),
+_OPENINGS: Mapping[ExceptionKind, str] = {
+    ExceptionKind.TASK_TRIGGER: "New on your list",
+    ExceptionKind.TASK_DELETE: "Off your list",
+    ExceptionKind.TASK_CHANGE: "Change of plan",
+}
+_FIELDS: Mapping[ExceptionKind, str] = {
+    ExceptionKind.TASK_TRIGGER: "trigger_messages",
+    ExceptionKind.TASK_DELETE: "delete_messages",
+    ExceptionKind.TASK_CHANGE: "change_messages",
 }
 
 
-def task_message(kind: ExceptionKind, landmark: LandmarkName, rng: np.random.Generator) -> str:
-    """Returns a message to the participant with the reason for a change of its tasks.
+def task_message(observation: ObservationMapping, kind: ExceptionKind, subgoal: int) -> str:
+    """Returns a message to the participant about a change of its tasks.
+
+    It is the message that the storyboard gives, or else what the storyboard says about the task, with its reason if it
+    gives one: "New on your list: Buy milk at Ikea, because the shop next door is closed".
 
     Args:
+        observation: observation of the Ad-Wizard.
         kind: one of the task exceptions.
-        landmark: place of the task.
-        rng: random generator of the decision.
+        subgoal: number of the subgoal.
     """
-    name = load_lexicon().forms(landmark, "say")[0]
-    sender = _SENDERS[int(rng.integers(len(_SENDERS)))]
-    bodies = _BODIES[kind]
-    return f"{sender}: {bodies[int(rng.integers(len(bodies)))].format(landmark=name)}"
+    if message := _line(observation, _FIELDS[kind], subgoal):
+        return message
+    described = _line(observation, "changes" if kind is ExceptionKind.TASK_CHANGE else "tasks", subgoal)
+    if kind is ExceptionKind.TASK_DELETE:
+        described = described.partition(BECAUSE)[0]  # the reason is that of the task, not of its end
+    text = f"{_OPENINGS[kind]}: {described or f'task {subgoal + 1}'}"
+    return textwrap.shorten(text, MESSAGE_LENGTH, placeholder=" ...")
+
+
+def _line(observation: ObservationMapping, field: str, subgoal: int) -> str:
+    """Returns a subgoal's line of a text; empty if the text has none."""
+    lines = str(observation[field]).split("\n")
+    return lines[subgoal] if subgoal < len(lines) else ""

@@ -15,7 +15,7 @@ from dorothie_gym.recording.actor_tracks import ActorTracks
 from dorothie_gym.recording.header import LandmarkRow
 from dorothie_gym.rendering.exception_words import exception_words
 from dorothie_gym.rendering.scene import Actor, CarView, ExceptionMark, FigureKind, Pin, Scene, SpokenLine, SubgoalState
-from dorothie_gym.tasks import map_labels
+from dorothie_gym.tasks import map_labels, with_reason
 
 _KINDS: Final[dict[int, FigureKind]] = {
     int(ActorKind.VEHICLE): "vehicle",
@@ -155,7 +155,9 @@ class Playback:
                 continue
             state = _STATES.get(status, "pending")
             changed = row["change"] if "change" in cause else None
-            goals[number] = changed or row["description"], state
+            reason = row.get("extra", {}).get("reason")
+            described = with_reason(row["description"], reason if isinstance(reason, str) else None)
+            goals[number] = changed or described, state
         live = [number for number, (_, state) in goals.items() if state != "abandoned"]
         for number in live:
             if number not in reached:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from dorothie_gym.copying import shared
 from dorothie_gym.maps import Town
+from dorothie_gym.tasks.storyboard import MESSAGE_LENGTH as MESSAGE_LENGTH
 
 TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"
 """Permitted characters of utterances, messages and stories."""
@@ -18,9 +19,6 @@ UTTERANCE_LENGTH = 160
 
 MEANING_LENGTH = 640
 """Greatest length of the propositions of one span, as JSON [characters]."""
-
-MESSAGE_LENGTH = 240
-"""Greatest length of a message of the Ad-Wizard [characters]."""
 
 STORY_LENGTH = 2400
 """Greatest length of a story [characters]."""

@@ -7,6 +7,7 @@ metres, speeds in m/s, headings in radians clockwise, turn angles in degrees pos
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -31,12 +32,16 @@ from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.spaces.actions import NO_MOVE
 from dorothie_gym.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
 from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, UTTERANCE_LENGTH, SpaceLimits
+from dorothie_gym.tasks import TaskMessages
 
 Observation: TypeAlias = dict[str, Any]
 """Observation dict of one role: values by field name, as specified by `observation_fields`."""
 
 ObservationMapping: TypeAlias = Mapping[str, Any]
 """Read-only observation dict, as accepted by policies."""
+
+MESSAGE_KINDS = tuple(field.name for field in fields(TaskMessages))
+"""Kinds of changes of a task that a storyboard gives messages for: "trigger", "delete", "change"."""
 
 MAX_UTTERANCE = 4 * (UTTERANCE_LENGTH + 1)
 """Greatest length of an utterance of several spans [characters]."""
@@ -161,7 +166,7 @@ def _participant_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldS
         _lights(),
         _subgoals(limits),
         _story(),
-        text("tasks", STORY_LENGTH, meaning="descriptions of the live subgoals"),
+        text("tasks", STORY_LENGTH, meaning="descriptions of the live subgoals with their reasons, a line each"),
         text("message", MESSAGE_LENGTH, meaning="message of the Ad-Wizard"),
         _speaking(),
         *_utterance(Role.CO_WIZARD, limits, observe_acts),
@@ -199,6 +204,18 @@ def _ad_wizard_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpe
         flags("hidden", limits.landmarks, meaning="1 for landmarks hidden from the Co-Wizard"),
         _subgoals(limits),
         _story(),
+        text("tasks", STORY_LENGTH, meaning="descriptions of all subgoals with their reasons, a line each"),
+        text(
+            "changes", STORY_LENGTH, meaning="description of each subgoal after a change, a line each; empty for none"
+        ),
+        *(
+            text(
+                f"{kind}_messages",
+                STORY_LENGTH,
+                meaning=f"message that the storyboard gives to {kind} each subgoal with, a line each; empty for none",
+            )
+            for kind in MESSAGE_KINDS
+        ),
         _waypoints(limits),
         choices("path_lanes", limits.lanes + 1, limits.plan, meaning="1 + id of the lanes of the path; 0 for none"),
         real("props", limits.props, columns=PropColumn, unit="mixed", meaning="props on the road"),

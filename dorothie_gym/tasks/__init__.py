@@ -6,6 +6,7 @@ from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, map_label, map
 from dorothie_gym.tasks.parsing import is_shipped_story, load_template, parse_template, template_names
 from dorothie_gym.tasks.state import TaskState
 from dorothie_gym.tasks.storyboard import (
+    Channel,
     Dependent,
     Landmark,
     LandmarkSite,
@@ -13,10 +14,14 @@ from dorothie_gym.tasks.storyboard import (
     StoryboardTemplate,
     Subgoal,
     SubgoalTemplate,
+    TaskMessage,
+    TaskMessages,
     Variable,
+    with_reason,
 )
 
 __all__ = [
+    "Channel",
     "Dependent",
     "Landmark",
     "LandmarkKind",
@@ -26,6 +31,8 @@ __all__ = [
     "StoryboardTemplate",
     "Subgoal",
     "SubgoalTemplate",
+    "TaskMessage",
+    "TaskMessages",
     "TaskState",
     "Variable",
     "bind",
@@ -36,4 +43,5 @@ __all__ = [
     "map_labels",
     "parse_template",
     "template_names",
+    "with_reason",
 ]

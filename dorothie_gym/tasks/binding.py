@@ -207,6 +207,20 @@ def _draw_values(
     return values
 
 
+def longest_values(template: StoryboardTemplate) -> dict[str, str]:
+    """Returns the longest text that each name of a template may stand for.
+
+    Args:
+        template: the template; `cast` accepts it.
+    """
+    roles = _roles(template.variables, template.dependents, template.name)
+    kinds = {variable.name: candidates for variable, candidates in zip(template.variables, roles, strict=True)}
+    values = {name: max((kind.noun for kind in candidates), key=len) for name, candidates in kinds.items()}
+    for row in template.dependents:
+        values[row.name] = max((v for kind in kinds[row.variable] for v in kind.attributes[row.attribute]), key=len)
+    return values
+
+
 def _line_up(parts: Mapping[str, LandmarkName]) -> tuple[list[LandmarkName], dict[str, int]]:
     """Returns the names of all landmarks (each kind once, then repeated ones) and the index of each part."""
     names = list(catalogue())
@@ -265,4 +279,6 @@ def _bind_subgoal(subgoal: SubgoalTemplate, values: Mapping[str, str], indices: 
         change_landmark=None if moved is None else indices[moved],
         delete_after_subgoal=subgoal.delete_after_subgoal,
         leaves=subgoal.leaves,
+        reason=None if subgoal.reason is None else fill(subgoal.reason, values),
+        messages=subgoal.messages.filled(values),
     )

@@ -13,12 +13,16 @@ from typing import NoReturn
 from dorothie_gym.errors import InputFileError, StoryboardError, did_you_mean
 from dorothie_gym.files import JsonValue
 from dorothie_gym.input_files import MAX_SMALL_JSON, parse_json, read_text
-from dorothie_gym.tasks.binding import cast
+from dorothie_gym.tasks.binding import cast, longest_values
 from dorothie_gym.tasks.catalogue import find_kind
 from dorothie_gym.tasks.storyboard import (
+    MESSAGE_LENGTH,
+    Channel,
     Dependent,
     StoryboardTemplate,
     SubgoalTemplate,
+    TaskMessage,
+    TaskMessages,
     Variable,
     references,
     variable_of,
@@ -40,6 +44,7 @@ def check(template: StoryboardTemplate) -> None:
     _check_indices(template)
     _check_order(template)
     cast(template)
+    _check_messages(template)
 
 
 def _check_names(template: StoryboardTemplate) -> None:
@@ -121,6 +126,25 @@ def _check_order(template: StoryboardTemplate) -> None:
         raise StoryboardError(template.name, f"subgoals[{min(waiting)}].after", reason)
 
 
+def _check_messages(template: StoryboardTemplate) -> None:
+    """Checks that messages belong to exceptions of their subgoals, and that they fit whatever the names stand for."""
+    longest = longest_values(template)
+    for index, subgoal in enumerate(template.subgoals):
+        permitted = {"trigger": subgoal.trigger, "delete": subgoal.delete, "change": subgoal.change is not None}
+        for kind, message in subgoal.messages.given():
+            field = f"subgoals[{index}].messages.{kind}"
+            if not permitted[kind]:
+                reason = f"subgoal {index} has no `{kind}`; add it, or remove the message"
+                raise StoryboardError(template.name, field, reason)
+            length = len(str(message.filled(longest)))
+            if length > MESSAGE_LENGTH:
+                reason = (
+                    f"has up to {length} characters with its sender and the longest values of its names; "
+                    f"shorten it to {MESSAGE_LENGTH}"
+                )
+                raise StoryboardError(template.name, f"{field}.text", reason)
+
+
 # --- parser -----------------------------------------------------------------------------------------------------------
 
 # Strings are matched as a whole, so that commas inside them are kept.
@@ -200,6 +224,11 @@ class TemplateFields:
             self.fail(field, f"must be a list, not {_describe(value)}")
         return value
 
+    def object(self, field: str) -> TemplateFields:
+        """Returns the fields of an object."""
+        path = f"{self.path}.{field}" if self.path else field
+        return TemplateFields(self.template, path, _object(self.template, path, self.values.get(field)))
+
     def indices(self, field: str) -> tuple[int, ...]:
         """Returns a list of distinct indices in ascending order."""
         found: set[int] = set()
@@ -263,7 +292,10 @@ _SUBGOAL_FIELDS = (
     "change",
     "change_destination",
     "delete_after_subgoal",
+    "reason",
+    "messages",
 )
+_MESSAGE_FIELDS = ("from", "by", "text")
 
 
 @functools.cache
@@ -389,7 +421,34 @@ def _subgoal(fields: TemplateFields) -> SubgoalTemplate:
         change_destination=change_destination,
         delete_after_subgoal=until,
         leaves=leaves,
+        reason=_reason(fields),
+        messages=_messages(fields),
     )
+
+
+def _reason(fields: TemplateFields) -> str | None:
+    reason = fields.optional_text("reason")
+    if reason is not None and (reason.lower().startswith("because ") or reason[-1] in ".!?"):
+        fields.fail("reason", "must be a clause as it follows 'because'; leave out that word and the full stop")
+    return reason
+
+
+def _messages(fields: TemplateFields) -> TaskMessages:
+    if "messages" not in fields.values:
+        return TaskMessages()
+    kinds = fields.object("messages")
+    kinds.check_known(tuple(TaskMessages.__dataclass_fields__))
+    return TaskMessages(**{kind: _message(kinds.object(kind)) for kind in kinds.values})
+
+
+def _message(fields: TemplateFields) -> TaskMessage:
+    fields.check_known(_MESSAGE_FIELDS)
+    sender, by = fields.text("from"), fields.optional_text("by") or Channel.TEXT_MESSAGE
+    if ":" in sender:
+        fields.fail("from", f"{sender!r} contains a colon; name the sender only")
+    if by not in tuple(Channel):
+        fields.fail("by", f"{by!r} is no way of sending a message; use one of {', '.join(Channel)}")
+    return TaskMessage(sender=sender, channel=Channel(by), text=fields.text("text"))
 
 
 def _destination(fields: TemplateFields, field: str) -> str | None:

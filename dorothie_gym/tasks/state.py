@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import GoalStatus
-from dorothie_gym.tasks.storyboard import Storyboard
+from dorothie_gym.tasks.storyboard import Storyboard, with_reason
 
 
 class TaskState:
@@ -80,9 +80,14 @@ class TaskState:
         return subgoal.landmark
 
     def description(self, i: int) -> str:
-        """Returns the current description of a subgoal."""
+        """Returns the current description of a subgoal, with the reason that the storyboard gives for it.
+
+        The description after a change contains its own reason.
+        """
         subgoal = self.storyboard.subgoals[i]
-        return subgoal.change if self._changed[i] and subgoal.change is not None else subgoal.description
+        if self._changed[i] and subgoal.change is not None:
+            return subgoal.change
+        return with_reason(subgoal.description, subgoal.reason)
 
     def arrive(self, landmark: int) -> list[int]:
         """Completes all permitted subgoals at a landmark where the car has stopped.

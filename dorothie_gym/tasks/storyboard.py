@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import enum
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Protocol
 
 from dorothie_gym.copying import shared
-from dorothie_gym.ontology import LandmarkName
+from dorothie_gym.ontology import ExceptionKind, LandmarkName
+
+MESSAGE_LENGTH = 240
+"""Greatest length of a message of the Ad-Wizard [characters]."""
 
 _REFERENCE = re.compile(r"\$([A-Za-z_]\w*)")
 
@@ -30,6 +34,76 @@ class Dependent:
     attribute: str
 
 
+class Channel(enum.StrEnum):
+    """Way in which a message reaches the participant; `WARNING` is one of the car or of another device."""
+
+    CALL = "call"
+    TEXT_MESSAGE = "text message"
+    VOICE_MESSAGE = "voice message"
+    EMAIL = "e-mail"
+    NOTE = "note"
+    RADIO_CALL = "radio call"
+    WARNING = "warning"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskMessage:
+    """Message to the participant about a change of its tasks.
+
+    Attributes:
+        sender: person or device that the message comes from, e.g. "Priya", "your sister", "the dashboard".
+        channel: way in which it reaches the participant.
+        text: words of the sender, with the reason for the change.
+    """
+
+    sender: str
+    channel: Channel
+    text: str
+
+    def __str__(self) -> str:
+        """Returns the message as the participant reads it, e.g. "Call from Priya: The vet closes early, so hurry."."""
+        return f"{self.channel.capitalize()} from {self.sender}: {self.text}"
+
+    def filled(self, values: Mapping[str, str]) -> TaskMessage:
+        """Returns the message with its references replaced."""
+        return TaskMessage(sender=fill(self.sender, values), channel=self.channel, text=fill(self.text, values))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskMessages:
+    """Messages of a subgoal, by the task exception that they come with; None where the storyboard gives none."""
+
+    trigger: TaskMessage | None = None
+    delete: TaskMessage | None = None
+    change: TaskMessage | None = None
+
+    def of(self, kind: ExceptionKind) -> TaskMessage | None:
+        """Returns the message of a task exception."""
+        match kind:
+            case ExceptionKind.TASK_TRIGGER:
+                return self.trigger
+            case ExceptionKind.TASK_DELETE:
+                return self.delete
+            case ExceptionKind.TASK_CHANGE:
+                return self.change
+        return None
+
+    def given(self) -> Iterator[tuple[str, TaskMessage]]:
+        """Yields (name of the field, message) for the messages that are given."""
+        for field in fields(self):
+            message: TaskMessage | None = getattr(self, field.name)
+            if message is not None:
+                yield field.name, message
+
+    def filled(self, values: Mapping[str, str]) -> TaskMessages:
+        """Returns the messages with their references replaced."""
+        return TaskMessages(**{name: message.filled(values) for name, message in self.given()})
+
+
+NO_MESSAGES = TaskMessages()
+"""Messages of a subgoal for which the storyboard gives none."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SubgoalTemplate:
     """Subgoal of a template.
@@ -44,6 +118,8 @@ class SubgoalTemplate:
         change_destination: destination after the change; None if it stays the same.
         delete_after_subgoal: index of the subgoal that must be reached before a deletion; None for no condition.
         leaves: whether the person at the destination disappears once the subgoal is reached.
+        reason: why the subgoal matters, a clause as after "because"; None if the template does not say.
+        messages: what the participant is told when the Ad-Wizard triggers, deletes or changes the subgoal.
     """
 
     destination: str
@@ -55,6 +131,8 @@ class SubgoalTemplate:
     change_destination: str | None = None
     delete_after_subgoal: int | None = None
     leaves: bool = False
+    reason: str | None = None
+    messages: TaskMessages = NO_MESSAGES
 
 
 @shared
@@ -90,6 +168,11 @@ class StoryboardTemplate:
             yield f"subgoals[{index}].description", subgoal.description
             if subgoal.change is not None:
                 yield f"subgoals[{index}].change", subgoal.change
+            if subgoal.reason is not None:
+                yield f"subgoals[{index}].reason", subgoal.reason
+            for kind, message in subgoal.messages.given():
+                yield f"subgoals[{index}].messages.{kind}.from", message.sender
+                yield f"subgoals[{index}].messages.{kind}.text", message.text
 
 
 def variable_of(destination: str) -> str | None:
@@ -105,6 +188,15 @@ def references(text: str) -> tuple[str, ...]:
 def fill(text: str, values: Mapping[str, str]) -> str:
     """Returns the text with each `$NAME` replaced by its value."""
     return _REFERENCE.sub(lambda match: values[match[1]], text)
+
+
+BECAUSE = ", because "
+"""Words between a description and its reason."""
+
+
+def with_reason(description: str, reason: str | None) -> str:
+    """Returns a description with its reason, e.g. "Buy milk at Ikea, because the shop next door is closed"."""
+    return description if reason is None else f"{description.rstrip(' .')}{BECAUSE}{reason}"
 
 
 # --- storyboards bound to a town --------------------------------------------------------------------------------------
@@ -190,6 +282,8 @@ class Subgoal:
     change_landmark: int | None = None
     delete_after_subgoal: int | None = None
     leaves: bool = False
+    reason: str | None = None
+    messages: TaskMessages = NO_MESSAGES
 
 
 @shared

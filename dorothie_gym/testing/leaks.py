@@ -19,6 +19,7 @@ from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import noop
+from dorothie_gym.tasks import TaskMessages
 from dorothie_gym.testing.playing import (
     ByAgent,
     Decision,
@@ -230,7 +231,9 @@ def with_other_tasks(scenario: Scenario) -> Scenario:
     board = scenario.storyboard
     places = [subgoal.landmark for subgoal in board.subgoals]
     subgoals = tuple(
-        dataclasses.replace(subgoal, landmark=place, description=f"task {k}")
+        dataclasses.replace(
+            subgoal, landmark=place, description=f"task {k}", reason=f"reason {k}", messages=TaskMessages()
+        )
         for k, (subgoal, place) in enumerate(zip(board.subgoals, places[1:] + places[:1], strict=True))
     )
     return dataclasses.replace(scenario, storyboard=dataclasses.replace(board, story="A story.", subgoals=subgoals))

@@ -10,9 +10,10 @@ import pytest
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import draw_scenario
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology import ExceptionKind, Role
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.spaces import SubgoalColumn, noop
+from dorothie_gym.spaces import AdWizardAction, SubgoalColumn, noop
+from dorothie_gym.tasks import with_reason
 from dorothie_gym.testing.leaks import with_hidden_landmarks_moved, with_other_tasks
 from dorothie_gym.testing.playing import play_again
 from tests.envs.sessions_played import play_at_random, play_by_script
@@ -147,3 +148,36 @@ def test_participant_does_not_observe_permissions(env: DuoWizardEnv) -> None:
     for seed in range(8):
         table = play_in_silence(env, seed, decisions=1)[-1]["participant"]["subgoals"]
         assert not table[:, SubgoalColumn.CAN_TRIGGER :].any()
+
+
+@pytest.mark.parametrize("name", ["birthday_tea", "film_night", "local_news"])
+def test_only_the_ad_wizard_observes_what_may_happen_to_the_tasks(name: str) -> None:
+    env = DuoWizardEnv(storyboard=name, config=EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2)))
+    observations = play_in_silence(env, seed=1, decisions=1)[-1]
+    secrets = [
+        str(secret)
+        for i, subgoal in enumerate(env.scenario.storyboard.subgoals)
+        for secret in (
+            *(message for _, message in subgoal.messages.given()),
+            *((subgoal.change,) if subgoal.change else ()),
+            *((subgoal.description, subgoal.reason) if i not in env.session.task.live else ()),
+        )
+    ]
+    assert len(secrets) >= 2
+    for role in ("participant", "co_wizard"):
+        observed = "\n".join(value for value in observations[role].values() if isinstance(value, str))
+        assert not [secret for secret in secrets if secret in observed]
+    known = "\n".join(value for value in observations["ad_wizard"].values() if isinstance(value, str))
+    assert all(secret in known for secret in secrets)
+
+
+def test_participant_reads_a_message_when_it_is_sent() -> None:
+    told = DuoWizardEnv(storyboard="birthday_tea", config=EnvConfig(world=WorldConfig(vehicles=0, pedestrians=0)))
+    told.reset(seed=1)
+    message = told.scenario.storyboard.subgoals[2].messages.trigger
+    idle = {agent: noop(Role(agent), told.limits) for agent in told.agents}
+    sent = AdWizardAction(exception=ExceptionKind.TASK_TRIGGER, item=2, message=str(message)).encode(told.limits)
+    observations, *_ = told.step({**idle, "ad_wizard": sent})
+    assert observations["participant"]["message"] == str(message)
+    subgoal = told.scenario.storyboard.subgoals[2]
+    assert with_reason(subgoal.description, subgoal.reason) in observations["participant"]["tasks"].split("\n")

@@ -7,13 +7,14 @@ from typer.testing import CliRunner
 from dorothie_gym.cli import app
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town
-from dorothie_gym.ontology import ExceptionKind, LandmarkName, Role
+from dorothie_gym.ontology import ExceptionKind, Role
 from dorothie_gym.policies import ScriptedAdWizard, Trick
 from dorothie_gym.policies.ad_wizard import idle_until
 from dorothie_gym.policies.task_exceptions import task_message
 from dorothie_gym.recording import EventType, Session
-from dorothie_gym.spaces import AdWizardAction, SpaceLimits, noop
-from dorothie_gym.tasks import TaskState, bind, parse_template
+from dorothie_gym.spaces import AdWizardAction, SpaceLimits, noop, plain_text
+from dorothie_gym.spaces.limits import MESSAGE_LENGTH
+from dorothie_gym.tasks import TaskState, bind, load_template, parse_template, template_names
 from tests.policies.walk import play
 
 TOWN = load_town("brookside")
@@ -38,12 +39,47 @@ def test_invalid_arguments_raise_value_error():
         ScriptedAdWizard(kinds=["earthquake"])
 
 
-@pytest.mark.parametrize("kind", [ExceptionKind.TASK_TRIGGER, ExceptionKind.TASK_DELETE, ExceptionKind.TASK_CHANGE])
-def test_messages_name_the_place_and_fit_their_field(kind):
-    for seed in range(20):
-        text = task_message(kind, LandmarkName.SEVEN_ELEVEN, np.random.default_rng(seed))
-        assert "SevenEleven" in text
-        AdWizardAction.decode(AdWizardAction(exception=kind, message=text).encode(SpaceLimits()), SpaceLimits())
+TASK_EXCEPTIONS = {
+    ExceptionKind.TASK_TRIGGER: "trigger",
+    ExceptionKind.TASK_DELETE: "delete",
+    ExceptionKind.TASK_CHANGE: "change",
+}
+
+
+@pytest.mark.parametrize("kind", TASK_EXCEPTIONS)
+def test_messages_are_those_of_the_storyboard(kind):
+    told = 0
+    for name in template_names():
+        engine = SessionEngine(TOWN, load_template(name))
+        seen = engine.reset(seed=len(name))["ad_wizard"]
+        for number, subgoal in enumerate(engine.scenario.storyboard.subgoals):
+            message = subgoal.messages.of(kind)
+            if message is None:
+                continue
+            text = task_message(seen, kind, number)
+            assert text == plain_text(str(message), 1000) and len(text) <= MESSAGE_LENGTH
+            action = AdWizardAction(exception=kind, item=number, message=text)
+            assert AdWizardAction.decode(action.encode(SpaceLimits()), SpaceLimits()).message == text
+            told += 1
+    assert told >= 5
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        (ExceptionKind.TASK_TRIGGER, "New on your list: Buy tea at Coco, because Noor is thirsty"),
+        (ExceptionKind.TASK_DELETE, "Off your list: Buy tea at Coco"),
+        (ExceptionKind.TASK_CHANGE, "Change of plan: Coco is full: buy tea at KFC"),
+    ],
+)
+def test_messages_are_made_of_the_texts_where_the_storyboard_gives_none(kind, expected):
+    seen = {
+        "tasks": "Stop at Ikea\nBuy tea at Coco, because Noor is thirsty",
+        "changes": "\nCoco is full: buy tea at KFC",
+        **dict.fromkeys(("trigger_messages", "delete_messages", "change_messages"), "\n"),
+    }
+    assert task_message(seen, kind, 1) == expected
+    assert len(task_message({**seen, "tasks": "\n" + "Buy tea " * 60}, ExceptionKind.TASK_TRIGGER, 1)) <= MESSAGE_LENGTH
 
 
 def test_bad_weather_comes_and_clears_up():

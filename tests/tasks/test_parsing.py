@@ -84,8 +84,22 @@ def test_template_printed_in_paper_loads_and_binds(seed):
     assert "$" not in storyboard.story and "\n" not in storyboard.story
 
 
-def test_package_has_at_least_ten_templates():
-    assert len(template_names()) >= 10
+def test_package_has_at_least_thirty_templates():
+    assert len(template_names()) >= 30
+
+
+def test_package_templates_have_two_to_six_live_subgoals():
+    numbers = {sum(not subgoal.trigger for subgoal in load_template(name).subgoals) for name in template_names()}
+    assert numbers == {2, 3, 4, 5, 6}
+
+
+@pytest.mark.parametrize("name", template_names())
+def test_every_subgoal_of_the_package_has_a_reason_and_a_message_for_each_exception(name):
+    for subgoal in load_template(name).subgoals:
+        assert subgoal.reason, subgoal
+        exceptions = (subgoal.trigger, subgoal.delete, subgoal.change)
+        messages = (subgoal.messages.trigger, subgoal.messages.delete, subgoal.messages.change)
+        assert list(map(bool, exceptions)) == list(map(bool, messages)), subgoal
 
 
 @pytest.mark.parametrize("name", template_names())
@@ -160,6 +174,26 @@ def test_both_hidden_fields_are_read_with_and_without_dollar_sign():
     assert template.hidden == ("A", "B")
 
 
+def test_messages_are_read_and_filled_with_the_values_of_the_town():
+    fields = plain(
+        {
+            "destination": "$P", "description": "Buy $I at $P", "reason": "$P is cheap", "delete": True,
+            "messages": {"delete": {"from": "the boss of $P", "by": "radio call", "text": "$P is closed, so go home."}},
+        },
+        {}, variables=[["P", "places.cafe"]], dependents=[["I", "P.menuitems"]],
+    )  # fmt: skip
+    subgoal = bind(parse(fields), grid_places(24), np.random.default_rng(0)).subgoals[0]
+    assert subgoal.reason == "Coco is cheap"
+    assert subgoal.messages.trigger is None and subgoal.messages.change is None
+    assert str(subgoal.messages.delete) == "Radio call from the boss of Coco: Coco is closed, so go home."
+
+
+def test_message_is_a_text_message_by_default():
+    message = {"from": "Noor", "text": "The shop is closed, so come home."}
+    template = parse(plain({"delete": True, "messages": {"delete": message}}, {}))
+    assert str(template.subgoals[0].messages.delete).startswith("Text message from Noor: ")
+
+
 def test_delete_after_subgoal_permits_deletion():
     template = parse(plain({}, {"delete_after_subgoal": 0}, {}))
     assert template.subgoals[1].delete and template.subgoals[1].delete_after_subgoal == 0
@@ -193,6 +227,34 @@ MALFORMED = {
         r"subgoals\[0\]\.change_destination: 'Moon' is neither",
     ),
     "delete after a text": (plain({"delete_after_subgoal": "1"}, {}), r"subgoals\[0\]\.delete_after_subgoal: must be"),
+    "reason is a number": (plain({"reason": 4}, {}), r"subgoals\[0\]\.reason: must be a text, not a number"),
+    "reason with because": (plain({"reason": "because of me"}, {}), r"subgoals\[0\]\.reason: must be a clause"),
+    "reason with a full stop": (plain({}, {"reason": "It rains."}), r"subgoals\[1\]\.reason: must be a clause"),
+    "messages is a text": (plain({"messages": "Go"}, {}), r"subgoals\[0\]\.messages: must be an object in braces"),
+    "unknown kind of message": (
+        plain({"messages": {"add": {}}}, {}),
+        r"subgoals\[0\]\.messages\.add: unknown field; the fields are trigger, delete, change",
+    ),
+    "message is a text": (
+        plain({"messages": {"delete": "Go"}}, {}),
+        r"subgoals\[0\]\.messages\.delete: must be an object in braces",
+    ),
+    "message without sender": (
+        plain({"delete": True, "messages": {"delete": {"text": "Go home."}}}, {}),
+        r"subgoals\[0\]\.messages\.delete\.from: is missing or empty",
+    ),
+    "message without text": (
+        plain({"delete": True, "messages": {"delete": {"from": "Noor"}}}, {}),
+        r"subgoals\[0\]\.messages\.delete\.text: is missing or empty",
+    ),
+    "sender with a colon": (
+        plain({"delete": True, "messages": {"delete": {"from": "Noor: work", "text": "Go."}}}, {}),
+        r"subgoals\[0\]\.messages\.delete\.from: 'Noor: work' contains a colon",
+    ),
+    "message by unknown means": (
+        plain({"delete": True, "messages": {"delete": {"from": "Noor", "by": "pigeon", "text": "Go."}}}, {}),
+        r"subgoals\[0\]\.messages\.delete\.by: 'pigeon' is no way of sending a message; use one of call, text message",
+    ),
     "variable is a text": (plain({}, {}, variables=["P1"]), r"variables\[0\]: must be \[\"NAME\", \"category\"\]"),
     "variable is no name": (plain({}, {}, variables=[["1 P", "people"]]), r"variables\[0\]: '1 P' is no name"),
     "category is empty": (plain({}, {}, variables=[["P", " "]]), r"variables\[0\]: P has an empty category"),

@@ -209,3 +209,11 @@ def test_destination_stays_last_and_task_feasible_under_any_events(fields, seed,
         assert open_now, "a subgoal can always be reached"
         reach(state, open_now[0])
     assert state.success
+
+
+def test_description_has_its_reason_until_a_change():
+    state = TaskState(bound({"reason": "the shop closes at six", "change": "Go to Coco: KFC is full"}, {}))
+    assert state.description(0) == "Stop at KFC, because the shop closes at six"
+    assert state.description(1) == "Stop at Shell"
+    state.change(0)
+    assert state.description(0) == "Go to Coco: KFC is full"

@@ -29,6 +29,27 @@ REFUSED = {
     "story undefined": (plain({}, {}, story="Go to $X."), "story: 'X' is no variable or dependent"),
     "description undefined": (plain({}, {"description": "$X"}), r"subgoals\[1\]\.description: 'X' is no variable"),
     "change text undefined": (plain({}, {"change": "$X"}), r"subgoals\[1\]\.change: 'X' is no variable"),
+    "reason undefined": (plain({}, {"reason": "$X"}), r"subgoals\[1\]\.reason: 'X' is no variable"),
+    "message undefined": (
+        plain({"delete": True, "messages": {"delete": {"from": "Noor", "text": "$X"}}}, {}),
+        r"subgoals\[0\]\.messages\.delete\.text: 'X' is no variable",
+    ),
+    "sender undefined": (
+        plain({"delete": True, "messages": {"delete": {"from": "$X", "text": "Go."}}}, {}),
+        r"subgoals\[0\]\.messages\.delete\.from: 'X' is no variable",
+    ),
+    "message of an exception that is not permitted": (
+        plain({"delete": True, "messages": {"trigger": {"from": "Noor", "text": "Go."}}}, {}),
+        r"subgoals\[0\]\.messages\.trigger: subgoal 0 has no `trigger`; add it, or remove the message",
+    ),
+    "message too long with the longest value": (
+        plain(
+            {"delete": True, "messages": {"delete": {"from": "Noor", "text": "Go. " * 50 + "$P " * 2}}},
+            {},
+            variables=[["P", "places.restaurants"]],
+        ),
+        r"subgoals\[0\]\.messages\.delete\.text: has up to 247 characters .* shorten it to 240",
+    ),
     "dependent undefined": (plain({}, {}, dependents=[["I", "P.items"]]), r"dependents\.I: 'P' is no variable"),
     "hidden undefined": (plain({}, {}, hidden_from_co_wizard=["P"]), "hidden_from_wizard: 'P' is no variable"),
     "name defined twice": (

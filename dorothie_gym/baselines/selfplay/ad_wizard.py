@@ -12,7 +12,7 @@ import numpy as np
 from dorothie_gym.baselines.selfplay.role_interface import LastUtterance, Mask, RoleInterface, last_utterance
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.ad_wizard import AdWizardConfig
-from dorothie_gym.policies.observation_parser import SeenSubgoal, place_on_path, read_landmarks, read_subgoals, scalar
+from dorothie_gym.policies.observation_parser import SeenSubgoal, place_on_path, read_subgoals, scalar
 from dorothie_gym.policies.task_exceptions import task_message
 from dorothie_gym.spaces import ActionMapping, AdWizardAction, LanePosition, ObservationMapping, PropColumn
 
@@ -190,11 +190,8 @@ class AdWizardInterface(RoleInterface[AdWizardMemory, AdWizardAction]):
         subgoal, kind = self._subgoal(macro, observation), _TASKS[macro]
         if subgoal is None:
             return _NOTHING
-        names = {mark.row: mark.name for mark in read_landmarks(observation, self.town)}
-        rng = np.random.default_rng(round(scalar(observation, "time")))
-        return AdWizardAction(
-            exception=kind, item=subgoal.index, message=task_message(kind, names[subgoal.landmark], rng)
-        )
+        message = task_message(observation, kind, subgoal.index)
+        return AdWizardAction(exception=kind, item=subgoal.index, message=message)
 
 
 def _next_exception(memory: AdWizardMemory) -> float:
