@@ -1,3 +1,4 @@
+import functools
 import re
 
 import numpy as np
@@ -22,11 +23,14 @@ from .test_parsing import printed_template
 SEEDS = range(2)
 
 
+@functools.cache
 def boards():
-    """Yields all shipped storyboards, bound to several towns."""
-    for name in template_names():
-        for seed in SEEDS:
-            yield bind(load_template(name), grid_places(24), np.random.default_rng(seed))
+    """Returns all shipped storyboards, bound several times."""
+    return [
+        bind(load_template(name), grid_places(24), np.random.default_rng(seed))
+        for name in template_names()
+        for seed in SEEDS
+    ]
 
 
 def words(text):
