@@ -6,14 +6,18 @@ write is ignored with a warning, and entries carry a signature by a key that lie
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import hmac
 import logging
 import os
 import secrets
+import shutil
 import stat
 import sys
+import time
+from collections.abc import Collection
 from pathlib import Path
 from typing import Final
 
@@ -29,6 +33,9 @@ KEY_FILE: Final = "key"
 
 SIGNATURE_LENGTH: Final = 64
 """Characters of a signature: hexadecimal digits of HMAC-SHA-256."""
+
+RECENT: Final = 3600.0
+"""Time since the last use in which `remove_least_used` leaves an entry to other processes [s]."""
 
 _KEY_LENGTH: Final = 32
 
@@ -81,6 +88,40 @@ def make_private(folder: Path) -> None:
     """
     for each in (folder.parent, folder):
         each.mkdir(mode=0o700, parents=True, exist_ok=True)
+
+
+def mark_used(entry: Path) -> None:
+    """Sets the time of the last use of an entry of the cache to now, if it can be written."""
+    with contextlib.suppress(OSError):
+        os.utime(entry)
+
+
+def remove_least_used(folder: Path, most: int, used: Collection[str]) -> None:
+    """Removes the least recently used entries of a folder of the cache until the others fit into a limit.
+
+    Entries are folders, of which each use is marked by `mark_used`. Those that were used within `RECENT` seconds stay,
+    because other processes may read them; files stay, too. What cannot be removed is left.
+
+    Args:
+        folder: folder of the cache.
+        most: limit of all entries together [bytes].
+        used: names of entries that stay in any case: those that the calling process uses.
+
+    Raises:
+        OSError: the folder cannot be read.
+    """
+    entries = []
+    for entry in folder.iterdir():
+        with contextlib.suppress(FileNotFoundError):  # another process removes entries, too
+            if entry.is_dir() and not entry.is_symlink():
+                entries.append((entry.stat().st_mtime, sum(file.stat().st_size for file in entry.iterdir()), entry))
+    total = sum(size for _, size, _ in entries)
+    for last_use, size, entry in sorted(entries):
+        if total <= most:
+            break
+        if entry.name not in used and time.time() - last_use > RECENT:
+            shutil.rmtree(entry, ignore_errors=True)
+            total -= size
 
 
 def write_signed(path: Path, content: bytes) -> None:

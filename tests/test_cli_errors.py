@@ -133,7 +133,25 @@ def test_invalid_evaluations_are_reported(arguments: list[str], words: str) -> N
     assert words in refused("evaluate", *arguments)
 
 
-@pytest.mark.parametrize("arguments", [["--seed", "x"], ["--seed", "-1"], ["--max-seconds", "0"], ["--bogus"]])
-def test_invalid_options_are_reported(arguments: list[str]) -> None:
-    result = CliRunner().invoke(app, ["run", *arguments])
-    assert result.exit_code == 2 and result.stdout == "" and arguments[0] in result.stderr
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "--seed", "x"], "Invalid value for '--seed': "),
+        (["run", "--seed", "-1"], "Invalid value for '--seed': "),
+        (["run", "--max-seconds", "0"], "Invalid value for '--max-seconds': "),
+        (["run", "--perception", "eyes"], "'eyes' is not one of 'symbolic', 'camera'; see dorothie-gym run --help"),
+        (["film", "a", "--out", "b.mp4", "--view", "side"], "'--view': 'side' is not one of 'map', 'camera', 'both'"),
+        (["run", "--bogus"], "No such option: --bogus"),
+        (["film"], "Missing argument 'SESSION'; see dorothie-gym film --help"),
+        (["bench", "camera", "--size"], "Option '--size' requires an argument"),
+        (["walk"], "No such command 'walk'; see dorothie-gym --help"),
+        (["--bogus"], "No such option: --bogus"),
+    ],
+)
+def test_invalid_options_are_reported(arguments: list[str], words: str) -> None:
+    assert words in refused(*arguments)
+
+
+def test_a_group_without_a_command_shows_its_help() -> None:
+    result = CliRunner().invoke(app, ["bench"])
+    assert "Usage: " in result.output and "camera" in result.output and "Error" not in result.output

@@ -1,13 +1,22 @@
 from __future__ import annotations
 
+import os
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.cache import pack, through_cache, unpack
-from dorothie_gym.user_cache import CACHE_VARIABLE, SIGNATURE_LENGTH, cache_folder
+from dorothie_gym.user_cache import (
+    CACHE_VARIABLE,
+    RECENT,
+    SIGNATURE_LENGTH,
+    cache_folder,
+    mark_used,
+    remove_least_used,
+)
 from tests.maps.yaml_text import MIDTOWN, written
 
 
@@ -35,6 +44,25 @@ def test_the_cache_folder_follows_the_variable_and_the_desktop_standard(
 def test_an_empty_variable_turns_the_cache_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(CACHE_VARIABLE, "")
     assert cache_folder() is None
+
+
+def kept(folder: Path, most: int, used: set[str]) -> list[str]:
+    """Returns the names of the entries that stay."""
+    remove_least_used(folder, most, used)
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+def test_least_recently_used_entries_are_removed_beyond_the_limit(tmp_path: Path) -> None:
+    for age, name in enumerate(("new", "middle", "old", "oldest"), start=2):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "pictures").write_bytes(bytes(100))
+        os.utime(tmp_path / name, (time.time() - age * RECENT,) * 2)
+    (tmp_path / "note").write_bytes(bytes(1000))
+    assert kept(tmp_path, 400, set()) == ["middle", "new", "note", "old", "oldest"], "they fit"
+    assert kept(tmp_path, 399, set()) == ["middle", "new", "note", "old"]
+    assert kept(tmp_path, 200, {"old"}) == ["new", "note", "old"], "the running command uses the old one"
+    mark_used(tmp_path / "new")
+    assert kept(tmp_path, 0, set()) == ["new", "note"], "another process may read the new one"
 
 
 def test_cache_is_created_for_its_user_alone(cache: Path) -> None:

@@ -1,7 +1,8 @@
 """Labelled pictures of the recorded sessions of a corpus, drawn once and kept in the user's cache.
 
 An entry of the cache is a folder of memory-mapped `.npy` files for one session. Its name is a hash of everything that
-determines its content: the session, its town, the sampling, and the source of the renderer.
+determines its content: the session, its town, the sampling, and the source of the renderer. The least recently used
+entries are removed beyond `MOST_BYTES`.
 """
 
 from __future__ import annotations
@@ -27,13 +28,14 @@ from dorothie_gym.camera.scene_cache import builder_digest
 from dorothie_gym.camera.solid_boxes import SolidBoxes
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.files import PART
+from dorothie_gym.input_files import MIB
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.cache import pack, package_sources
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import Sensor, parse_sensor
 from dorothie_gym.recording import FRAME_RATE, Corpus, CorpusEntry, EventType, Session
 from dorothie_gym.rollout.processes import run_tasks
-from dorothie_gym.user_cache import cache_folder, is_private
+from dorothie_gym.user_cache import cache_folder, is_private, mark_used, remove_least_used
 
 OnFrames: TypeAlias = Callable[[int, int], None]
 """Called with the numbers of finished and of all sessions."""
@@ -53,6 +55,9 @@ BOX_DTYPE: Final = np.dtype(
 
 CAMERA_FAULTS: Final = (Sensor.BLUR, Sensor.VIEW)
 """Faults that show in pictures."""
+
+MOST_BYTES: Final = 8 * 1024 * MIB
+"""Limit of the pictures in the user's cache [bytes]; those of the running command stay beyond it, too."""
 
 _NEAR: Final = 45.0  # [m] farther road users have few pixels
 _TRIED: Final = 2  # pictures that are looked at for one that is chosen
@@ -278,7 +283,7 @@ def load_frames(
         corpus: the corpus.
         sampling: choice of pictures.
         workers: number of processes that draw.
-        folder: where entries are kept; by default `frames` in the user's cache.
+        folder: where entries are kept, without a limit; by default `frames` in the user's cache.
         on_session: called with the numbers of finished and of all sessions.
 
     Raises:
@@ -286,6 +291,7 @@ def load_frames(
             switched off and no folder is given.
         OSError: an entry cannot be written.
     """
+    bounded = folder is None
     if folder is None:
         cache = cache_folder()
         if cache is None:
@@ -301,6 +307,8 @@ def load_frames(
         assert session is not None  # just written, or checked
         found[number] = session
         on_session(len(found), len(tasks))
+    if bounded:
+        remove_least_used(folder, MOST_BYTES, {session.key for session in found.values()})
     folds: dict[str, list[SessionFrames]] = {}
     for number, entry in enumerate(entries):
         folds.setdefault(str(entry.fold), []).append(found[number])
@@ -399,7 +407,10 @@ def _recall(path: Path, name: str, town: str, sampling: FrameSampling) -> Sessio
         and (depth.shape, depth.dtype) == (size, np.float16)
         and (boxes.dtype, frames.dtype) == (BOX_DTYPE, np.int64)
     )
-    return SessionFrames(name, town, path.name, rgb, semantic, depth, boxes, frames) if whole else None
+    if not whole:
+        return None
+    mark_used(path)
+    return SessionFrames(name, town, path.name, rgb, semantic, depth, boxes, frames)
 
 
 @functools.cache

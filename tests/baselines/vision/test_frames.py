@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -130,6 +131,21 @@ def test_pictures_with_objects_only(corpus, tmp_path):
     pictures = load_frames(Corpus.load(corpus), sampling, folder=tmp_path)["train"]
     assert len(pictures)
     assert all(boxes["pixels"].max() >= 12 for boxes in pictures.take(range(len(pictures))).boxes)
+
+
+def test_pictures_in_the_users_cache_are_bounded(corpus, tmp_path, monkeypatch):
+    monkeypatch.setenv("DOROTHIE_GYM_CACHE", str(tmp_path))
+    monkeypatch.setattr(frames, "MOST_BYTES", 0)
+    few, fewer = (replace(SMALL, most=most) for most in (2, 1))
+    for sampling in (few, fewer):
+        load_frames(Corpus.load(corpus), sampling)
+    entries = set((tmp_path / "frames").iterdir())
+    assert len(entries) == 4, "other processes may read what was used a moment ago"
+    for entry in entries:
+        os.utime(entry, (0.0, 0.0))
+    used = load_frames(Corpus.load(corpus), few)["train"]
+    assert {entry.name for entry in (tmp_path / "frames").iterdir()} == {session.key for session in used.sessions}
+    assert used.take(range(len(used))).rgb.std() > 20.0
 
 
 def test_cache_that_is_switched_off_is_reported(corpus, monkeypatch):
