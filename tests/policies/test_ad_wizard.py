@@ -82,6 +82,16 @@ def test_messages_are_made_of_the_texts_where_the_storyboard_gives_none(kind, ex
     assert len(task_message({**seen, "tasks": "\n" + "Buy tea " * 60}, ExceptionKind.TASK_TRIGGER, 1)) <= MESSAGE_LENGTH
 
 
+def test_task_exceptions_of_a_session_come_with_the_messages_of_the_storyboard():
+    wizard = ScriptedAdWizard(rate=4.0, kinds=["task"])
+    silent = {"participant": "silent", "co_wizard": "silent"}
+    played = play(3, decisions=400, names=silent, policies={"ad_wizard": wizard}, storyboard="bake_sale")
+    subgoals = played.env.scenario.storyboard.subgoals
+    given = {str(message) for subgoal in subgoals for _, message in subgoal.messages.given()}
+    told = [str(event.data["text"]) for event in played.events if event.type is EventType.MESSAGE]
+    assert told and set(told) <= given
+
+
 def test_bad_weather_comes_and_clears_up():
     wizard = ScriptedAdWizard(rate=1.0, kinds=["weather"])
     played = play(
@@ -158,6 +168,11 @@ def test_every_exception_of_a_template_of_ones_own_is_played(tmp_path, fields, e
     exceptions = [event.data for event in session.of_type(EventType.EXCEPTION)]
     played = [(data["kind"], data["subgoal"]) for data in exceptions if str(data["kind"]).startswith("task_")]
     assert sorted(played) == expected
+    told = [str(event.data["text"]) for event in session.of_type(EventType.MESSAGE)]
+    assert len(told) == len(played)
+    for text, (kind, subgoal) in zip(told, played, strict=True):
+        written = fields["subgoals"][subgoal]["change" if kind == "task_change" else "description"]
+        assert written.partition("$")[0] in text
     assert json.loads(result.output)["subgoals"]["live"] == len(fields["subgoals"]) - (fields is FULL_DAY)
 
 
