@@ -97,8 +97,11 @@ def add_portals(builder: MeshBuilder, edges: Edges) -> None:
 
 def add_lids(builder: MeshBuilder, triangles: GroundTriangles) -> None:
     """Adds surfaces just below the ground above tunnels, which only the sun sees: the ground casts no shadows."""
-    covered = triangles.corners[triangles.areas & Area.COVERED != 0]
-    builder.triangles(covered - [0.0, 0.0, _LID], colour=_SHADED, kind=ObjectClass.WALL)
+    covered = triangles.areas & Area.COVERED != 0
+    lids = triangles.corners[covered]
+    raised = triangles.areas[covered] & (Area.RAISED | Area.SLOPE) != 0
+    lids[..., 2] -= _LID + np.where(raised, KERB_HEIGHT, 0.0)[:, None]  # without steps, which would let light through
+    builder.triangles(lids, colour=_SHADED, kind=ObjectClass.WALL)
 
 
 def tunnel_floors(town: Town, sheets: Sequence[Sheet], cover: BaseGeometry, field: HeightField) -> TunnelFloors | None:
