@@ -23,6 +23,7 @@ from dorothie_gym.ontology import (
     SLOT_VALUES,
     ActionValue,
     DialogueMove,
+    PropKind,
     Role,
     Slot,
     SlotValue,
@@ -46,7 +47,7 @@ SLOT_FIELDS: Mapping[str, Slot] = {
 }
 """Gaps that are filled by slot values, with their slot."""
 
-CONTENT_FIELDS = frozenset({"seconds", "feature", "purpose", "person", "item", "cause"})
+CONTENT_FIELDS = frozenset({"seconds", "prop", "feature", "purpose", "person", "item", "cause"})
 """Gaps that are filled by the arguments of the content of the same names."""
 
 CONTEXT_FIELDS = frozenset({"side", "nth", "speed", "distance", "past", "dropped"}) | CONTENT_FIELDS
@@ -112,6 +113,7 @@ class Grammar:
         joints: links between two acts of one utterance, by (previous move, move).
         fillers: filled pauses.
         clauses: clauses that state a proposition, by its topic ("red", "not goal"), with "past " in front for the past.
+        props: names of each kind of prop, with an article.
     """
 
     templates: Mapping[DialogueMove, tuple[Template, ...]]
@@ -121,6 +123,7 @@ class Grammar:
     joints: Mapping[tuple[DialogueMove, DialogueMove], Phrase]
     fillers: Phrase
     clauses: Mapping[str, Phrase]
+    props: Mapping[PropKind, Phrase]
 
 
 @functools.cache
@@ -156,6 +159,7 @@ class _Builder:
     joints: dict[tuple[DialogueMove, DialogueMove], Phrase] = field(default_factory=dict)
     fillers: Phrase = Phrase("uh", frozenset(), frozenset())
     clauses: dict[str, Phrase] = field(default_factory=dict)
+    props: dict[PropKind, Phrase] = field(default_factory=dict)
 
     def build(self) -> Grammar:
         files = parse_talk_files(self.texts)
@@ -170,7 +174,14 @@ class _Builder:
         self._check()
         templates = {move: tuple(self.templates[move]) for move in DialogueMove}
         return Grammar(
-            templates, dict(self.actions), dict(self.tails), self.markers, self.joints, self.fillers, self.clauses
+            templates,
+            dict(self.actions),
+            dict(self.tails),
+            self.markers,
+            self.joints,
+            self.fillers,
+            self.clauses,
+            self.props,
         )
 
     def _take(self, section: TalkSection) -> None:
@@ -190,6 +201,8 @@ class _Builder:
                 self.markers[kind, parse_role(words[0]), parse_move(word)] = marker
         elif kind == "filler":
             self.fillers = self._phrase(section)
+        elif kind == "prop":
+            self.props[PropKind(words[0])] = self._phrase(section)
         elif kind == "clause":
             Predicate(words[-1])
             self.clauses[" ".join(words)] = self._phrase(section)

@@ -22,6 +22,7 @@ from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
     LandmarkName,
+    PropKind,
     Slot,
     SlotValue,
     in_label_order,
@@ -199,6 +200,12 @@ class SlotRealizer:
         tense = "past " if self._wording.topic == "because_then" else ""
         return load_grammar().clauses[f"{tense}{'not ' * cause.negated}{cause.predicate}"].say(self)
 
+    def prop(self) -> str:
+        """Returns the name of the prop of the content, with an article."""
+        kind = self.argument("prop")
+        assert isinstance(kind, PropKind)
+        return load_grammar().props[kind].say(self)
+
     def past(self) -> str:
         """Returns the name of the landmark to drive past."""
         return self.place(self._wording.past)
@@ -252,6 +259,7 @@ _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
         "dropped": SlotRealizer.dropped,
         "seconds": SlotRealizer.duration,
         "cause": SlotRealizer.clause,
+        "prop": SlotRealizer.prop,
         "feature": lambda realizer: str(realizer.argument("feature")),
         "purpose": lambda realizer: str(realizer.argument("purpose")),
         "person": lambda realizer: str(realizer.argument("person")),

@@ -6,6 +6,7 @@ import enum
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from dorothie_gym.compilation.records import Rows
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
-from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar
+from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar, weather
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception, story_exception, task_message
 from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, ObservationMapping, PropColumn, SpaceLimits
@@ -79,9 +80,39 @@ class AdWizardConfig:
     bad_weather_time: tuple[float, float] = (80.0, 140.0)
     crowd_ahead: tuple[float, float] = (60.0, 110.0)
     crowd_extent: int = 25
-    crowd_sizes: tuple[int, int] = (1, 3)
+    crowd_sizes: tuple[int, int] = (3, 6)
     crowd_of_people: float = 0.6
 
+
+WEATHERS: Mapping[WeatherParameter, tuple[float, tuple[float, float]]] = MappingProxyType(
+    {
+        WeatherParameter.FOG_DENSITY: (3.0, (0.5, 0.85)),
+        WeatherParameter.PRECIPITATION: (3.0, (0.65, 0.95)),
+        WeatherParameter.SUN_ALTITUDE_ANGLE: (3.0, (0.2, 0.42)),
+        WeatherParameter.CLOUDINESS: (1.0, (0.8, 1.0)),
+        WeatherParameter.WIND_INTENSITY: (1.0, (0.6, 1.0)),
+        WeatherParameter.PRECIPITATION_DEPOSITS: (1.0, (0.5, 1.0)),
+        WeatherParameter.WETNESS: (1.0, (0.5, 1.0)),
+        WeatherParameter.SUN_AZIMUTH_ANGLE: (0.5, (0.25, 0.75)),
+    }
+)
+"""Parameters that are changed in clear weather: weight, and range of the new value as a share of the parameter's."""
+
+FOGS: Mapping[WeatherParameter, tuple[float, tuple[float, float]]] = MappingProxyType(
+    {
+        WeatherParameter.FOG_DISTANCE: (1.0, (0.3, 0.6)),
+        WeatherParameter.FOG_FALLOFF: (1.0, (0.35, 0.6)),
+    }
+)
+"""The same in fog, of which they are details."""
+
+FOGS_FROM = 0.4
+"""Share of the density from which on there is fog."""
+
+PROPS: Mapping[PropKind, float] = MappingProxyType(
+    {kind: 3.0 if kind is PropKind.STREET_BARRIER else 1.0 for kind in PropKind}
+)
+"""Props that block a lane, with their weights."""
 
 SAME_PROP = 3.0
 """Distance within which a prop is recognized as the one placed [m]."""
@@ -301,7 +332,7 @@ def _restore(state: AdWizardState, observation: ObservationMapping, now: float) 
 
 
 def _roadblock(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
-    """Places a barrier across the lane ahead, not too near to a place where the car may have to stop."""
+    """Places a prop on the lane ahead, not too near to a place where the car may have to stop."""
     config = state.config
     if state.roadblocks >= config.most_roadblocks or scalar(observation, "speed") < config.roadblock_speed:
         return None, state
@@ -321,7 +352,7 @@ def _roadblock(state: AdWizardState, observation: ObservationMapping, now: float
     removal = Restoration(at=now + config.roadblock_time, prop=(float(point[0]), float(point[1])))
     action = AdWizardAction(
         exception=ExceptionKind.PLACE_PROP,
-        prop=PropKind.STREET_BARRIER,
+        prop=tuple(PROPS)[int(rng.choice(len(PROPS), p=np.array(list(PROPS.values())) / sum(PROPS.values())))],
         place=LanePosition(lane=lane, metres=round(station)),
     )
     return action, state.after_roadblock().with_restoration(removal)
@@ -350,12 +381,12 @@ def suits_roadblock(
 
 
 def _weather(state: AdWizardState, observation: ObservationMapping, now: float, rng: np.random.Generator) -> Outcome:
-    """Brings fog, heavy rain or night, for a while."""
-    parameter, share = (
-        (WeatherParameter.FOG_DENSITY, float(rng.uniform(0.5, 0.85))),
-        (WeatherParameter.PRECIPITATION, float(rng.uniform(0.65, 0.95))),
-        (WeatherParameter.SUN_ALTITUDE_ANGLE, float(rng.uniform(0.2, 0.42))),
-    )[int(rng.integers(3))]
+    """Brings fog, heavy rain, night, wind, puddles, ... for a while; fog changes further while it is there."""
+    density = weather(observation, WeatherParameter.FOG_DENSITY) / WeatherParameter.FOG_DENSITY.high
+    options = FOGS if density > FOGS_FROM else WEATHERS
+    weights = np.array([weight for weight, _ in options.values()])
+    parameter = tuple(options)[int(rng.choice(len(options), p=weights / weights.sum()))]
+    share = float(rng.uniform(*options[parameter][1]))
     clearing = Restoration(at=now + float(rng.uniform(*state.config.bad_weather_time)), weather=parameter)
     action = AdWizardAction(exception=ExceptionKind.WEATHER, weather=parameter, share=round(share, 2))
     return action, state.with_restoration(clearing)

@@ -20,6 +20,7 @@ from dorothie_gym.ontology import (
     GoalStatus,
     LandmarkName,
     ObjectClass,
+    PropKind,
     Role,
     StreetName,
     WeatherParameter,
@@ -102,12 +103,21 @@ class SeenSubgoal:
 
 @dataclass(frozen=True, kw_only=True)
 class SeenObject:
-    """Object in sight: its class, position [m] and distance [m]."""
+    """Object in sight: its class, position [m], distance [m], length and width [m]."""
 
     kind: ObjectClass
     x: float
     y: float
     distance: float
+    length: float = 0.0
+    width: float = 0.0
+
+    @property
+    def prop(self) -> PropKind | None:
+        """The kind of prop whose size this is; None for what is no prop."""
+        if self.kind is not ObjectClass.STATIC:
+            return None
+        return min(PropKind, key=lambda kind: abs(kind.length - self.length) + abs(kind.width - self.width))
 
 
 def street_of(observation: ObservationMapping, town: Town, lane: int) -> StreetName:
@@ -183,6 +193,8 @@ def read_objects(observation: ObservationMapping) -> tuple[SeenObject, ...]:
             x=float(row[column.X]),
             y=float(row[column.Y]),
             distance=float(row[column.DISTANCE]),
+            length=float(row[column.LENGTH]),
+            width=float(row[column.WIDTH]),
         )
         for row in observation["objects"]
         if row[column.KIND] > 0

@@ -49,7 +49,7 @@ ACTIONS = {
 # From the commonest on; the draw is skewed.
 COMMON = [ObjectClass.STATIC, ObjectClass.PEDESTRIAN, ObjectClass.VEHICLES, ObjectClass.TRAFFIC_LIGHT]
 OBJECTS = [*COMMON, *(value for value in ObjectClass if value not in COMMON)]
-TOPICS = ["fog", "rain", "night", "blocked", "wrong_way", "arrived", "plan", "refused", "no_gps"]
+TOPICS = ["fog", "rain", "night", "blocked", "wrong_way", "arrived", "plan", "refused", "failed"]
 
 
 class Sampler:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps import Town
@@ -124,14 +125,22 @@ class SessionWorld:
 
     def distance_of(self, time: float, kinds: Sequence[ActorKind]) -> float:
         """Returns the distance of the nearest recorded actor of some kinds at a time [m]; infinity if there is none."""
+        return float(self._distances(time, kinds).min(initial=math.inf))
+
+    def count_near(self, time: float, kinds: Sequence[ActorKind], distance: float) -> int:
+        """Returns the number of recorded actors of some kinds within a distance at a time [m, s]."""
+        return int((self._distances(time, kinds) <= distance).sum())
+
+    def _distances(self, time: float, kinds: Sequence[ActorKind]) -> NDArray[np.float64]:
+        """Returns the distances of the recorded actors of some kinds (n,) [m]."""
         table = self.session.scene.actors
         place = bisect.bisect_right(table.frames.tolist(), round(time * FRAME_RATE)) - 1
         if place < 0:
-            return math.inf
+            return np.empty(0)
         rows = table.rows[int(table.offsets[place]) : int(table.offsets[place + 1])]
         rows = rows[np.isin(rows["kind"], [int(kind) for kind in kinds])]
         x, y = self.position(time)
-        return float(np.hypot(rows["x"] - x, rows["y"] - y).min()) if len(rows) else math.inf
+        return np.hypot(rows["x"] - x, rows["y"] - y)
 
     def hazards(self, time: float, around: float) -> set[str]:
         """Returns the labels of the objects that the car brakes for within some seconds of a time [s]."""

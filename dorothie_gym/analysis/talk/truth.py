@@ -32,6 +32,9 @@ SHORT_TIME: Final = 15.0
 
 _FOG, _RAIN = 30.0, 50.0  # densities from which on the view may be called poor [%]
 _NOW: Final = 4.0  # time within which "now" may lie [s]
+_FADING: Final = 16  # time for which a fault is felt after its end [s]
+_CHANGED: Final = 0.15  # share of a parameter's range that is a change
+_CROWD: Final = 3  # least number in a crowd
 _TOLD: Final = 60.0  # longest time between an order and what it explains [s]
 
 Evaluator = Callable[[SessionWorld, Proposition, float, Role], bool | None]
@@ -154,6 +157,31 @@ def _goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) ->
     return world.goal_named(time) if said.get("place") is None else None
 
 
+def _failed(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """The fault may have begun or ended a while ago: its effect grows and fades."""
+    sensor = said.get("sensor")
+    if not isinstance(sensor, Sensor):
+        return None
+    lag = range(0, _FADING, 2)
+    return not said.negated if any(world.failed(time - k, sensor) is not said.negated for k in lag) else said.negated
+
+
+def _weather(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Whether a parameter has moved away from clear noon, or back, in the last minute."""
+    parameter, high = said.get("parameter"), said.get("high")
+    if not isinstance(parameter, WeatherParameter) or not isinstance(high, bool):
+        return None
+    span = parameter.high - parameter.low
+    away = abs(world.weather(time, parameter) - parameter.clear_noon) / span
+    return away > _CHANGED if high else away < 2.0 * _CHANGED
+
+
+def _crowded(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    kind = said.get("object")
+    actors = ACTORS.get(kind) if isinstance(kind, ObjectClass) else None
+    return None if actors is None else world.count_near(time, actors, SIGHT / 2.0) >= _CROWD
+
+
 _EVALUATORS: Final[dict[Predicate, Evaluator]] = {
     Predicate.SEES: _sees,
     Predicate.ON_STREET: _on_street,
@@ -167,6 +195,10 @@ _EVALUATORS: Final[dict[Predicate, Evaluator]] = {
     Predicate.GOAL: _goal,
     Predicate.LIGHTS_ON: lambda world, said, time, speaker: world.lights_on(time),
     Predicate.STANDS: lambda world, said, time, speaker: world.stands(time),
+    Predicate.FAILED: _failed,
+    Predicate.WEATHER: _weather,
+    Predicate.BLOCKED: lambda world, said, time, speaker: _blocked(world, said, time),
+    Predicate.CROWDED: _crowded,
     Predicate.LOCALISED: lambda world, said, time, speaker: None if world.failed(time, Sensor.GPS) else True,
 }
 

@@ -57,8 +57,9 @@ class CoWizardConfig:
         first_word: time at the beginning that is left to the participant [s].
         next_delay: silence after which a standing Co-Wizard asks for the next task [s].
         start_delay: silence at the beginning after which it asks for the first one [s].
-        lost_variance: variance of the position above which localization counts as lost [m^2].
-        found_variance: variance of the position below which it is regained [m^2].
+        lost_variance: variance of the position above which the car does not know where it is [m^2].
+        gps_variance: variance of the position that shows that it is not measured [m^2]; 0.02 to 0.15 while it is.
+        found_variance: variance of the position below which it is measured again [m^2].
         leaves_weather: probability that mentioning the weather is left to the participant.
         confirms: probability that an instruction is confirmed instead of acknowledged.
     """
@@ -104,8 +105,9 @@ class CoWizardConfig:
     next_delay: float = 4.0
     start_delay: float = 7.0
     lost_variance: float = 36.0
-    found_variance: float = 9.0
-    leaves_weather: float = 0.45
+    gps_variance: float = 0.4
+    found_variance: float = 0.08
+    leaves_weather: float = 0.25
     confirms: float = 0.45
 
 
@@ -128,6 +130,7 @@ class CoWizardStyle:
         rambles: probability that the present plan is mentioned along with another remark.
         offers: probability that a task on the way is proposed as the first one.
         reassures: probability that a description is followed by a question whether it was understood.
+        notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
         pace: cruise speed where nothing is said about it [km/h].
     """
 
@@ -145,6 +148,7 @@ class CoWizardStyle:
     rambles: float = 0.0
     offers: float = 0.0
     reassures: float = 0.0
+    notices: float = 0.0
     pace: int = USUAL_SPEED
 
     @classmethod
@@ -166,4 +170,5 @@ class CoWizardStyle:
             reassures=float(rng.uniform(0.0, 0.3)),
             pace=int(rng.choice((30, 35, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
+            notices=float(rng.uniform(0.3, 0.9)),
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Wording, WordingContext
+from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Proposition, Wording, WordingContext
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology import (
     ActionValue,
@@ -13,17 +13,27 @@ from dorothie_gym.ontology import (
     LandmarkName,
     ObjectClass,
     PhysicalAction,
+    Sensor,
     SlotValue,
     StreetName,
+    WeatherParameter,
 )
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
-from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, visibility_topic
+from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, is_localised, visibility_topic
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import Choice, direction_of
-from dorothie_gym.policies.speech import remark
+from dorothie_gym.policies.speech import intend, remark
+from dorothie_gym.policies.weather_talk import (
+    CROWD_INTERVAL,
+    changes,
+    crowd_ahead,
+    crowd_remark,
+    noting,
+    weather_change_remark,
+)
 from dorothie_gym.spaces import Motion, Physical
 
 _WEATHER_OBJECTS = {
@@ -32,6 +42,12 @@ _WEATHER_OBJECTS = {
     "night": (ObjectClass.SKY,),
 }
 """Objects that become visible or invisible with each condition."""
+
+
+_HANDLED = frozenset(
+    {WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION, WeatherParameter.SUN_ALTITUDE_ANGLE}
+)
+"""Parameters of the weather that have a reaction of their own."""
 
 
 def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -45,6 +61,8 @@ def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
         _ask_goal,
         _explain_hazard,
         _mention_weather,
+        _notice_weather,
+        _notice_crowd,
         _mention_localization,
     ):
         consider(state, view, rng)
@@ -224,16 +242,36 @@ def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
         state.say(remark(DialogueMove.EXPLAIN, ActionValue.LIGHT_CHANGE, wording=wording, joined=True))
 
 
+def _notice_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Mentions, by chance, a parameter of the weather that has changed conspicuously."""
+    for parameter, high in changes(view.raw, state.dialogue.noted):
+        state.dialogue = state.dialogue.with_noted(noting(state.dialogue.noted, parameter, high=high))
+        told_otherwise = high and parameter in _HANDLED
+        if not told_otherwise and rng.random() < state.style.notices:
+            state.say(weather_change_remark(parameter, high=high))
+            return
+
+
+def _notice_crowd(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Mentions, by chance, that there are many people or vehicles."""
+    kind = crowd_ahead(view.objects)
+    if kind is None or view.time - state.dialogue.crowd_at < CROWD_INTERVAL:
+        return
+    state.dialogue = state.dialogue.after_noticing_crowd(view.time)
+    if rng.random() < state.style.notices:
+        state.say(crowd_remark(kind))
+
+
 def _mention_localization(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Reports once that the position has become uncertain."""
-    covariance = view.raw["pose_covariance"]
-    variance = float(covariance[0][0]) + float(covariance[1][1])
-    if variance < state.config.found_variance:
-        if state.dialogue.lost_mentioned:
-            state.dialogue = state.dialogue.with_lost_mentioned(False)
-    elif variance > state.config.lost_variance and not state.dialogue.lost_mentioned:
+    """Reports once that the position is only estimated by dead reckoning, and when it is measured again."""
+    config, failed = state.config, state.dialogue.lost_mentioned
+    if failed and is_localised(view, config.found_variance):
+        state.dialogue = state.dialogue.with_lost_mentioned(False)
+    elif not failed and not is_localised(view, config.gps_variance):
         state.dialogue = state.dialogue.with_lost_mentioned(True)
-        state.say(remark(DialogueMove.EXPLAIN, wording=Wording(topic="no_gps")))
+    if state.dialogue.lost_mentioned is not failed:
+        outage = Proposition.of(Predicate.FAILED, negated=failed, sensor=Sensor.GPS)
+        state.say(intend(CommunicativeFunction.INFORM, outage))
 
 
 def announce_action(

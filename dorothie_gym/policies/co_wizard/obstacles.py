@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import Wording
+from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, SlotValue
 from dorothie_gym.policies.co_wizard.goals import plan_route
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenObject, place_on_lanes
 from dorothie_gym.policies.route_progress import first_new_street, lanes_ahead
-from dorothie_gym.policies.speech import remark
+from dorothie_gym.policies.speech import intend, remark
 from dorothie_gym.spaces import Motion
 
 
@@ -33,7 +33,8 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
         return
     state.route = state.route.with_roadblock(state.town, place)
     state.dialogue = state.dialogue.after_explaining_hazard(view.time)
-    blocked = remark(DialogueMove.EXPLAIN, ObjectClass.STATIC, wording=Wording(topic="blocked"), urgent=True)
+    obstacle = Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC, prop=thing.prop)
+    blocked = intend(CommunicativeFunction.INFORM, obstacle, urgent=True)
     state.speech = state.speech.cleared().plan(blocked)
     if state.route.progress is not None:
         state.dialogue = state.dialogue.with_detour_question(view.time)

@@ -149,6 +149,7 @@ class ParticipantStyle:
         aligns: probability of a question whether an utterance was understood.
         nods: probability that explanations of the car are acknowledged.
         curious: probability of a question why the car does something unexpected.
+        notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
         puzzled: probability that words of the car said during an own utterance have to be repeated.
     """
 
@@ -164,6 +165,7 @@ class ParticipantStyle:
     aligns: float = 0.0
     nods: float = 0.2
     curious: float = 0.0
+    notices: float = 0.0
     puzzled: float = 0.0
 
     @classmethod
@@ -183,4 +185,5 @@ class ParticipantStyle:
             nods=float(rng.uniform(0.5, 0.85)),
             curious=float(rng.uniform(0.02, 0.25)),
             puzzled=float(rng.uniform(0.0, 0.35)),
+            notices=float(rng.uniform(0.4, 1.0)),
         )

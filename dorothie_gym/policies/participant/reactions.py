@@ -8,7 +8,7 @@ import numpy as np
 
 from dorothie_gym.dialogue import ASKED, CommunicativeFunction, Predicate, Proposition, Wording, WordingContext
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, StreetName, WeatherParameter
+from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, PropKind, StreetName, WeatherParameter
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.observation_parser import (
     is_dark,
@@ -22,6 +22,17 @@ from dorothie_gym.policies.observation_parser import (
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, intend, remark
+from dorothie_gym.policies.weather_talk import (
+    CROWD_INTERVAL,
+    changes,
+    crowd_ahead,
+    crowd_remark,
+    noting,
+    weather_change_remark,
+)
+
+_HANDLED = frozenset({WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION})
+"""Parameters of the weather that have a reaction of their own."""
 
 LIGHTS_INTERVAL = 25.0
 """Time between remarks about the head lights [s]."""
@@ -63,7 +74,15 @@ def react(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     note_blocked(state, view)
     if not state.speech.idle or view.speaking > 0.0 or not state.task.announced:
         return
-    for consider in (_mention_weather, _mention_lights, _ask_why_standing, _wonder, _chat):
+    for consider in (
+        _mention_weather,
+        _mention_lights,
+        _notice_weather,
+        _notice_crowd,
+        _ask_why_standing,
+        _wonder,
+        _chat,
+    ):
         consider(state, view, rng)
         if not state.speech.idle:
             return
@@ -80,7 +99,7 @@ def note_blocked(state: ParticipantState, view: ParticipantView, near: bool = Fa
     progress = state.route.progress
     if progress is None:
         return
-    found = _obstacle_on_route(state, view)
+    found, prop = _obstacle_on_route(state, view)
     if found is None and near:
         ahead = min(view.station + 12.0, state.town.lanes[view.lane].length)
         found = (view.lane, ahead)
@@ -91,12 +110,12 @@ def note_blocked(state: ParticipantState, view: ParticipantView, near: bool = Fa
     state.route = route.with_progress(progress)
     state.guidance = state.guidance.for_new_route(progress.left(view.station))
     if state.guidance.guiding and not near:
-        wording = Wording(topic="blocked")
-        state.say_only(remark(DialogueMove.EXPLAIN, ObjectClass.STATIC, wording=wording, urgent=True))
+        obstacle = Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC, prop=prop)
+        state.say_only(intend(CommunicativeFunction.INFORM, obstacle, urgent=True))
 
 
-def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> Place | None:
-    """Returns the place of the first obstacle in sight on the next lanes of the route."""
+def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> tuple[Place | None, PropKind | None]:
+    """Returns the place of the first obstacle in sight on the next lanes of the route, and its kind."""
     assert state.route.progress is not None
     lanes = [leg.lane for leg in state.route.progress.legs[:6]]
     for thing in view.objects:
@@ -104,8 +123,8 @@ def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> Place 
             found = place_on_lanes(state.town, lanes, thing.x, thing.y)
             behind = found is not None and found[0] == view.lane and found[1] < view.station
             if found is not None and not behind:
-                return found
-    return None
+                return found, thing.prop
+    return None, None
 
 
 def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -119,9 +138,13 @@ def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.ran
     if not conversation.slowed and view.time - conversation.bad_weather_since > config.weather_notice:
         state.conversation = conversation.with_slowed(True)
         mentioned = view.time - conversation.heard_at < config.weather_notice + 2.0
-        if view.speed < config.bad_weather_speed / 3.6 or mentioned:
-            return  # the car is slow already, or talks about the weather
+        if mentioned:
+            return
         topic = "fog" if is_foggy(view.raw) else "rain"
+        if view.speed < config.bad_weather_speed / 3.6:  # the car is slow already
+            if rng.random() < state.style.notices:
+                state.say(weather_remark(topic, rng))
+            return
         wording = Wording(faster=False, speed=config.bad_weather_speed)
         slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording, joined=True)
         state.say(weather_remark(topic, rng), slower)
@@ -138,6 +161,26 @@ def weather_remark(topic: str, rng: np.random.Generator) -> Remark:
     draw = rng.random() * (len(things) + 1)
     values = (things[int(draw)],) if draw < len(things) else ()
     return remark(DialogueMove.EXPLAIN, *values, wording=Wording(topic=topic))
+
+
+def _notice_weather(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Mentions, by chance, a parameter of the weather that has changed conspicuously."""
+    for parameter, high in changes(view.raw, state.conversation.noted):
+        state.conversation = state.conversation.with_noted(noting(state.conversation.noted, parameter, high=high))
+        told_otherwise = high and parameter in _HANDLED  # with a request to slow down, or for the lights
+        if not told_otherwise and rng.random() < state.style.notices:
+            state.say(weather_change_remark(parameter, high=high))
+            return
+
+
+def _notice_crowd(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Mentions, by chance, that there are many people or vehicles."""
+    kind = crowd_ahead(view.objects)
+    if kind is None or view.time - state.conversation.crowd_at < CROWD_INTERVAL:
+        return
+    state.conversation = state.conversation.after_noticing_crowd(view.time)
+    if rng.random() < state.style.notices:
+        state.say(crowd_remark(kind))
 
 
 def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:

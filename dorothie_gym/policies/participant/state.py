@@ -15,6 +15,7 @@ from dorothie_gym.policies.participant.config import ParticipantConfig, Particip
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteState
 from dorothie_gym.policies.speech import Remark, SpeakingState
+from dorothie_gym.policies.weather_talk import Noted
 
 StepKey: TypeAlias = tuple[str, int, int]
 """Identity of a guidance step: "turn", "lane", "round" or "on", and the lanes concerned."""
@@ -34,6 +35,8 @@ class ConversationState:
         slowed: whether a lower speed for the weather has been requested or was not needed.
         bad_weather_since: start of the present bad weather [s]; infinite in good weather.
         hurried: whether the car has been asked to go faster.
+        noted: parameters of the weather that have been noticed.
+        crowd_at: time at which a crowd was last noticed [s].
     """
 
     heard_at: float = 0.0
@@ -45,6 +48,8 @@ class ConversationState:
     slowed: bool = False
     bad_weather_since: float = math.inf
     hurried: bool = False
+    noted: Noted = frozenset()
+    crowd_at: float = -math.inf
 
     def after_hearing(self, now: float) -> ConversationState:
         """Records an utterance of the car at `now` [s]."""
@@ -78,6 +83,14 @@ class ConversationState:
     def with_slowed(self, slowed: bool) -> ConversationState:
         """Sets whether a lower speed for the weather has been requested or was not needed."""
         return replace(self, slowed=slowed)
+
+    def with_noted(self, noted: Noted) -> ConversationState:
+        """Sets what has been noticed of the weather."""
+        return replace(self, noted=noted)
+
+    def after_noticing_crowd(self, now: float) -> ConversationState:
+        """Records that a crowd was noticed."""
+        return replace(self, crowd_at=now)
 
     def after_hurrying(self) -> ConversationState:
         """Records a request to go faster."""

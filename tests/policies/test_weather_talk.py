@@ -1,0 +1,99 @@
+"""What the scripted agents notice of weather and crowds, and that they say it truly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dorothie_gym.dialogue import Predicate, word_act
+from dorothie_gym.ontology import ObjectClass, PropKind, Role, WeatherParameter
+from dorothie_gym.policies.observation_parser import SeenObject
+from dorothie_gym.policies.weather_talk import (
+    CROWDS,
+    changes,
+    crowd_ahead,
+    crowd_remark,
+    noting,
+    weather_change_remark,
+)
+
+W = WeatherParameter
+CLEAR = np.array([parameter.clear_noon for parameter in W])
+
+
+def observed(**values: float) -> dict[str, np.ndarray]:
+    row = CLEAR.copy()
+    for name, value in values.items():
+        row[list(W).index(W(name))] = value
+    return {"weather": row}
+
+
+def test_clear_weather_is_not_worth_a_word():
+    assert list(changes(observed(), frozenset())) == []
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"cloudiness": 90.0}, {"precipitation": 80.0}, {"precipitation_deposits": 70.0}, {"wind_intensity": 80.0},
+        {"sun_azimuth_angle": 120.0}, {"sun_altitude_angle": -20.0}, {"fog_density": 70.0}, {"wetness": 70.0},
+        {"fog_distance": 50.0, "fog_density": 70.0}, {"fog_falloff": 3.0, "fog_density": 70.0},
+    ],
+    ids=lambda values: next(iter(values)),
+)  # fmt: skip
+def test_each_parameter_is_noticed_when_it_comes_and_when_it_goes(values):
+    parameter = W(next(iter(values)))
+    found = dict(changes(observed(**values), frozenset()))
+    assert found[parameter] is True
+    noted = noting(frozenset(), parameter, high=True)
+    assert parameter not in dict(changes(observed(**values), noted))
+    assert dict(changes(observed(), noted)) == {parameter: False}
+    assert noting(noted, parameter, high=False) == frozenset()
+
+
+def test_details_of_fog_are_noticed_in_fog_only():
+    assert list(changes(observed(fog_distance=80.0, fog_falloff=4.0), frozenset())) == []
+
+
+def test_slow_changes_do_not_flicker():
+    noted = frozenset({W.WIND_INTENSITY})
+    assert list(changes(observed(wind_intensity=45.0), noted)) == []
+    assert list(changes(observed(wind_intensity=45.0), frozenset())) == []
+
+
+@pytest.mark.parametrize("parameter", W)
+@pytest.mark.parametrize("high", [True, False])
+def test_every_change_has_words_and_says_which_it_is(parameter, high):
+    item = weather_change_remark(parameter, high=high)
+    (said,) = item.meaning
+    assert said.predicate is Predicate.WEATHER and said.get("parameter") is parameter and said.get("high") is high
+    texts = {
+        role: {word_act(item.act, role, np.random.default_rng(seed), item.wording) for seed in range(12)}
+        for role in (Role.PARTICIPANT, Role.CO_WIZARD)
+    }
+    other = weather_change_remark(parameter, high=not high)
+    for role, words in texts.items():
+        assert len(words) > 1
+        assert words.isdisjoint(
+            word_act(other.act, role, np.random.default_rng(seed), other.wording) for seed in range(12)
+        )
+
+
+def people(count: int, distance: float, kind: ObjectClass = ObjectClass.PEDESTRIAN) -> list[SeenObject]:
+    return [SeenObject(kind=kind, x=distance, y=float(k), distance=distance) for k in range(count)]
+
+
+def test_crowds_are_many_and_near():
+    least = CROWDS[ObjectClass.PEDESTRIAN]
+    assert crowd_ahead(people(least, 20.0)) is ObjectClass.PEDESTRIAN
+    assert crowd_ahead(people(least - 1, 20.0)) is None
+    assert crowd_ahead(people(3 * least, 90.0)) is None
+    assert crowd_ahead(people(10, 20.0, ObjectClass.VEHICLES)) is ObjectClass.VEHICLES
+    assert crowd_remark(ObjectClass.PEDESTRIAN).act.slots == {ObjectClass.PEDESTRIAN}
+
+
+@pytest.mark.parametrize("kind", PropKind)
+def test_props_are_told_apart_by_their_size(kind):
+    seen = SeenObject(kind=ObjectClass.STATIC, x=0.0, y=0.0, distance=9.0, length=kind.length, width=kind.width)
+    assert seen.prop is kind
+    assert SeenObject(kind=ObjectClass.VEHICLES, x=0.0, y=0.0, distance=9.0, length=4.5, width=1.8).prop is None
