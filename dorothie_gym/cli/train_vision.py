@@ -19,10 +19,10 @@ _FIGURES: Final[Mapping[str, Mapping[str, str]]] = {
     "segformer": {"miou": "mIoU", "macc": "mAcc", "aacc": "aAcc", "depth_error": "depth error"},
     "detr": {
         "ap50": "AP50", "ap50_95": "AP50:95", "ap_place": "AP 2 m", "place_error": "place", "range_error": "depth",
-        "size_error": "size", "heading_error": "heading",
+        "size_error": "size", "heading_error": "heading", "axis_error": "axis",
     },
 }  # fmt: skip
-_UNITS: Final[Mapping[str, str]] = {"place_error": "m", "heading_error": "deg"}
+_UNITS: Final[Mapping[str, str]] = {"place_error": "m", "heading_error": "deg", "axis_error": "deg"}
 """Units of figures that are no shares."""
 _MEANINGS: Final[Mapping[str, str]] = {
     "segformer": "Means over the classes that occur in the fold; depth error: mean relative error up to 80 m.",
@@ -98,7 +98,7 @@ def _show(model: str, results: Sequence[Mapping[str, Any]]) -> None:
     for result in results:
         for towns, figures in result["test"].items():
             label = f"{towns} towns" + (f", seed {result['seed']}" if len(results) > 1 else "")
-            table.add_row(label, *(_shown(name, figures[name]) for name in names))
+            table.add_row(label, *(_shown(name, figures.get(name)) for name in names))
     table.add_row("paper", *(_shown(name, results[0]["paper"].get(name)) for name in names), style="dim")
     wide_stdout().print(table)
     stdout().print(_MEANINGS[model], style="dim", markup=False, soft_wrap=True)

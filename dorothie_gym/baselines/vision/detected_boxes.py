@@ -18,11 +18,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from dorothie_gym.angles import wrap_radians
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.trainer import BEST_FILE
 from dorothie_gym.baselines.vision.detector import KINDS, Detector
 from dorothie_gym.baselines.vision.experiment import load_detector, load_segformer
-from dorothie_gym.baselines.vision.object_learner import focals_of
+from dorothie_gym.baselines.vision.object_learner import distinct_queries, focals_of
 from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
 from dorothie_gym.baselines.vision.segformer import SegFormer, normalised
 from dorothie_gym.baselines.vision.solids import spaces_of
@@ -221,12 +222,13 @@ class DetectedBoxes:
         spaces = spaces_of(found.solids.numpy(), focals_of(detector.config))
         for k, (record, view) in enumerate(zip(records, views, strict=True)):
             heading = pictures.pose(int(frames[record])).heading
-            actors = actors_at(found.scores[k].numpy(), spaces[k], view, heading, self.threshold)
-            rows = np.empty(len(actors), _KEPT_DTYPE)
-            rows["record"] = record
+            rows = objects_in(found.boxes[k].numpy(), found.scores[k].numpy(), self.threshold)
+            actors = actors_at(found.scores[k].numpy()[rows], spaces[k, rows], view, heading)
+            table = np.empty(len(actors), _KEPT_DTYPE)
+            table["record"] = record
             for column in ACTOR_DTYPE.names or ():
-                rows[column] = actors[column]
-            kept.append(rows)
+                table[column] = actors[column]
+            kept.append(table)
         return kept, found.queries.numpy().astype(np.float16)
 
 
@@ -250,30 +252,35 @@ def _event_frames(session: Session) -> NDArray[np.int64]:
     return np.array([event.frame for event in session.events], dtype=np.int64)
 
 
-def actors_at(
-    scores: NDArray[np.floating], spaces: NDArray[np.float64], view: View, heading: float, threshold: float
-) -> Rows:
-    """Returns the objects in a picture, the surest first, as rows of `ACTOR_DTYPE`.
+def objects_in(boxes: NDArray[np.floating], scores: NDArray[np.floating], threshold: float) -> NDArray[np.int64]:
+    """Returns the queries (n,) that are objects in a picture, the surest first, each object once.
 
     Args:
-        scores: (q, k) sureness of the kinds of each query.
-        spaces: (q, 7) boxes in space, `SPACE_COLUMNS`.
-        view: projection of the picture.
-        heading: of the camera [rad].
+        boxes: (q, 4) middle x and y, width and height.
+        scores: (q, k) sureness of the kinds.
         threshold: least score of an object.
     """
-    best = scores.max(axis=1)
-    chosen = np.argsort(-best, kind="stable")
-    chosen = chosen[best[chosen] >= threshold]
-    aside, down, ahead, length, width, _, turned = spaces[chosen].T
+    sure = np.flatnonzero(scores.max(axis=1) >= threshold)
+    return sure[distinct_queries(boxes[sure], scores[sure])] if len(sure) else sure
+
+
+def actors_at(scores: NDArray[np.floating], spaces: NDArray[np.float64], view: View, heading: float) -> Rows:
+    """Returns objects in a picture as rows of `ACTOR_DTYPE`, in the same order.
+
+    Args:
+        scores: (n, k) sureness of the kinds of each.
+        spaces: (n, 7) boxes in space, `SPACE_COLUMNS`.
+        view: projection of the picture.
+        heading: of the camera [rad].
+    """
+    aside, down, ahead, length, width, _, turned = spaces.T
     places = view.origin + np.stack((aside, -down, ahead), axis=1) @ view.axes
-    rows = np.zeros(len(chosen), ACTOR_DTYPE)
-    rows["key"] = np.arange(1, len(chosen) + 1)
-    kinds = scores[chosen].argmax(axis=1)
-    rows["kind"] = np.array([_ACTORS[kind].value for kind in KINDS])[kinds]
+    rows = np.zeros(len(scores), ACTOR_DTYPE)
+    rows["key"] = np.arange(1, len(scores) + 1)
+    rows["kind"] = np.array([_ACTORS[kind].value for kind in KINDS])[scores.argmax(axis=1)]
     rows["kind"][(rows["kind"] == ActorKind.VEHICLE) & (width < CYCLIST_WIDTH)] = ActorKind.CYCLIST
     rows["x"], rows["y"] = places[:, 0], places[:, 1]
-    rows["heading"] = (turned + heading + math.pi) % (2.0 * math.pi) - math.pi
+    rows["heading"] = wrap_radians(turned + heading)
     rows["length"], rows["width"] = length, width
     return rows
 

@@ -161,9 +161,10 @@ def space_errors(pictures: Sequence[PictureBoxes], turned: Sequence[int]) -> dic
         range_error: |detected - true| / true depth.
         size_error: 1 less intersection over union of the boxes, were they at one place with one heading.
         heading_error: [degrees].
+        axis_error: the same if front and back are taken for one [degrees].
         NaN where no box is right.
     """
-    rows: dict[str, list[Array]] = {name: [] for name in ("place", "range", "size", "heading")}
+    rows: dict[str, list[Array]] = {name: [] for name in ("place", "range", "size", "heading", "axis")}
     for kind in _kinds_of(pictures):
         for picture in (each.of_kind(kind) for each in pictures):
             partner = _partners(_overlap(picture), picture.ignored, 0.5)
@@ -174,6 +175,7 @@ def space_errors(pictures: Sequence[PictureBoxes], turned: Sequence[int]) -> dic
             rows["size"].append(1.0 - common / (found[:, 3:6].prod(1) + true[:, 3:6].prod(1) - common))
             if kind in turned:
                 rows["heading"].append(np.abs(np.degrees(wrap_radians(found[:, 6] - true[:, 6]))))
+                rows["axis"].append(np.minimum(rows["heading"][-1], 180.0 - rows["heading"][-1]))
     every = {name: np.concatenate(parts) if parts else np.empty(0) for name, parts in rows.items()}
     return {f"{name}_error": float(values.mean()) if len(values) else math.nan for name, values in every.items()}
 
@@ -263,3 +265,16 @@ def box_overlaps(first: Array, second: Array) -> Array:
     areas = [np.prod(np.clip(boxes[:, 2:] - boxes[:, :2], 0.0, None), axis=1) for boxes in (first, second)]
     union = areas[0][:, None] + areas[1][None] - common
     return np.asarray(common / np.where(union > 0.0, union, 1.0))
+
+
+def distinct(boxes: Array, scores: Array, overlap: float) -> NDArray[np.int64]:
+    """Returns the rows of boxes (n, 4) that overlap no surer one by more than a share of their union, the surest first.
+
+    This is greedy suppression (Dalal and Triggs, CVPR 2005): a detector may find an object by several queries.
+    """
+    chosen: list[int] = []
+    shares = box_overlaps(boxes, boxes)
+    for row in np.argsort(-scores, kind="stable").tolist():
+        if not chosen or shares[row, chosen].max() <= overlap:
+            chosen.append(row)
+    return np.array(chosen, dtype=np.int64)

@@ -17,6 +17,7 @@ from dorothie_gym.baselines.vision.metrics import (
     PictureBoxes,
     average_precisions,
     best_threshold,
+    distinct,
     place_precision,
     space_errors,
 )
@@ -26,6 +27,9 @@ from dorothie_gym.baselines.vision.training import Learner
 
 LEAST_PIXELS: Final = 64
 """Visible pixels from which on an object has to be found in tests; others are ignored."""
+
+OVERLAP: Final = 0.5
+"""Overlap from which on boxes in a picture are taken for one object."""
 
 TURNED: Final = (0, 1)
 """Rows of `KINDS` whose headings mean something: props look alike from several sides."""
@@ -182,6 +186,16 @@ def detected_boxes(model: Detector, pictures: FrameSet, *, most: int | None = No
     return found
 
 
+def distinct_queries(centred: NDArray[np.floating], scores: NDArray[np.floating]) -> NDArray[np.int64]:
+    """Returns the queries (n,) that overlap no surer one by more than `OVERLAP`, the surest first.
+
+    Args:
+        centred: (q, 4) boxes: middle x and y, width and height.
+        scores: (q, k) sureness of the kinds.
+    """
+    return distinct(corners_of(centred).astype(np.float64), scores.max(axis=1).astype(np.float64), OVERLAP)
+
+
 def corners_of(centred: NDArray[np.floating]) -> NDArray[np.floating]:
     """Returns left, top, right and bottom (n, 4) of boxes (n, 4) with middle x and y, width and height."""
     half = centred[:, 2:] / 2
@@ -196,7 +210,9 @@ def _compared(
     scale: NDArray[np.float64],
     focals: Focals,
 ) -> PictureBoxes:
-    """Returns the true and the detected boxes of a picture; each query may be of any kind."""
+    """Returns the true and the detected boxes of a picture, each found once; a query may be of any kind."""
+    chosen = distinct_queries(centred, scores)
+    centred, scores, solids = centred[chosen], scores[chosen], solids[chosen]
     return PictureBoxes(
         true=np.stack([boxes[name] for name in ("left", "top", "right", "bottom")], axis=1).astype(np.float64),
         kinds=kinds_of(boxes),

@@ -118,7 +118,15 @@ def test_errors_of_boxes_in_space_are_of_the_detections_that_are_right_in_the_pi
     assert found["place_error"] == pytest.approx(5.0) and found["range_error"] == pytest.approx(4.0 / 20.0)
     assert found["size_error"] == pytest.approx(0.5)  # the box is twice as long
     assert found["heading_error"] == pytest.approx(math.degrees(0.5))
+    assert found["axis_error"] == found["heading_error"]
     assert math.isnan(space_errors([picture], turned=())["heading_error"])
+
+
+def test_error_of_the_axis_takes_front_and_back_for_one():
+    found = space_errors(
+        [boxes([BOX], [BOX], [0.9], detected_spaces=[moved(heading=math.radians(170.0))])], turned=(0,)
+    )
+    assert found["heading_error"] == pytest.approx(170.0) and found["axis_error"] == pytest.approx(10.0)
 
 
 def test_errors_without_a_right_detection_are_unknown():
