@@ -1,3 +1,4 @@
+import gc
 import os
 import subprocess
 import sys
@@ -61,6 +62,44 @@ def test_unwritable_cache_costs_time_and_one_warning_but_no_result(monkeypatch, 
     if not numba.config.DISABLE_JIT:
         assert [warning.category for warning in caught] == [RuntimeWarning]
         assert "NUMBA_CACHE_DIR" in str(caught[0].message)
+
+
+@pytest.fixture
+def collector():
+    """Restores the state of the garbage collector."""
+    was_enabled = gc.isenabled()
+    yield
+    (gc.enable if was_enabled else gc.disable)()
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+@pytest.mark.parametrize("enabled", [True, False])
+def test_collector_is_off_during_a_compilation_and_afterwards_as_before(collector, enabled, monkeypatch, tmp_path):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))  # nothing is compiled yet
+    states = []
+
+    class Listener(event.Listener):
+        def on_start(self, event):
+            states.append(gc.isenabled())
+
+        def on_end(self, event):
+            states.append(gc.isenabled())
+
+    @compiled
+    def increased(x):
+        return x + 1
+
+    @compiled
+    def broken(x):
+        return x.nothing
+
+    (gc.enable if enabled else gc.disable)()
+    with event.install_listener("numba:compile", Listener()):
+        assert increased(2) == 3
+        assert states == [False, False] and gc.isenabled() == enabled
+        with pytest.raises(numba.core.errors.TypingError):
+            broken(2)
+    assert gc.isenabled() == enabled
 
 
 CALLEE = """
