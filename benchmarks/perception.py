@@ -24,7 +24,7 @@ from dorothie_gym.analysis.intervals import wilson_interval
 from dorothie_gym.camera.cells import sorted_by_cell
 from dorothie_gym.camera.mesh import empty_mesh
 from dorothie_gym.camera.scene_cache import town_scene
-from dorothie_gym.camera.scenery.signals import Lenses
+from dorothie_gym.camera.scenery.lenses import Lenses
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.camera.visibility import PERCEPTION_CAMERA, is_body_seen

@@ -181,25 +181,27 @@ def town_atlas() -> AtlasArrays:
     return TextureAtlas(pictures[texture] for texture in Texture if texture != Texture.PLAIN).arrays()
 
 
-def with_street_names(base: AtlasArrays, names: Sequence[str]) -> AtlasArrays:
-    """Returns the textures of a town, followed by the blades of its streets with the names of a session.
+@lru_cache(maxsize=1)
+def street_atlas() -> AtlasArrays:
+    """Returns the textures of `Texture`, followed by the blades of all street names of the ontology."""
+    return _with_blades(town_atlas(), list(_STREETS))
 
-    Sessions share the texels of the names of the ontology: only their tables differ.
+
+def with_street_names(base: AtlasArrays, names: Sequence[str]) -> AtlasArrays:
+    """Returns the textures of `Texture`, followed by the blades of streets.
+
+    Args:
+        base: textures. If it is that of `street_atlas`, sessions whose names are those of the ontology share its
+            texels, and only their tables differ.
+        names: of the streets of a session.
     """
-    if base is town_atlas() and all(name in _STREETS for name in names):
-        atlas, first = _atlas_of_streets(), len(base.table)
-        rows = [first + _STREETS[name] for name in names]
-        return AtlasArrays(atlas.texels, np.concatenate((base.table, atlas.table[rows])))
+    if len(base.table) == STREET_NAMES + len(_STREETS) and all(name in _STREETS for name in names):
+        rows = [*range(STREET_NAMES), *(STREET_NAMES + _STREETS[name] for name in names)]
+        return AtlasArrays(base.texels, base.table[rows])
     return _with_blades(base, names)
 
 
 _STREETS = {street.label: k for k, street in enumerate(StreetName)}
-
-
-@lru_cache(maxsize=1)
-def _atlas_of_streets() -> AtlasArrays:
-    """Returns the textures of a town, followed by the blades of all names of the ontology."""
-    return _with_blades(town_atlas(), list(_STREETS))
 
 
 def _with_blades(base: AtlasArrays, names: Sequence[str]) -> AtlasArrays:
@@ -207,6 +209,7 @@ def _with_blades(base: AtlasArrays, names: Sequence[str]) -> AtlasArrays:
         lettered(name or " ", SIGN_SIZE, ink=STREET_INK, ground=STREET_GROUND, rim=STREET_INK, margin=0.1)
         for name in names
     ).arrays()
+    own = base.texels[: base.table[STREET_NAMES, 0]] if len(base.table) > STREET_NAMES else base.texels
     table = blades.table[1:].copy()  # without the plain one
-    table[:, 0] += len(base.texels) - 1
-    return AtlasArrays(np.concatenate((base.texels, blades.texels[1:])), np.concatenate((base.table, table)))
+    table[:, 0] += len(own) - 1
+    return AtlasArrays(np.concatenate((own, blades.texels[1:])), np.concatenate((base.table[:STREET_NAMES], table)))

@@ -27,7 +27,6 @@ from dorothie_gym.camera.scene_drawing import draw_scene
 from dorothie_gym.camera.sensor_faults import apply_faults
 from dorothie_gym.camera.shading import shade
 from dorothie_gym.camera.shadows import draw_shadows, new_shadow_maps, turn_sun
-from dorothie_gym.camera.sky import sky_noise
 from dorothie_gym.camera.texturing import textures_of
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records, plain
 from dorothie_gym.copying import shared
@@ -50,6 +49,7 @@ class CameraScene:
         atlas: textures.
         lamps: light of street lamps.
         bank: models of bodies.
+        noise: (256, 256) of the sky, see `sky_noise`.
     """
 
     town: Mesh
@@ -58,6 +58,7 @@ class CameraScene:
     atlas: AtlasArrays
     lamps: LampMap
     bank: ModelBank
+    noise: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -185,8 +186,8 @@ class FirstPersonCamera:
             picture = np.empty((config.height, config.width, 3), np.uint8)
             shade(
                 view, optics_of(view, light, self._shadows, pose.tilt), self._buffer, config.samples, self.scene.town,
-                self._overlay, self._bodies, self.scene.ground, self._textures, light, sky_noise(), self.scene.lamps,
-                self._beams, self._shadows, self._samples, self._face, picture.reshape(-1, 3),
+                self._overlay, self._bodies, self.scene.ground, self._textures, light, self.scene.noise,
+                self.scene.lamps, self._beams, self._shadows, self._samples, self._face, picture.reshape(-1, 3),
             )  # fmt: skip
             if light.rainfall > 0.02:
                 add_rain(picture, light.rainfall, round(time * 30.0))

@@ -20,7 +20,7 @@ from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.camera.scene_cache import town_scene
-from dorothie_gym.camera.scenery.clearance import Lot
+from dorothie_gym.camera.scenery.lots import Lot
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.solid_boxes import SolidBoxes, solid_boxes
 from dorothie_gym.camera.town_scene import SessionScene, TownScene

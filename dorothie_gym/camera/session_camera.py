@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.first_person_camera import CameraFrame, FirstPersonCamera
-from dorothie_gym.camera.ground.lookup import GroundArrays, material_at
+from dorothie_gym.camera.ground.lookup import GROUND_SHEET, GroundArrays, material_at
 from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material, Relief
-from dorothie_gym.camera.ground.sheets import GROUND_SHEET
 from dorothie_gym.camera.models.model_bank import FIRST_PERSON, FIRST_PROP, PlacementRecord, place_bodies
 from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.camera.road_slopes import RoadSlopes, rise_at
-from dorothie_gym.camera.scenery.signals import LENS_OFF, LENS_ON
-from dorothie_gym.camera.town_scene import SessionScene, lens_rows
+from dorothie_gym.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows
+from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.compilation import concurrent
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records
 from dorothie_gym.maps.traffic_lights import LightColour, LightPhase

@@ -6,25 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
-from dorothie_gym.camera.atlas import STREET_NAMES, town_atlas, with_street_names
-from dorothie_gym.camera.cells import CellTable, sorted_by_cell
+from dorothie_gym.camera.assets import camera_assets
+from dorothie_gym.camera.atlas import STREET_NAMES, with_street_names
+from dorothie_gym.camera.cells import CellTable
 from dorothie_gym.camera.first_person_camera import CameraScene
-from dorothie_gym.camera.ground.town_ground import Ground, build_ground
-from dorothie_gym.camera.lighting import LampMap, lamp_map
+from dorothie_gym.camera.ground.ground import Ground
+from dorothie_gym.camera.lighting import LampMap
 from dorothie_gym.camera.mesh import Mesh, joined
-from dorothie_gym.camera.models.model_bank import model_bank
-from dorothie_gym.camera.road_slopes import RoadSlopes, road_slopes
-from dorothie_gym.camera.scenery.clearance import Lot
+from dorothie_gym.camera.road_slopes import RoadSlopes
 from dorothie_gym.camera.scenery.landmarks import build_landmarks
-from dorothie_gym.camera.scenery.signals import Lenses
-from dorothie_gym.camera.scenery.town_scenery import build_scenery
+from dorothie_gym.camera.scenery.lenses import Lenses
+from dorothie_gym.camera.scenery.lots import Lot
 from dorothie_gym.copying import shared
-from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightProgramme
-from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.tasks import Landmark
 
 
@@ -62,24 +56,6 @@ class TownScene:
         return sum(array.nbytes for part in parts for array in part)
 
 
-def build_town_scene(town: Town) -> TownScene:
-    """Returns the scene of a town; it depends on the town and its name only."""
-    ground = build_ground(town)
-    scenery = build_scenery(MapLayers(town), ground)
-    mesh, cells, _ = sorted_by_cell(joined([ground.mesh, scenery.mesh]))
-    return TownScene(
-        ground=Ground(mesh, ground.arrays),
-        mesh=mesh,
-        cells=cells,
-        signals=scenery.signals,
-        lenses=scenery.lenses,
-        lamps=lamp_map(scenery.lights.astype(np.float64)),
-        slopes=road_slopes(town),
-        lots=scenery.lots,
-        programmes=tuple(town.programmes),
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class SessionScene:
     """What a session adds to the scene of its town: the names of its streets, and its landmarks.
@@ -97,12 +73,12 @@ class SessionScene:
     @cached_property
     def camera_scene(self) -> CameraScene:
         """What a camera needs besides the overlay."""
-        town = self.town
+        town, assets = self.town, camera_assets()
         blades = int(town.mesh.textures.max(initial=0)) + 1 - STREET_NAMES
         names = [*self.street_names, *[""] * (blades - len(self.street_names))]
         return CameraScene(
-            town=town.mesh, cells=town.cells, ground=town.ground.arrays, lamps=town.lamps, bank=model_bank(),
-            atlas=with_street_names(town_atlas(), names),
+            town=town.mesh, cells=town.cells, ground=town.ground.arrays, lamps=town.lamps, bank=assets.bank,
+            atlas=with_street_names(assets.atlas, names), noise=assets.noise,
         )  # fmt: skip
 
     @cached_property
@@ -110,9 +86,3 @@ class SessionScene:
         """Signals and landmarks; the rows of signals come first."""
         town = self.town
         return joined([town.signals, build_landmarks(self.landmarks, town.lots, town.ground)])
-
-
-def lens_rows(lenses: Lenses, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Returns the triangles of some lenses."""
-    parts = [np.arange(first, last) for first, last in lenses.ranges[chosen].tolist()]
-    return np.concatenate([np.zeros(0, np.int64), *parts]).astype(np.int64)

@@ -27,6 +27,7 @@ from dorothie_gym.camera.mesh import MeshBuilder, Surface, empty_mesh
 from dorothie_gym.camera.models.model_bank import ModelBank, PlacementRecord
 from dorothie_gym.camera.models.vehicles import Lamps
 from dorothie_gym.camera.pose import CameraPose
+from dorothie_gym.camera.sky import sky_noise
 from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
@@ -62,8 +63,9 @@ def scene(builder: MeshBuilder, *, ground: bool = True, lamps: Array | None = No
     places = np.zeros((0, 3)) if lamps is None else lamps
     atlas = TextureAtlas([halves]).arrays()
     return CameraScene(
-        town=town, cells=cells, ground=ground_arrays([sheet]), atlas=atlas, lamps=lamp_map(places), bank=bank()
-    )
+        town=town, cells=cells, ground=ground_arrays([sheet]), atlas=atlas, lamps=lamp_map(places), bank=bank(),
+        noise=sky_noise(),
+    )  # fmt: skip
 
 
 def weather(**values: float) -> Weather:

@@ -11,8 +11,9 @@ import shapely
 
 from dorothie_gym.camera.atlas import BRAND_SIGNS, Texture
 from dorothie_gym.camera.mesh import Mesh, Surface
-from dorothie_gym.camera.scenery.clearance import Clearance, Lot
+from dorothie_gym.camera.scenery.clearance import Clearance
 from dorothie_gym.camera.scenery.landmarks import build_landmarks, landmark_form, landmark_key
+from dorothie_gym.camera.scenery.lots import Lot
 from dorothie_gym.camera.scenery.placing import FlatGround
 from dorothie_gym.maps.catalogue import load_town, town_names
 from dorothie_gym.maps.model import Array

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.camera import scene_cache
+from dorothie_gym.camera import scene_building
+from dorothie_gym.camera.scene_building import build_town_scene
 from dorothie_gym.camera.scene_cache import town_scene
-from dorothie_gym.camera.town_scene import TownScene, build_town_scene
+from dorothie_gym.camera.town_scene import TownScene
 from dorothie_gym.maps import Town, load_town
 
 
@@ -29,7 +30,7 @@ def builds(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
         return build_town_scene(town)
 
     monkeypatch.setenv("DOROTHIE_GYM_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(scene_cache, "build_town_scene", build)
+    monkeypatch.setattr(scene_building, "build_town_scene", build)
     town_scene.cache_clear()
     return built
 

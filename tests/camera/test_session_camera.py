@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.pose import CameraPose
+from dorothie_gym.camera.scene_building import build_town_scene
 from dorothie_gym.camera.scenery.landmarks import landmark_key
 from dorothie_gym.camera.session_camera import SessionCamera
-from dorothie_gym.camera.town_scene import SessionScene, TownScene, build_town_scene
+from dorothie_gym.camera.town_scene import SessionScene, TownScene
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import Town, load_town

@@ -27,10 +27,10 @@ from dorothie_gym.baselines.vision.object_learner import distinct_queries, focal
 from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
 from dorothie_gym.baselines.vision.segformer import SegFormer, normalised
 from dorothie_gym.baselines.vision.solids import spaces_of
+from dorothie_gym.camera.array_cache import builder_digest
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
-from dorothie_gym.camera.scene_cache import builder_digest
 from dorothie_gym.errors import CheckpointError, SessionError
 from dorothie_gym.files import replacing
 from dorothie_gym.maps import Town

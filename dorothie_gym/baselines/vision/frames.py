@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_radians
+from dorothie_gym.camera.array_cache import builder_digest
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
-from dorothie_gym.camera.scene_cache import builder_digest
 from dorothie_gym.camera.solid_boxes import SolidBoxes
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.files import PART

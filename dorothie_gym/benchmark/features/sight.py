@@ -35,7 +35,7 @@ class VisibleBoxes:
         Raises:
             SessionError: the sources cannot be read.
         """
-        from dorothie_gym.camera.scene_cache import builder_digest  # here: most features need no camera
+        from dorothie_gym.camera.array_cache import builder_digest  # here: most features need no camera
 
         if (digest := builder_digest()) is None:
             raise SessionError("the sources of the camera cannot be read; use the objects of the record")

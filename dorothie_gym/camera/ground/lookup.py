@@ -18,6 +18,9 @@ from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
 
+GROUND_SHEET = 0
+"""Sheet of the ground; others are bridges and tunnels."""
+
 SQUARES = 8
 """Squares along each side of a mixed cell."""
 
@@ -33,7 +36,7 @@ SEVERAL = 255
 class GroundArrays(NamedTuple):
     """Materials and colours of all sheets of ground.
 
-    Sheet 0 is the ground, others are bridges and tunnels. Cells of a sheet are numbered row by row.
+    Cells of a sheet are numbered row by row.
 
     Attributes:
         origins: (sheets, 2) positions of the first corners of the grids [m].

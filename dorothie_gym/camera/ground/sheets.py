@@ -22,8 +22,6 @@ BORDER = 80.0
 MAP_SCALE = 40.0
 """Scale of the map at which all its lines have their true widths [px/m]."""
 
-GROUND_SHEET = 0
-
 
 @dataclass(frozen=True, eq=False)
 class Sheet:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from dorothie_gym.camera.ground.heights import HeightField, Zone
-from dorothie_gym.camera.ground.lookup import GroundArrays, material_at
+from dorothie_gym.camera.ground.lookup import GROUND_SHEET, GroundArrays, material_at
 from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material
 from dorothie_gym.camera.ground.partition import Area, cut_areas
 from dorothie_gym.camera.ground.regions import GRID, footprint, only_areas, polygons_of, tidy
-from dorothie_gym.camera.ground.sheets import GROUND_SHEET, Sheet
+from dorothie_gym.camera.ground.sheets import Sheet
 from dorothie_gym.camera.ground.surface import (
     PORTAL_HEIGHT,
     ROOF,

@@ -1,21 +1,19 @@
-"""Ground of a town: mesh, lookup of materials and colours, and the height at a place."""
+"""Building of the ground of a town, from the polygons of its map to a mesh with heights."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from dorothie_gym.camera.ground.arrays import ground_arrays
+from dorothie_gym.camera.ground.ground import Ground
 from dorothie_gym.camera.ground.heights import HeightField
-from dorothie_gym.camera.ground.lookup import GroundArrays
+from dorothie_gym.camera.ground.lookup import GROUND_SHEET
 from dorothie_gym.camera.ground.partition import Area, Cut, cut_ground
 from dorothie_gym.camera.ground.regions import GRID, Regions, find_regions, only_areas, tidy
-from dorothie_gym.camera.ground.sheets import GROUND_SHEET, town_sheets
+from dorothie_gym.camera.ground.sheets import town_sheets
 from dorothie_gym.camera.ground.structures import (
     add_bridge,
     add_lids,
@@ -26,52 +24,10 @@ from dorothie_gym.camera.ground.structures import (
     tunnel_floors,
 )
 from dorothie_gym.camera.ground.surface import add_faces, add_sheet, find_edges, lifted
-from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface
-from dorothie_gym.maps.model import Array
+from dorothie_gym.camera.mesh import MeshBuilder
 from dorothie_gym.maps.town import Town
 
 _SLIVER = 0.05  # [m] width
-
-
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """Ground of a town.
-
-    Attributes:
-        mesh: surfaces of all sheets (`Surface.GROUND`, the texture is the sheet), kerbs, walls, bridges and tunnels.
-        arrays: lookup of materials and colours.
-    """
-
-    mesh: Mesh
-    arrays: GroundArrays
-
-    def height_at(self, points: ArrayLike, sheet: int = GROUND_SHEET) -> Array:
-        """Returns the height of a sheet (n,) at positions (n, 2) [m]; on pavements that of their kerbs.
-
-        NaN where the sheet has no surface: beyond the horizon, or beside a bridge.
-        """
-        places = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-        tree, corners = self._surfaces.get(sheet, (None, np.zeros((0, 3, 3))))
-        heights = np.full(len(places), -np.inf)
-        if tree is not None:
-            at, found = tree.query(shapely.points(places), predicate="intersects")
-            a, b, c = (corners[found, k] for k in range(3))
-            ab, ac, ap = b[:, :2] - a[:, :2], c[:, :2] - a[:, :2], places[at] - a[:, :2]
-            area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-            u = (ap[:, 0] * ac[:, 1] - ap[:, 1] * ac[:, 0]) / area
-            v = (ab[:, 0] * ap[:, 1] - ab[:, 1] * ap[:, 0]) / area
-            np.maximum.at(heights, at, a[:, 2] + u * (b[:, 2] - a[:, 2]) + v * (c[:, 2] - a[:, 2]))
-        return np.where(np.isfinite(heights), heights, np.nan)
-
-    @cached_property
-    def _surfaces(self) -> dict[int, tuple[shapely.STRtree, Array]]:
-        """Triangles of each sheet, by place."""
-        found = {}
-        ground = self.mesh.surfaces & int(Surface.GROUND) != 0
-        for sheet in np.unique(self.mesh.textures[ground]).tolist():
-            corners = self.mesh.corners[ground & (self.mesh.textures == sheet)].astype(np.float64)
-            found[sheet] = shapely.STRtree(shapely.polygons(corners[..., :2])), corners
-        return found
 
 
 def build_ground(town: Town) -> Ground:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.mesh import oriented
-from dorothie_gym.copying import shared
+from dorothie_gym.camera.scenery.lots import Lot
 from dorothie_gym.maps.model import Array, Site
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
@@ -50,38 +48,6 @@ def rectangles(centres: Array, headings: Array, lengths: Array, widths: Array) -
     cos, sin = np.cos(headings)[:, None], np.sin(headings)[:, None]
     x, y = local[..., 0] * cos - local[..., 1] * sin, local[..., 0] * sin + local[..., 1] * cos
     return np.asarray(shapely.polygons(np.stack((x, y), axis=-1) + centres[:, None]), dtype=np.object_)
-
-
-@shared
-@dataclass(frozen=True)
-class Lot:
-    """Ground reserved for the landmark of a site.
-
-    Attributes:
-        site: id of the site.
-        place: position of the site (x, y) [m].
-        heading: direction of somebody who looks at it from its street [rad].
-        front: middle of its front edge (x, y) [m].
-        length: along the street [m].
-        depth: away from the street [m].
-    """
-
-    site: int
-    place: tuple[float, float]
-    heading: float
-    front: tuple[float, float]
-    length: float
-    depth: float
-
-    def at(self, deep: float, right: float) -> tuple[float, float]:
-        """Returns the world position (x, y) [m] of a place in the lot: behind its front, to the right of the middle."""
-        ((x, y),) = oriented([(deep, right)], self.front, self.heading).tolist()
-        return x, y
-
-    @property
-    def middle(self) -> tuple[float, float]:
-        """Middle of the lot (x, y) [m]."""
-        return self.at(self.depth / 2.0, 0.0)
 
 
 class Clearance:

@@ -17,7 +17,7 @@ from dorothie_gym.camera.atlas import BRAND_SIGNS, Texture
 from dorothie_gym.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface, joined, oriented
 from dorothie_gym.camera.models.people import STANDING, Look, Outfit, person_form
 from dorothie_gym.camera.models.solids import ModelBuilder, Rgb, Slot, dressed
-from dorothie_gym.camera.scenery.clearance import Lot
+from dorothie_gym.camera.scenery.lots import Lot
 from dorothie_gym.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import LandmarkName, ObjectClass

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from dorothie_gym.camera.atlas import STREET_NAMES, Texture
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface, joined
 from dorothie_gym.camera.scenery.clearance import Clearance, free_of
+from dorothie_gym.camera.scenery.lenses import LENS_OFF, Lenses
 from dorothie_gym.camera.scenery.placing import Heights, stamped
 from dorothie_gym.maps.model import NO_STREET, Array, Lane, SignalKind
 from dorothie_gym.maps.town import Town
@@ -19,14 +19,6 @@ from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.rendering.map_layers import MapLayers, Post
 from dorothie_gym.rendering.shapes import disc
 from dorothie_gym.sim.state.codes import Colour
-
-LENS_ON: dict[Colour, tuple[int, int, int]] = {
-    Colour.GREEN: (70, 255, 130), Colour.YELLOW: (255, 196, 40), Colour.RED: (255, 52, 40),
-}  # fmt: skip
-LENS_OFF: dict[Colour, tuple[int, int, int]] = {
-    Colour.GREEN: (10, 38, 22), Colour.YELLOW: (46, 34, 10), Colour.RED: (48, 10, 8),
-}  # fmt: skip
-"""Colours of the lenses of traffic lights that are on and off."""
 
 _HEAD = 3.4  # [m] height of the middle of a traffic light
 _LENS, _BETWEEN = 0.2, 0.46  # [m] radius of a lens, distance of two
@@ -40,20 +32,6 @@ _OTHER_LEVEL = 2.5  # [m] between a road and the ground above or below it
 _STRAIGHT = 45  # [degrees] largest turn of a way straight on
 _FAR, _FAR_ASIDE = 1.5, 1.3  # [m] from the beginning and from the edge of the exit to a repeated light
 _HEADS_APART = 1.5  # [m] between lights
-
-
-class Lenses(NamedTuple):
-    """Triangles of a mesh that show the state of traffic lights.
-
-    Attributes:
-        ranges: (n, 2) first triangle of each lens and the one after its last.
-        signals: (n,) id of the signal in the town.
-        colours: (n,) `Colour` that it shows.
-    """
-
-    ranges: NDArray[np.int32]
-    signals: NDArray[np.int32]
-    colours: NDArray[np.int32]
 
 
 class _Head(NamedTuple):

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from dorothie_gym.camera.mesh import Mesh, joined
 from dorothie_gym.camera.scenery.buildings import build_buildings, plan_buildings
-from dorothie_gym.camera.scenery.clearance import Clearance, Lot
+from dorothie_gym.camera.scenery.clearance import Clearance
+from dorothie_gym.camera.scenery.lenses import Lenses
+from dorothie_gym.camera.scenery.lots import Lot
 from dorothie_gym.camera.scenery.placing import Heights
-from dorothie_gym.camera.scenery.signals import Lenses, build_blades, build_signals, plan_blades
+from dorothie_gym.camera.scenery.signals import build_blades, build_signals, plan_blades
 from dorothie_gym.camera.scenery.street_lamps import build_lamps, lamp_places
 from dorothie_gym.camera.scenery.trees import build_trees
 from dorothie_gym.rendering.map_layers import MapLayers

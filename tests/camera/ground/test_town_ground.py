@@ -7,9 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from dorothie_gym.camera.ground import Ground, GroundArrays, build_ground
-from dorothie_gym.camera.ground.lookup import materials_at
+from dorothie_gym.camera.ground.ground import Ground
+from dorothie_gym.camera.ground.lookup import GroundArrays, materials_at
 from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material, Relief
+from dorothie_gym.camera.ground.town_ground import build_ground
 from dorothie_gym.camera.mesh import Mesh, Surface
 from dorothie_gym.maps.catalogue import load_town, town_names
 from dorothie_gym.maps.model import Array

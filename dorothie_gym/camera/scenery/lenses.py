@@ -1,0 +1,38 @@
+"""Lenses of traffic lights: the triangles that show their state, and the colours of these."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.sim.state.codes import Colour
+
+LENS_ON: dict[Colour, tuple[int, int, int]] = {
+    Colour.GREEN: (70, 255, 130), Colour.YELLOW: (255, 196, 40), Colour.RED: (255, 52, 40),
+}  # fmt: skip
+LENS_OFF: dict[Colour, tuple[int, int, int]] = {
+    Colour.GREEN: (10, 38, 22), Colour.YELLOW: (46, 34, 10), Colour.RED: (48, 10, 8),
+}  # fmt: skip
+"""Colours of the lenses of traffic lights that are on and off."""
+
+
+class Lenses(NamedTuple):
+    """Triangles of a mesh that show the state of traffic lights.
+
+    Attributes:
+        ranges: (n, 2) first triangle of each lens and the one after its last.
+        signals: (n,) id of the signal in the town.
+        colours: (n,) `Colour` that it shows.
+    """
+
+    ranges: NDArray[np.int32]
+    signals: NDArray[np.int32]
+    colours: NDArray[np.int32]
+
+
+def lens_rows(lenses: Lenses, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Returns the triangles of some lenses."""
+    parts = [np.arange(first, last) for first, last in lenses.ranges[chosen].tolist()]
+    return np.concatenate([np.zeros(0, np.int64), *parts]).astype(np.int64)
