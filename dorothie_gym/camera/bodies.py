@@ -36,7 +36,7 @@ def copy_bodies(
     count, room = 0, target.corners.shape[0]
     for k in range(len(bodies)):
         body = bodies[k]
-        _surround(body, boxes[body.model], box)
+        surround(body, boxes[body.model], box)
         if is_in_view(view, box[0], box[1]) and not is_hidden(view, tiles, box[0], box[1]):
             first, last = ranges[body.model, 0], ranges[body.model, 1]
             if count + last - first <= room:
@@ -47,7 +47,7 @@ def copy_bodies(
 
 
 @inlined
-def _surround(body: PlacementRecord, model: NDArray[np.float32], box: Array) -> None:
+def surround(body: PlacementRecord, model: NDArray[np.float32], box: Array) -> None:
     """Writes a box around a body in every direction."""
     x, y = max(abs(model[0, 0]), abs(model[1, 0])), max(abs(model[0, 1]), abs(model[1, 1]))
     radius = math.sqrt(x * x + y * y)

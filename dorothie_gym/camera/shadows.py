@@ -129,12 +129,18 @@ def _draw_tiles(
             if held[0] != column or held[1] != row:
                 held[0], held[1] = column, row
                 left, top = (column % _TILES) * _TILE, (row % _TILES) * _TILE
+                for j in range(top, top + _TILE):
+                    _empty(maps.town[j, left : left + _TILE])
                 tile = maps.town[top : top + _TILE, left : left + _TILE]
-                for j in range(_TILE):
-                    for i in range(_TILE):
-                        tile[j, i] = _NOTHING
                 _draw_tile(maps, tile, town, town_cells, column, row)
                 _draw_tile(maps, tile, overlay, overlay_cells, column, row)
+
+
+@inlined
+def _empty(row: NDArray[np.int16]) -> None:
+    """Empties a row of a map, whose squares lie side by side: the compiler makes vectors of it."""
+    for k in range(len(row)):
+        row[k] = _NOTHING
 
 
 @compiled
@@ -165,8 +171,7 @@ def _draw_bodies(maps: ShadowMaps, bank: Mesh, ranges: NDArray[np.int32], bodies
     squares = maps.bodies[0:_BODIES, 0:_BODIES]  # a part, as tiles are: `_cast` is compiled once
     first, reach = maps.window, 0.5 * _BODIES * TEXEL
     for y in range(_BODIES):
-        for x in range(_BODIES):
-            squares[y, x] = _NOTHING
+        _empty(maps.bodies[y])
     for k in range(len(bodies)):
         body = bodies[k]
         across = abs(body.x - maps.slope[0] * body.z - first[2] * TEXEL - reach)
