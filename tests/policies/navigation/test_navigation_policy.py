@@ -39,9 +39,9 @@ def test_obedient_driver_completes_tasks_by_dialogue(seed: int, observe_acts: bo
 def test_observation_equals_that_of_training(town: str, guidance: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The vector depends only on the Co-Wizard's observation, in both environments."""
     learning = NavigationEnv(town, guidance=guidance, exceptions=4.0)
-    observation, info = learning.reset(seed=3)
+    observation, info = learning.reset(seed=4)
     playing = DuoWizardEnv(learning.town, config=learning.config.session_config)
-    observations, _ = playing.reset(seed=3)
+    observations, _ = playing.reset(seed=4)
     viewpoint = NavigationEncoder(learning.town, JunctionExits(learning.town), learning.config.max_seconds)
     session, exits = learning.session, JunctionExits(learning.town)
     others: dict[str, Any] = {}
@@ -142,7 +142,7 @@ def test_speed_and_lights_are_set_on_request() -> None:
 def test_estimated_mask_agrees_with_environment() -> None:
     env = NavigationEnv(guidance="goals", traffic="medium")
     same = total = 0
-    for seed in range(4):
+    for seed in range(10, 18):
         observation, info = env.reset(seed=seed)
         likely = EstimatedActionMask(env.town)
         for _ in range(80):
