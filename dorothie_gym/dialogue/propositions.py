@@ -115,7 +115,7 @@ class Predicate(enum.StrEnum):
     ORDER = "order"
     """An errand comes before another one."""
     PURPOSE = "purpose"
-    """What an errand is for, with the person and the item that it concerns."""
+    """What an errand is for and why, with the person and the item that it concerns."""
     GOAL = "goal"
     """The landmark that the car is to go to now."""
     TOLD = "told"
@@ -172,7 +172,7 @@ PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
         Predicate.BEHIND: _PLACE,
         Predicate.TASK: {**_PLACE, "status": GoalStatus},
         Predicate.ORDER: {"place": LandmarkName, "then": LandmarkName},
-        Predicate.PURPOSE: {**_PLACE, "purpose": str, "person": str, "item": str},
+        Predicate.PURPOSE: {**_PLACE, "purpose": str, "person": str, "item": str, "reason": str},
         Predicate.GOAL: {**_PLACE, "street": StreetName},
         Predicate.TOLD: _ACTION,
         Predicate.BECAUSE: {"effect": _ANY, "cause": _ANY, "at": int},

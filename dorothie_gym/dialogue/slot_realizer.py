@@ -264,6 +264,7 @@ _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
         "purpose": lambda realizer: str(realizer.argument("purpose")),
         "person": lambda realizer: str(realizer.argument("person")),
         "item": lambda realizer: str(realizer.argument("item")),
+        "reason": lambda realizer: str(realizer.argument("reason")),
     }
 )
 

@@ -13,7 +13,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Span, SpeakerStyle, Wording, WordingContext, draw_style, word_acts
+from dorothie_gym.dialogue import (
+    Direction,
+    Predicate,
+    Proposition,
+    Span,
+    SpeakerStyle,
+    Wording,
+    WordingContext,
+    draw_style,
+    word_acts,
+)
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -25,6 +35,11 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
+from dorothie_gym.policies.participant.goals import LONGEST_REASON
+from dorothie_gym.tasks import load_template, template_names
+from dorothie_gym.tasks.catalogue import catalogue
+from dorothie_gym.tasks.purposes import in_first_person, read_purpose
+from dorothie_gym.tasks.storyboard import fill
 
 M = DialogueMove
 HUMAN = {
@@ -52,6 +67,25 @@ OBJECTS = [*COMMON, *(value for value in ObjectClass if value not in COMMON)]
 TOPICS = ["fog", "rain", "night", "blocked", "wrong_way", "arrived", "plan", "refused", "failed"]
 
 
+@functools.cache
+def errands() -> tuple[Wording, ...]:
+    """What participants tell of the errands of the shipped storyboards."""
+    rng = np.random.default_rng(0)
+    found = []
+    for template in map(load_template, template_names()):
+        values = {row.name: "the place" for row in template.variables}
+        for row in template.dependents:
+            listed = [value for kind in catalogue().values() for value in kind.attributes.get(row.attribute, ())]
+            values[row.name] = listed[int(rng.integers(len(listed)))]
+        for subgoal in template.subgoals:
+            told = read_purpose(fill(subgoal.description, values))
+            for topic, text in (("purpose", told.action), ("reason", subgoal.reason)):
+                if text is not None and len(text) <= LONGEST_REASON:
+                    content = Proposition.of(Predicate.PURPOSE, **{topic: in_first_person(fill(text, values))})
+                    found.append(Wording(topic=topic, content=content))
+    return tuple(found)
+
+
 class Sampler:
     """Sampler of dialogue acts with the details of their wording."""
 
@@ -72,6 +106,8 @@ class Sampler:
         values: list[SlotValue] = []
         bare = 0.12 if move is M.INSTRUCT else 0.62
         if move in (M.IRRELEVANT, M.ALIGN, M.CONFUSE) or rng.random() < bare:
+            if move is M.EXPLAIN and human and rng.random() < 0.25:
+                return DialogueAct.of(move), self.one_of(errands())
             topic = {M.ACKNOWLEDGE: ["sorry", "align", None], M.EXPLAIN: [None, *TOPICS]}.get(move, [None])
             return DialogueAct.of(move), Wording(topic=self.one_of(topic) if rng.random() < 0.5 else None)
         drawn = rng.random()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -18,6 +19,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
 from dorothie_gym.recording import Corpus, EventType, MoveRecord, Session
+from dorothie_gym.tasks.purposes import find_items, read_people
 
 TALKED_ABOUT_WITHIN: Final = 45.0
 """Time within which an exception is talked about [s]."""
@@ -45,6 +47,7 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
         "arrival_times": "arrival times within a factor of 1.5",
         "yes_no_answers": "yes and no that are right",
         "relevance": "answers to what was asked",
+        "story": "sessions that mention somebody or something of the story",
         "loops": "sessions without an order given three times in a row",
     }
 )
@@ -109,6 +112,7 @@ def check_session(checks: TalkChecks, session: Session, town: Town | None) -> No
         _check_claims(checks, SessionWorld(session, town))
     _check_answers(checks, session)
     _check_exceptions(checks, session)
+    checks.add("story", mentions_story(session))
     checks.add("loops", not has_loop(session))
 
 
@@ -172,6 +176,17 @@ def _check_exceptions(checks: TalkChecks, session: Session) -> None:
             continue
         name = str(event.data.get("sensor") or event.data.get("weather") or kind.name.lower())
         checks.add(_EXCEPTIONS + name, talked.get(id(event), math.inf) - event.time <= TALKED_ABOUT_WITHIN)
+
+
+def mentions_story(session: Session) -> bool | None:
+    """Returns whether somebody says a name or a thing of the story; None if the story has neither."""
+    texts = (session.header.story, *(str(row["description"]) for row in session.header.subgoals))
+    things = (item for text in texts for item in find_items(text))
+    wanted = {words.casefold() for words in (*read_people(*texts), *things)}
+    if not wanted:
+        return None
+    said = " ".join(move.span for move in session.moves()).casefold()
+    return any(re.search(rf"\b{re.escape(words)}\b", said) for words in wanted)
 
 
 def has_loop(session: Session) -> bool:

@@ -214,7 +214,7 @@ class SessionWorld:
 
 
 ACTORS: Final = {
-    ObjectClass.VEHICLES: (ActorKind.VEHICLE,),
+    ObjectClass.VEHICLES: (ActorKind.VEHICLE, ActorKind.CYCLIST),
     ObjectClass.PEDESTRIAN: (ActorKind.PEDESTRIAN,),
     ObjectClass.STATIC: (ActorKind.PROP,),
 }

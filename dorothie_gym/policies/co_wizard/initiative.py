@@ -263,14 +263,13 @@ def _notice_crowd(state: CoWizardState, view: CoWizardView, rng: np.random.Gener
 
 
 def _mention_localization(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Reports once that the position is only estimated by dead reckoning, and when it is measured again."""
-    config, failed = state.config, state.dialogue.lost_mentioned
-    if failed and is_localised(view, config.found_variance):
+    """Reports once that the position is only estimated by dead reckoning."""
+    config, mentioned = state.config, state.dialogue.lost_mentioned
+    if mentioned and is_localised(view, config.found_variance):
         state.dialogue = state.dialogue.with_lost_mentioned(False)
-    elif not failed and not is_localised(view, config.gps_variance):
+    elif not mentioned and not is_localised(view, config.gps_variance):
         state.dialogue = state.dialogue.with_lost_mentioned(True)
-    if state.dialogue.lost_mentioned is not failed:
-        outage = Proposition.of(Predicate.FAILED, negated=failed, sensor=Sensor.GPS)
+        outage = Proposition.of(Predicate.FAILED, sensor=Sensor.GPS)
         state.say(intend(CommunicativeFunction.INFORM, outage))
 
 

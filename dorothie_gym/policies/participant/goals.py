@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import Wording
+from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
 from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import (
     ActionValue,
@@ -22,7 +22,8 @@ from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
-from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.speech import Remark, intend, remark
+from dorothie_gym.tasks.purposes import Purpose, read_purposes
 
 _FAMOUS = frozenset(LandmarkName) - {
     LandmarkName.HOUSE,
@@ -237,11 +238,36 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
     return remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic=topic))
 
 
-def reason_topic(state: ParticipantState) -> str | None:
-    """Returns the topic of a reason to go to the target: a purpose such as shopping, or a visit."""
-    if state.task.goal is None:
-        return None
-    return "visit" if state.task.goal.name in (LandmarkName.HOUSE, LandmarkName.PERSON) else "purpose"
+LONGEST_REASON = 48
+"""Longest purpose or reason that is said [characters]."""
+
+
+def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns what the target is for, or why it matters, as the story tells; nothing where the story does not."""
+    told, goal = _purpose(state, view), state.task.goal
+    if told is None or goal is None:
+        return ()
+    options = {
+        topic: text
+        for topic, text in (("purpose", told.action), ("reason", told.reason))
+        if text is not None and len(text) <= LONGEST_REASON
+    }
+    if not options:
+        return ()
+    topic = list(options)[int(rng.integers(len(options)))]
+    item = told.items[0] if told.items else None
+    said = Proposition.of(
+        Predicate.PURPOSE, place=goal.name, purpose=options.get("purpose") if topic == "purpose" else None,
+        reason=options.get("reason") if topic == "reason" else None, person=told.person, item=item,
+    )  # fmt: skip
+    return (intend(CommunicativeFunction.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
+
+
+def _purpose(state: ParticipantState, view: ParticipantView) -> Purpose | None:
+    """Returns the purpose of the target; None without a target, or if the list does not tell."""
+    live = [subgoal.index for subgoal in view.subgoals if subgoal.live]
+    purposes = read_purposes(str(view.raw["tasks"]))
+    return dict(zip(live, purposes, strict=False)).get(-1 if state.task.target is None else state.task.target)
 
 
 def _say_announcement(
@@ -250,14 +276,11 @@ def _say_announcement(
     """Names the target, perhaps with a reason, and perhaps a later task."""
     words = replace(announcement(state, view, rng), joined=same_breath)
     draw = rng.random()
-    if draw < state.style.reasons:
-        reason = remark(DialogueMove.EXPLAIN, joined=same_breath, wording=Wording(topic=reason_topic(state)))
-        state.say(reason, replace(words, joined=True))
-    elif draw < 1.6 * state.style.reasons:
-        reason = remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic=reason_topic(state)))
-        state.say(words, reason)
+    reason = story_remark(state, view, rng) if draw < 1.6 * state.style.reasons else ()
+    if draw < state.style.reasons and reason:
+        state.say(replace(reason[0], joined=same_breath), replace(words, joined=True))
     else:
-        state.say(words)
+        state.say(words, *reason)
     goal, target = state.task.goal, state.task.target
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != target]
     named = [mark for mark in later if mark is not None and goal is not None and mark.name is not goal.name]

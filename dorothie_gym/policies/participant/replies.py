@@ -21,7 +21,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.observation_parser import SeenSubgoal, heard_utterance
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
-from dorothie_gym.policies.participant.goals import announcement, describe, reason_topic, route_length, switch_target
+from dorothie_gym.policies.participant.goals import announcement, describe, route_length, story_remark, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import correction, has_missed
@@ -91,7 +91,7 @@ def _check(
         return
     if landmarks:
         state.set_guiding(False)  # the car knows the place
-    state.say_first(remark(DialogueMove.CONFIRM), *_addition(state, rng))
+    state.say_first(remark(DialogueMove.CONFIRM), *_addition(state, view, rng))
 
 
 def _fits(
@@ -112,12 +112,13 @@ def _fits(
     return bool(actions & meant) and (wanted is None or words.direction is wanted)
 
 
-def _addition(state: ParticipantState, rng: np.random.Generator) -> tuple[Remark, ...]:
+def _addition(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns a hint or reason to add to an answer, or nothing, by chance."""
     if rng.random() >= state.style.reasons:
         return ()
-    topic = "hint" if state.guidance.guiding or rng.random() < 0.5 else reason_topic(state)
-    return (remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic=topic)),)
+    if state.guidance.guiding or rng.random() < 0.5:
+        return (remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic="hint")),)
+    return story_remark(state, view, rng)
 
 
 def _refuse_with_step(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -161,7 +162,7 @@ def _yes_or_no(
     elif rng.random() < state.config.unsure:
         state.say_first(remark(DialogueMove.REPLY_U), remark(DialogueMove.REPLY_Y))
     else:
-        state.say_first(remark(DialogueMove.REPLY_Y), *_addition(state, rng))
+        state.say_first(remark(DialogueMove.REPLY_Y), *_addition(state, view, rng))
 
 
 def _offered_subgoal(
@@ -212,7 +213,7 @@ def _answer_proposal(
     if step is not None:
         note_step(state, view, step[0])
     first = (remark(DialogueMove.REPLY_U),) if rng.random() < state.config.unsure else ()
-    state.say_first(*first, remark(DialogueMove.REPLY_Y), *_addition(state, rng))
+    state.say_first(*first, remark(DialogueMove.REPLY_Y), *_addition(state, view, rng))
 
 
 # --- open questions -------------------------------------------------------------------------------------------------
@@ -233,7 +234,7 @@ def _open_question(
     elif landmarks == (LandmarkName.QUERIED,):
         named_lately = view.time - state.task.announced_at < state.config.just_said
         if not named_lately and not _was_just_named(state, view):
-            _name_target(state, view, rng, *_addition(state, rng))
+            _name_target(state, view, rng, *_addition(state, view, rng))
     elif actions:
         if not _was_just_named(state, view):
             state.set_guiding(True)
@@ -280,7 +281,7 @@ def _name_step(state: ParticipantState, view: ParticipantView, move: DialogueMov
     if answers and state.guidance.step == key and view.time - state.guidance.step_at < state.config.just_said:
         return  # the question was asked during the answer
     note_step(state, view, key)
-    state.say_only(words, *(_addition(state, rng) if answers else ()))
+    state.say_only(words, *(_addition(state, view, rng) if answers else ()))
 
 
 # --- other moves ----------------------------------------------------------------------------------------------------
@@ -337,7 +338,7 @@ def _nod(state: ParticipantState, view: ParticipantView, rng: np.random.Generato
     elif not alone or not state.speech.idle or (state.guidance.guiding and about_to_arrive(state, view)):
         return
     elif rng.random() < state.style.nods:
-        state.say(remark(DialogueMove.ACKNOWLEDGE), *_addition(state, rng))
+        state.say(remark(DialogueMove.ACKNOWLEDGE), *_addition(state, view, rng))
 
 
 def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:
