@@ -40,10 +40,10 @@ within 15 degrees of the horizon, or stands elsewhere than at noon."""
 
 OVER: Final = 0.6
 
-CROWD_DISTANCE: Final = 40.0
+CROWD_DISTANCE: Final = 50.0
 """Distance within which a crowd is noticed [m]."""
 
-CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTRIAN: 4, ObjectClass.VEHICLES: 5})
+CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTRIAN: 3, ObjectClass.VEHICLES: 4})
 """Least number of objects in a crowd."""
 
 CROWD_INTERVAL: Final = 60.0

@@ -17,6 +17,7 @@ from dorothie_gym.maps.routing import Place, router
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import (
     ActionValue,
+    DialogueMove,
     GoalStatus,
     LandmarkName,
     ObjectClass,
@@ -29,6 +30,8 @@ from dorothie_gym.recording import FRAME_RATE, Event, EventType, Session
 from dorothie_gym.recording.header import LandmarkRow
 from dorothie_gym.recording.surroundings import ActorKind
 
+_NAMING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
+_OVER: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE, GoalStatus.PENDING})
 STANDING_SPEED: Final = 0.5  # [m/s]
 _LIGHT_SIGHT: Final = 60.0  # distance of the light that a standing car waits for [m]
 
@@ -109,7 +112,7 @@ class SessionWorld:
         switched = [
             action.up
             for action in self.session.physical_actions
-            if action.action is PhysicalAction.LIGHT_CHANGE and action.frame <= time * FRAME_RATE
+            if action.action is PhysicalAction.LIGHT_CHANGE and action.frame < time * FRAME_RATE
         ]
         return bool(switched and switched[-1])
 
@@ -207,10 +210,15 @@ class SessionWorld:
         )
 
     def goal_named(self, time: float) -> bool:
-        """Returns whether the participant has named a place to go to since the last task was finished."""
+        """Returns whether the participant has named a place to go to since the last change of a task."""
         since = max((event.time for event in self.changes if event.time <= time), default=0.0)
-        named = (move for move in self.session.moves(Role.PARTICIPANT) if since - 1.0 <= move.end <= time)
-        return any(isinstance(value, LandmarkName) for move in named for value in move.act.slots)
+        named = (move for move in self.session.moves(Role.PARTICIPANT) if since <= move.start and move.end <= time)
+        return any(
+            isinstance(value, LandmarkName)
+            for move in named
+            if move.act.move in _NAMING and not _OVER & move.act.slots
+            for value in move.act.slots
+        )
 
 
 ACTORS: Final = {

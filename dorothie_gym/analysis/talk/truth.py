@@ -21,8 +21,8 @@ from dorothie_gym.ontology import (
 CLOSE, FAR = 130.0, 200.0
 """Ways up to the first length count as short, and from the second on as long [m]; in between, both may be said."""
 
-SIGHT: Final = 120.0
-"""Largest distance of an actor that can be seen [m]."""
+PLAIN_SIGHT, SIGHT = 20.0, 120.0
+"""An actor within the first distance is seen, one beyond the second is not [m]; in between it may be hidden."""
 
 TIME_FACTOR: Final = 1.5
 """Largest ratio of a claimed and an actual time that agree; times up to `SHORT_TIME` agree in any case."""
@@ -30,7 +30,7 @@ TIME_FACTOR: Final = 1.5
 SHORT_TIME: Final = 15.0
 """Differences of times that nobody minds [s]."""
 
-_FOG, _RAIN = 30.0, 50.0  # densities from which on the view may be called poor [%]
+_FOG, _RAIN, _SUN = (25.0, 40.0), (45.0, 60.0), (-3.0, 6.0)  # where the view may be called good or poor [%, degrees]
 _NOW: Final = 4.0  # time within which "now" may lie [s]
 _FADING: Final = 16  # time for which a fault is felt after its end [s]
 _CHANGED: Final = 0.15  # share of a parameter's range that is a change
@@ -84,7 +84,7 @@ def _sees(world: SessionWorld, said: Proposition, time: float, speaker: Role) ->
     if actors is None:
         return None
     nearest = min(world.distance_of(time + shift, actors) for shift in (-_NOW, -2.0, 0.0))
-    return nearest <= SIGHT
+    return True if nearest <= PLAIN_SIGHT else False if nearest > SIGHT else None
 
 
 def _on_street(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
@@ -132,12 +132,16 @@ def _knows(world: SessionWorld, said: Proposition, time: float, speaker: Role) -
 
 
 def _visibility(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    faulty = world.failed(time, Sensor.BLUR) or world.failed(time, Sensor.VIEW)
+    if faulty:
+        return None
     fog, rain = (
         world.weather(time, parameter) for parameter in (WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION)
     )
-    dark = world.weather(time, WeatherParameter.SUN_ALTITUDE_ANGLE) < 5.0
-    faulty = world.failed(time, Sensor.BLUR) or world.failed(time, Sensor.VIEW)
-    return not (fog > _FOG or rain > _RAIN or dark or faulty)
+    sun = world.weather(time, WeatherParameter.SUN_ALTITUDE_ANGLE)
+    if fog > _FOG[1] or rain > _RAIN[1] or sun < _SUN[0]:
+        return False
+    return True if fog < _FOG[0] and rain < _RAIN[0] and sun > _SUN[1] else None
 
 
 def _arrived(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:

@@ -170,5 +170,5 @@ class CoWizardStyle:
             reassures=float(rng.uniform(0.0, 0.3)),
             pace=int(rng.choice((30, 35, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
-            notices=float(rng.uniform(0.3, 0.9)),
+            notices=float(rng.uniform(0.4, 0.95)),
         )

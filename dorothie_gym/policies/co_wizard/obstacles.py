@@ -32,7 +32,7 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
     if place is None or state.route.knows_roadblock(place):
         return
     state.route = state.route.with_roadblock(state.town, place)
-    state.dialogue = state.dialogue.after_explaining_hazard(view.time)
+    state.dialogue = state.dialogue.after_finding_obstacle(view.time)
     obstacle = Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC, prop=thing.prop)
     blocked = intend(CommunicativeFunction.INFORM, obstacle, urgent=True)
     state.speech = state.speech.cleared().plan(blocked)

@@ -68,6 +68,7 @@ class DialogueState:
         proposed: turn proposed to the participant and not answered yet.
         offer: place proposed as the first destination and not answered yet.
         proposes_slowing: whether a proposal to slow down has not been answered yet.
+        blocked_at: time at which an obstacle across the road was last found [s].
         detour_asked_at: time of the open question about a detour [s]; None where none is open.
         hazard_explained_at: time of the last explanation of a hazard [s].
         weather_mentioned: whether the present bad weather has been mentioned.
@@ -87,6 +88,7 @@ class DialogueState:
     proposed: Directive | None = None
     offer: LandmarkName | None = None
     proposes_slowing: bool = False
+    blocked_at: float = -math.inf
     detour_asked_at: float | None = None
     hazard_explained_at: float = -math.inf
     weather_mentioned: bool = False
@@ -145,6 +147,10 @@ class DialogueState:
     def with_detour_question(self, asked_at: float | None) -> DialogueState:
         """Opens the question about a detour at a time [s]; None closes it."""
         return replace(self, detour_asked_at=asked_at)
+
+    def after_finding_obstacle(self, now: float) -> DialogueState:
+        """Records that an obstacle across the road was found and explained at `now` [s]."""
+        return replace(self, blocked_at=now, hazard_explained_at=now)
 
     def after_explaining_hazard(self, now: float) -> DialogueState:
         """Records that a hazard was explained at `now` [s]."""

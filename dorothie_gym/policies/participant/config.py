@@ -185,5 +185,5 @@ class ParticipantStyle:
             nods=float(rng.uniform(0.5, 0.85)),
             curious=float(rng.uniform(0.02, 0.25)),
             puzzled=float(rng.uniform(0.0, 0.35)),
-            notices=float(rng.uniform(0.4, 1.0)),
+            notices=float(rng.uniform(0.5, 1.0)),
         )

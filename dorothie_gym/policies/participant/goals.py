@@ -238,8 +238,11 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
     return remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic=topic))
 
 
-LONGEST_REASON = 48
+LONGEST_REASON = 55
 """Longest purpose or reason that is said [characters]."""
+
+PURPOSES = 0.75
+"""Probability that an errand is explained by what it is for rather than by why it matters."""
 
 
 def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
@@ -254,7 +257,8 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
     }
     if not options:
         return ()
-    topic = list(options)[int(rng.integers(len(options)))]
+    prefers = "purpose" if rng.random() < PURPOSES else "reason"
+    topic = prefers if prefers in options else next(iter(options))
     item = told.items[0] if told.items else None
     said = Proposition.of(
         Predicate.PURPOSE, place=goal.name, purpose=options.get("purpose") if topic == "purpose" else None,
