@@ -28,6 +28,7 @@ from dorothie_gym.camera.sensor_faults import apply_faults
 from dorothie_gym.camera.shading import shade
 from dorothie_gym.camera.shadows import draw_shadows, new_shadow_maps, turn_sun
 from dorothie_gym.camera.texturing import textures_of
+from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records, plain
 from dorothie_gym.copying import shared
 from dorothie_gym.ontology import Sensor
@@ -35,6 +36,9 @@ from dorothie_gym.sim.weather import Weather
 
 _ROOM = 4096  # triangles of bodies, at first
 _NO_BODIES = empty_records(PlacementRecord, 0)
+
+_draw_scene, _draw_shadows, _draw_head_lights = direct(draw_scene), direct(draw_shadows), direct(draw_head_lights)
+_shade, _write_labels = direct(shade), direct(write_labels)
 
 
 @shared
@@ -177,14 +181,14 @@ class FirstPersonCamera:
             light = self._daylight(weather, head_lights)
             placed = self._draw(view.scaled(config.samples), self._buffer, self._orders, bodies, placed)
             if self._casts_shadows:
-                draw_shadows(
+                _draw_shadows(
                     self._shadows, self.scene.town, self.scene.cells, self._overlay, self._overlay_cells, pose.x,
                     pose.y, pose.z, self.scene.bank.mesh, self.scene.bank.ranges, bodies,
                 )  # fmt: skip
             if light.beams > 0.0:
-                draw_head_lights(self._beams, pose.x, pose.y, pose.heading, bodies)
+                _draw_head_lights(self._beams, pose.x, pose.y, pose.heading, bodies)
             picture = np.empty((config.height, config.width, 3), np.uint8)
-            shade(
+            _shade(
                 view, optics_of(view, light, self._shadows, pose.tilt), self._buffer, config.samples, self.scene.town,
                 self._overlay, self._bodies, self.scene.ground, self._textures, light, self.scene.noise,
                 self.scene.lamps, self._beams, self._shadows, self._samples, self._face, picture.reshape(-1, 3),
@@ -217,7 +221,7 @@ class FirstPersonCamera:
         """Draws all triangles; copies those of bodies first if `placed` is negative, and returns their number."""
         scene, bank = self.scene, self.scene.bank
         while True:
-            count = draw_scene(
+            count = _draw_scene(
                 view, buffer, scene.town, scene.cells, orders[0], self._overlay, self._overlay_cells, orders[1],
                 bank.mesh, bank.ranges, bank.boxes, bodies, self._box, self._bodies, placed,
             )  # fmt: skip
@@ -227,7 +231,7 @@ class FirstPersonCamera:
 
     def _write_labels(self, view: View, bodies: RecordArray[PlacementRecord]) -> dict[str, NDArray[np.generic] | Boxes]:
         labels, outputs = self._labels, self.config.outputs
-        write_labels(
+        _write_labels(
             view,
             self._label_buffer,
             self.scene.town,
