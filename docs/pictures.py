@@ -4,7 +4,8 @@ python docs/pictures.py --corpus DIR       # all; DIR: dorothie-gym generate --s
 python docs/pictures.py session midtown    # some of them
 
 `navigation_curve.png` and `selfplay_curve.png` come from training runs, see `docs/pages.py curves` and
-docs/selfplay.md; `perception.png` comes from `benchmarks/perception.py --picture`. Charts have a hash of what they show
+docs/selfplay.md; `perception.png` comes from `benchmarks/perception.py --picture`, `detections.webp` from
+`benchmarks/detections.py`. Charts have a hash of what they show
 (`FINGERPRINT`), with which the tests find charts that are out of date without drawing them: the pixels of a chart
 depend on the version of matplotlib.
 """

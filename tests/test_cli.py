@@ -84,7 +84,7 @@ class TestRun:
         assert pygame.image.load("p.png").get_size() == (1640, 900)
 
     def test_session_is_recorded_into_the_given_folder(self) -> None:
-        facts = loaded("run", "--seed", 3, "--max-seconds", 6, "--json", "--out", "deep/down")
+        facts = loaded("run", "--seed", 3, "--max-seconds", 12, "--json", "--out", "deep/down")
         session = Session.load(facts["session"])
         assert facts["session"] == str(Path("deep/down"))
         assert session.complete and session.header.seed == 3

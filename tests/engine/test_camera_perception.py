@@ -116,7 +116,7 @@ def test_the_co_wizard_sees_the_same_objects_around_its_estimated_pose() -> None
 
 def test_a_covered_view_shows_nothing_and_the_car_still_brakes_for_hazards() -> None:
     engine = SessionEngine(TOWN, config=CONFIG)
-    for _ in played(engine, seed=3, decisions=8):
+    for _ in played(engine, seed=0, decisions=8):
         pass
     world = engine.session.world
     world.faults[Sensor.VIEW] = world.frame + 3000
@@ -142,7 +142,7 @@ def test_fog_hides_distant_bodies() -> None:
 
 def test_a_hidden_landmark_is_observed_from_the_first_time_that_it_is_in_view() -> None:
     met = 0
-    for seed in (0, 8, 13, 19):
+    for seed in (0, 9, 30, 32):
         engine = SessionEngine(TOWN, config=CONFIG)
         first: dict[int, int] = {}
         for k, observations in enumerate(played(engine, seed=seed, decisions=56)):

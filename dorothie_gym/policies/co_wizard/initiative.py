@@ -20,7 +20,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
-from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, is_localised, visibility_topic
+from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, is_localised, reason_to_stand, visibility_topic
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
@@ -208,10 +208,15 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
     state.dialogue = state.dialogue.after_explaining_hazard(view.time)
     if rng.random() < (0.85 if hazard is ObjectClass.TRAFFIC_LIGHT else 0.4):
         return  # most hazards, red lights above all, are obvious to the participant
-    values: tuple[SlotValue, ...] = (hazard,)
-    if resting or rng.random() < 0.3:
-        values = (ActionValue.STOP, hazard)
-    state.say(remark(DialogueMove.EXPLAIN, *values), *plan_remark(state, view, rng, joined=True))
+    reason = reason_to_stand(state, view)
+    if reason is None:
+        return
+    stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
+    because = Proposition.of(Predicate.BECAUSE, effect=stands, cause=reason)
+    full = resting or rng.random() < 0.3
+    wording = Wording(topic="because_standing" if full else "because")
+    explained = intend(CommunicativeFunction.INFORM, because, elided=() if full else ("effect",), wording=wording)
+    state.say(explained, *plan_remark(state, view, rng, joined=True))
 
 
 def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
