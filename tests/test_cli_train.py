@@ -49,7 +49,7 @@ def corpus(tmp_path_factory):
     from dorothie_gym.rollout import generate_corpus
 
     folder = tmp_path_factory.mktemp("corpus")
-    generate_corpus(folder, sessions=12, seed=2, workers=1)
+    generate_corpus(folder, sessions=16, seed=2, workers=1)  # as many as all folds need
     return folder
 
 
