@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from dorothie_gym.cli.options import OWN_NAME, AsJson, Maps
-from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stdout
+from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, session_progress, stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.recording import Corpus
@@ -264,7 +264,8 @@ def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
 def _talk(corpus: Corpus, *, as_json: bool) -> None:
     from dorothie_gym.analysis.talk import talk_checks_of
 
-    found = talk_checks_of(corpus)
+    with session_progress(quiet=as_json) as on_session:
+        found = talk_checks_of(corpus, on_session)
     if as_json:
         print_json({"sessions": len(corpus), **found.to_json()})
         return

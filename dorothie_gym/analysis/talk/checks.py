@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
@@ -97,12 +97,19 @@ class TalkChecks:
         return rows
 
 
-def talk_checks_of(corpus: Corpus) -> TalkChecks:
-    """Returns the figures of a corpus."""
+def talk_checks_of(corpus: Corpus, on_session: Callable[[int, int], None] | None = None) -> TalkChecks:
+    """Returns the figures of a corpus.
+
+    Args:
+        corpus: the corpus.
+        on_session: called after each session with the number of sessions done and of all.
+    """
     checks = TalkChecks()
-    for entry in corpus.entries:
+    for number, entry in enumerate(corpus.entries, start=1):
         session = entry.load()
         check_session(checks, session, find_town(session.header.town, entry.maps))
+        if on_session is not None:
+            on_session(number, len(corpus.entries))
     return checks
 
 

@@ -162,16 +162,15 @@ def _goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) ->
 
 
 def _failed(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """The fault may have begun or ended a while ago: its effect grows and fades."""
+    """Whether a sensor has failed, or had until a moment ago: the effect of a fault fades."""
     sensor = said.get("sensor")
     if not isinstance(sensor, Sensor):
         return None
-    lag = range(0, _FADING, 2)
-    return not said.negated if any(world.failed(time - k, sensor) is not said.negated for k in lag) else said.negated
+    return any(world.failed(time - k, sensor) for k in range(0, _FADING, 2))
 
 
 def _weather(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Whether a parameter has moved away from clear noon, or back, in the last minute."""
+    """Whether a parameter is away from clear noon, or close to it."""
     parameter, high = said.get("parameter"), said.get("high")
     if not isinstance(parameter, WeatherParameter) or not isinstance(high, bool):
         return None

@@ -27,11 +27,11 @@ from dorothie_gym.baselines.vision.object_learner import distinct_queries, focal
 from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
 from dorothie_gym.baselines.vision.segformer import SegFormer, normalised
 from dorothie_gym.baselines.vision.solids import spaces_of
-from dorothie_gym.camera.array_cache import builder_digest
+from dorothie_gym.benchmark.features.sight import drawing_digest
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
-from dorothie_gym.errors import CheckpointError, SessionError
+from dorothie_gym.errors import CheckpointError
 from dorothie_gym.files import replacing
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ObjectClass
@@ -119,9 +119,7 @@ class DetectedBoxes:
         Raises:
             SessionError: the sources cannot be read.
         """
-        if (pictures := builder_digest()) is None:
-            raise SessionError("the sources of the camera cannot be read; use the objects of the record")
-        return f"detections {_FORMAT} {' '.join(self._digests)} {pictures} torch {torch.__version__}"
+        return f"detections {_FORMAT} {' '.join(self._digests)} {drawing_digest()} torch {torch.__version__}"
 
     @functools.cached_property
     def _models(self) -> tuple[SegFormer, Detector]:

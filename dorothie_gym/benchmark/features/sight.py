@@ -24,6 +24,19 @@ class Sight(Protocol):
         ...
 
 
+def drawing_digest() -> str:
+    """Returns a digest of the sources that draw pictures.
+
+    Raises:
+        SessionError: the sources cannot be read.
+    """
+    from dorothie_gym.camera.array_cache import builder_digest  # here: most features need no camera
+
+    if (digest := builder_digest()) is None:
+        raise SessionError("the sources of the camera cannot be read; use the objects of the record")
+    return digest
+
+
 @dataclass(frozen=True)
 class VisibleBoxes:
     """Recorded actors that the camera on the car shows: what a detector without errors finds ("oracle boxes")."""
@@ -35,11 +48,7 @@ class VisibleBoxes:
         Raises:
             SessionError: the sources cannot be read.
         """
-        from dorothie_gym.camera.array_cache import builder_digest  # here: most features need no camera
-
-        if (digest := builder_digest()) is None:
-            raise SessionError("the sources of the camera cannot be read; use the objects of the record")
-        return f"visible boxes {digest}"
+        return f"visible boxes {drawing_digest()}"
 
     def actors(self, session: Session, town: Town) -> SceneTable:
         """Returns the recorded actors that the pictures show."""

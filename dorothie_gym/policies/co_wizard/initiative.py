@@ -23,17 +23,10 @@ from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, is_localised, reason_to_stand, visibility_topic
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.noticing import notice
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import Choice, direction_of
 from dorothie_gym.policies.speech import intend, remark
-from dorothie_gym.policies.weather_talk import (
-    CROWD_INTERVAL,
-    changes,
-    crowd_ahead,
-    crowd_remark,
-    noting,
-    weather_change_remark,
-)
 from dorothie_gym.spaces import Motion, Physical
 
 _WEATHER_OBJECTS = {
@@ -61,8 +54,7 @@ def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
         _ask_goal,
         _explain_hazard,
         _mention_weather,
-        _notice_weather,
-        _notice_crowd,
+        _look_around,
         _mention_localization,
     ):
         consider(state, view, rng)
@@ -247,24 +239,14 @@ def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
         state.say(remark(DialogueMove.EXPLAIN, ActionValue.LIGHT_CHANGE, wording=wording, joined=True))
 
 
-def _notice_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Mentions, by chance, a parameter of the weather that has changed conspicuously."""
-    for parameter, high in changes(view.raw, state.dialogue.noted):
-        state.dialogue = state.dialogue.with_noted(noting(state.dialogue.noted, parameter, high=high))
-        told_otherwise = high and parameter in _HANDLED
-        if not told_otherwise and rng.random() < state.style.notices:
-            state.say(weather_change_remark(parameter, high=high))
-            return
-
-
-def _notice_crowd(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Mentions, by chance, that there are many people or vehicles."""
-    kind = crowd_ahead(view.objects)
-    if kind is None or view.time - state.dialogue.crowd_at < CROWD_INTERVAL:
-        return
-    state.dialogue = state.dialogue.after_noticing_crowd(view.time)
-    if rng.random() < state.style.notices:
-        state.say(crowd_remark(kind))
+def _look_around(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Mentions, by chance, a conspicuous change of the weather, or a crowd."""
+    said, noticed = notice(
+        state.dialogue.noticed, view.raw, view.objects, rng, chance=state.style.notices, handled=_HANDLED
+    )
+    state.dialogue = state.dialogue.with_noticed(noticed)
+    if said is not None:
+        state.say(said)
 
 
 def _mention_localization(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:

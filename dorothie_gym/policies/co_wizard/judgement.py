@@ -1,4 +1,4 @@
-"""What the Co-Wizard believes: the truth of a proposition, and the answer to an open one, by its own observations."""
+"""Beliefs of the Co-Wizard about propositions, from its own observations, and its reasons for what it does."""
 
 from __future__ import annotations
 

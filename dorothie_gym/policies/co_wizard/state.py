@@ -20,10 +20,10 @@ from dorothie_gym.ontology import (
     StreetName,
 )
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
+from dorothie_gym.policies.noticing import Noticed
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteState
 from dorothie_gym.policies.speech import SpeakingState
-from dorothie_gym.policies.weather_talk import Noted
 from dorothie_gym.spaces import LanePosition, Mental
 
 
@@ -72,8 +72,7 @@ class DialogueState:
         detour_asked_at: time of the open question about a detour [s]; None where none is open.
         hazard_explained_at: time of the last explanation of a hazard [s].
         weather_mentioned: whether the present bad weather has been mentioned.
-        noted: parameters of the weather that have been noticed.
-        crowd_at: time at which a crowd was last noticed [s].
+        noticed: weather and crowds that have been noticed.
         lost_mentioned: whether the present loss of localization has been mentioned.
     """
 
@@ -92,8 +91,7 @@ class DialogueState:
     detour_asked_at: float | None = None
     hazard_explained_at: float = -math.inf
     weather_mentioned: bool = False
-    noted: Noted = frozenset()
-    crowd_at: float = -math.inf
+    noticed: Noticed = field(default_factory=Noticed)
     lost_mentioned: bool = False
 
     def after_hearing(self, now: float) -> DialogueState:
@@ -160,13 +158,9 @@ class DialogueState:
         """Sets whether the present weather has been mentioned."""
         return replace(self, weather_mentioned=mentioned)
 
-    def with_noted(self, noted: Noted) -> DialogueState:
-        """Sets what has been noticed of the weather."""
-        return replace(self, noted=noted)
-
-    def after_noticing_crowd(self, now: float) -> DialogueState:
-        """Records that a crowd was noticed."""
-        return replace(self, crowd_at=now)
+    def with_noticed(self, noticed: Noticed) -> DialogueState:
+        """Sets what has been noticed of weather and crowds."""
+        return self if noticed is self.noticed else replace(self, noticed=noticed)
 
     def with_lost_mentioned(self, mentioned: bool) -> DialogueState:
         """Sets whether the present loss of localization has been mentioned."""

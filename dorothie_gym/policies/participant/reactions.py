@@ -10,6 +10,7 @@ from dorothie_gym.dialogue import ASKED, CommunicativeFunction, Predicate, Propo
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, PropKind, StreetName, WeatherParameter
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
+from dorothie_gym.policies.noticing import notice
 from dorothie_gym.policies.observation_parser import (
     is_dark,
     is_foggy,
@@ -22,14 +23,6 @@ from dorothie_gym.policies.observation_parser import (
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, intend, remark
-from dorothie_gym.policies.weather_talk import (
-    CROWD_INTERVAL,
-    changes,
-    crowd_ahead,
-    crowd_remark,
-    noting,
-    weather_change_remark,
-)
 
 _HANDLED = frozenset({WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION})
 """Parameters of the weather that have a reaction of their own."""
@@ -77,8 +70,7 @@ def react(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     for consider in (
         _mention_weather,
         _mention_lights,
-        _notice_weather,
-        _notice_crowd,
+        _look_around,
         _ask_why_standing,
         _wonder,
         _chat,
@@ -163,24 +155,14 @@ def weather_remark(topic: str, rng: np.random.Generator) -> Remark:
     return remark(DialogueMove.EXPLAIN, *values, wording=Wording(topic=topic))
 
 
-def _notice_weather(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Mentions, by chance, a parameter of the weather that has changed conspicuously."""
-    for parameter, high in changes(view.raw, state.conversation.noted):
-        state.conversation = state.conversation.with_noted(noting(state.conversation.noted, parameter, high=high))
-        told_otherwise = high and parameter in _HANDLED  # with a request to slow down, or for the lights
-        if not told_otherwise and rng.random() < state.style.notices:
-            state.say(weather_change_remark(parameter, high=high))
-            return
-
-
-def _notice_crowd(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Mentions, by chance, that there are many people or vehicles."""
-    kind = crowd_ahead(view.objects)
-    if kind is None or view.time - state.conversation.crowd_at < CROWD_INTERVAL:
-        return
-    state.conversation = state.conversation.after_noticing_crowd(view.time)
-    if rng.random() < state.style.notices:
-        state.say(crowd_remark(kind))
+def _look_around(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Mentions, by chance, a conspicuous change of the weather, or a crowd."""
+    said, noticed = notice(
+        state.conversation.noticed, view.raw, view.objects, rng, chance=state.style.notices, handled=_HANDLED
+    )
+    state.conversation = state.conversation.with_noticed(noticed)
+    if said is not None:
+        state.say(said)
 
 
 def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:

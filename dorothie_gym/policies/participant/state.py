@@ -10,12 +10,12 @@ import math
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from dorothie_gym.policies.noticing import Noticed
 from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteState
 from dorothie_gym.policies.speech import Remark, SpeakingState
-from dorothie_gym.policies.weather_talk import Noted
 
 StepKey: TypeAlias = tuple[str, int, int]
 """Identity of a guidance step: "turn", "lane", "round" or "on", and the lanes concerned."""
@@ -35,8 +35,7 @@ class ConversationState:
         slowed: whether a lower speed for the weather has been requested or was not needed.
         bad_weather_since: start of the present bad weather [s]; infinite in good weather.
         hurried: whether the car has been asked to go faster.
-        noted: parameters of the weather that have been noticed.
-        crowd_at: time at which a crowd was last noticed [s].
+        noticed: weather and crowds that have been noticed.
     """
 
     heard_at: float = 0.0
@@ -48,8 +47,7 @@ class ConversationState:
     slowed: bool = False
     bad_weather_since: float = math.inf
     hurried: bool = False
-    noted: Noted = frozenset()
-    crowd_at: float = -math.inf
+    noticed: Noticed = field(default_factory=Noticed)
 
     def after_hearing(self, now: float) -> ConversationState:
         """Records an utterance of the car at `now` [s]."""
@@ -84,13 +82,9 @@ class ConversationState:
         """Sets whether a lower speed for the weather has been requested or was not needed."""
         return replace(self, slowed=slowed)
 
-    def with_noted(self, noted: Noted) -> ConversationState:
-        """Sets what has been noticed of the weather."""
-        return replace(self, noted=noted)
-
-    def after_noticing_crowd(self, now: float) -> ConversationState:
-        """Records that a crowd was noticed."""
-        return replace(self, crowd_at=now)
+    def with_noticed(self, noticed: Noticed) -> ConversationState:
+        """Sets what has been noticed of weather and crowds."""
+        return self if noticed is self.noticed else replace(self, noticed=noticed)
 
     def after_hurrying(self) -> ConversationState:
         """Records a request to go faster."""

@@ -1,17 +1,22 @@
-"""What the scripted agents notice around them: the ten parameters of the weather, and crowds."""
+"""Noticing of the scripted agents: the ten parameters of the weather, and crowds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
+
+import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.ontology import WeatherParameter as W
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
-from dorothie_gym.policies.observation_parser import SeenObject, weather
+from dorothie_gym.policies.observation_parser import SeenObject, scalar, weather
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.spaces import ObservationMapping
 
@@ -49,11 +54,58 @@ CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTR
 CROWD_INTERVAL: Final = 60.0
 """Time between remarks about crowds [s]."""
 
-Noted = frozenset[W]
-"""Parameters that have been noticed and are not over."""
+
+@dataclass(frozen=True, kw_only=True)
+class Noticed:
+    """What an agent has noticed.
+
+    Attributes:
+        weather: parameters that have become conspicuous and are still so.
+        crowd_at: time at which a crowd was last noticed [s].
+    """
+
+    weather: frozenset[W] = frozenset()
+    crowd_at: float = -math.inf
+
+    def with_change(self, parameter: W, *, high: bool) -> Noticed:
+        """Records that a parameter has become conspicuous, or has ceased to be."""
+        return replace(self, weather=self.weather | {parameter} if high else self.weather - {parameter})
 
 
-def changes(observation: ObservationMapping, noted: Noted) -> Iterator[tuple[W, bool]]:
+def notice(
+    noticed: Noticed,
+    observation: ObservationMapping,
+    objects: Sequence[SeenObject],
+    rng: np.random.Generator,
+    *,
+    chance: float,
+    handled: Collection[W],
+) -> tuple[Remark | None, Noticed]:
+    """Looks around, and perhaps mentions a change of the weather or a crowd.
+
+    Args:
+        noticed: what has been noticed before.
+        observation: observation of the agent.
+        objects: objects in sight.
+        rng: random generator of the decision.
+        chance: probability that what is noticed is mentioned.
+        handled: parameters whose beginning the agent reacts to elsewhere.
+
+    Returns:
+        The remark, or None, and what has been noticed now.
+    """
+    for parameter, high in changes(observation, noticed.weather):
+        noticed = noticed.with_change(parameter, high=high)
+        if not (high and parameter in handled) and rng.random() < chance:
+            return weather_change_remark(parameter, high=high), noticed
+    kind, now = crowd_ahead(objects), scalar(observation, "time")
+    if kind is None or now - noticed.crowd_at < CROWD_INTERVAL:
+        return None, noticed
+    noticed = replace(noticed, crowd_at=now)
+    return crowd_remark(kind) if rng.random() < chance else None, noticed
+
+
+def changes(observation: ObservationMapping, noted: frozenset[W]) -> Iterator[tuple[W, bool]]:
     """Yields the parameters that have become conspicuous (True), or are so no more (False), since they were noted."""
     now = {parameter: weather(observation, parameter) for parameter in W}
     for parameter, measure in CONSPICUOUS.items():
@@ -62,11 +114,6 @@ def changes(observation: ObservationMapping, noted: Noted) -> Iterator[tuple[W, 
             yield parameter, True
         elif value < OVER and parameter in noted:
             yield parameter, False
-
-
-def noting(noted: Noted, parameter: W, *, high: bool) -> Noted:
-    """Returns what has been noted after a change of a parameter."""
-    return noted | {parameter} if high else noted - {parameter}
 
 
 def crowd_ahead(objects: Sequence[SeenObject]) -> ObjectClass | None:
@@ -80,8 +127,8 @@ def crowd_remark(kind: ObjectClass) -> Remark:
     return intend(CommunicativeFunction.INFORM, Proposition.of(Predicate.CROWDED, object=kind))
 
 
-def weather_change_remark(parameter: W, *, high: bool, joined: bool = False) -> Remark:
+def weather_change_remark(parameter: W, *, high: bool) -> Remark:
     """Returns a remark about a parameter that has become conspicuous, or has ceased to be."""
     said = Proposition.of(Predicate.WEATHER, parameter=parameter, high=high)
     topic = f"{'much' if high else 'less'}_{parameter}"
-    return intend(CommunicativeFunction.INFORM, said, wording=Wording(topic=topic), joined=joined)
+    return intend(CommunicativeFunction.INFORM, said, wording=Wording(topic=topic))

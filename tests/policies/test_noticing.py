@@ -7,15 +7,15 @@ import pytest
 
 from dorothie_gym.dialogue import Predicate, word_act
 from dorothie_gym.ontology import ObjectClass, PropKind, Role, WeatherParameter
-from dorothie_gym.policies.observation_parser import SeenObject
-from dorothie_gym.policies.weather_talk import (
+from dorothie_gym.policies.noticing import (
     CROWDS,
+    Noticed,
     changes,
     crowd_ahead,
     crowd_remark,
-    noting,
     weather_change_remark,
 )
+from dorothie_gym.policies.observation_parser import SeenObject
 
 W = WeatherParameter
 CLEAR = np.array([parameter.clear_noon for parameter in W])
@@ -45,10 +45,10 @@ def test_each_parameter_is_noticed_when_it_comes_and_when_it_goes(values):
     parameter = W(next(iter(values)))
     found = dict(changes(observed(**values), frozenset()))
     assert found[parameter] is True
-    noted = noting(frozenset(), parameter, high=True)
+    noted = Noticed().with_change(parameter, high=True).weather
     assert parameter not in dict(changes(observed(**values), noted))
     assert dict(changes(observed(), noted)) == {parameter: False}
-    assert noting(noted, parameter, high=False) == frozenset()
+    assert Noticed(weather=noted).with_change(parameter, high=False) == Noticed()
 
 
 def test_details_of_fog_are_noticed_in_fog_only():
