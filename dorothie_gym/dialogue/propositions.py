@@ -109,6 +109,8 @@ class Predicate(enum.StrEnum):
     """Nothing endangers the drive: no hazard, poor view or failed sensor."""
     BEHIND = "behind"
     """A landmark lies behind the car."""
+    NEARER = "nearer"
+    """The way to a landmark is shorter than that to another one."""
     # the tasks
     TASK = "task"
     """The errand at a landmark has a status."""
@@ -170,7 +172,8 @@ PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
         Predicate.POSSIBLE: _ACTION,
         Predicate.SAFE: {},
         Predicate.BEHIND: _PLACE,
-        Predicate.TASK: {**_PLACE, "status": GoalStatus},
+        Predicate.NEARER: {**_PLACE, "landmark": LandmarkName},
+        Predicate.TASK: {**_PLACE, "street": StreetName, "status": GoalStatus},
         Predicate.ORDER: {"place": LandmarkName, "then": LandmarkName},
         Predicate.PURPOSE: {**_PLACE, "purpose": str, "person": str, "item": str, "reason": str},
         Predicate.GOAL: {**_PLACE, "street": StreetName},

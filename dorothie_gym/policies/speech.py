@@ -88,7 +88,7 @@ def remark(
 def intend(
     function: CommunicativeFunction,
     content: Proposition | None = None,
-    *,
+    *also: Proposition,
     elided: Collection[str] = (),
     wording: Wording | None = None,
     joined: bool = False,
@@ -100,7 +100,8 @@ def intend(
     Args:
         function: what is done with the content.
         content: what is stated, asked, asked for or answered; None where there is no content.
-        elided: arguments of the content that are left out of the words.
+        also: further contents of the same span: "forget KFC, go to Ikea".
+        elided: arguments of the contents that are left out of the words.
         wording: further particulars for the words; where no topic is given it is the predicate of the content, with
             "not_" in front if it is negated.
         joined: as of `Remark`.
@@ -112,14 +113,20 @@ def intend(
     if content is not None:
         topic = particulars.topic or f"{'not_' * content.negated}{content.predicate}"
         particulars = dataclasses.replace(particulars, content=intention.spoken, topic=topic)
+    slots = intention.slots.union(*(further.without(*elided).slots() for further in also))
     return Remark(
-        act=intention.act,
+        act=DialogueAct(intention.function.move, slots),
         wording=particulars,
-        meaning=() if content is None else (content,),
+        meaning=also if content is None else (content, *also),
         joined=joined,
         urgent=urgent,
         expires=expires,
     )
+
+
+def repeated(item: Remark, function: CommunicativeFunction) -> Remark:
+    """Returns a remark that says again, by another function, what `item` says: "I said the second left"."""
+    return Remark(act=DialogueAct(function.move, item.act.slots), wording=item.wording, meaning=item.meaning)
 
 
 @dataclass(frozen=True, kw_only=True)

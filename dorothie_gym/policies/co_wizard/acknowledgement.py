@@ -6,12 +6,13 @@ import numpy as np
 
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import ParsedText, Predicate, Proposition, Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove
+from dorothie_gym.ontology import ActionValue
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.judgement import seconds_to_goal
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.speech import Remark, intend, remark
+from dorothie_gym.policies.speech import Remark, intend
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
 """Actions that are carried out at once and therefore never checked."""
@@ -20,7 +21,7 @@ _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
 def acknowledge(
     state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Acknowledges an instruction: not at all, with a word, by repeating it, or by checking it.
+    """Acknowledges an instruction: not at all, with a word, by taking it on, by repeating it, or by checking it.
 
     Args:
         state: working copy of the state.
@@ -31,6 +32,7 @@ def acknowledge(
     """
     if rng.random() < state.style.silent:
         return
+    wanted = contents.action(action, words)
     wording = Wording(
         direction=words.direction,
         faster=words.faster,
@@ -39,24 +41,25 @@ def acknowledge(
     )
     at_once = action in _AT_ONCE or words.further or words.distance is not None
     if rng.random() < state.style.checks * 0.25 and not at_once:
-        state.say(remark(DialogueMove.CHECK, action, wording=wording))
+        state.say(intend(Function.CHECK_QUESTION, wanted, wording=wording))
     elif rng.random() < state.style.echoes:
-        state.say(*_repeated(action, wording, rng))
+        state.say(*_repeated(wanted, wording, rng))
     else:
-        move = DialogueMove.CONFIRM if rng.random() < state.config.confirms else DialogueMove.ACKNOWLEDGE
-        taken = remark(move, wording=Wording(topic="taken"))
-        state.say(taken, *plan_remark(state, view, rng, joined=True))
+        state.say(taken_on(state, wanted, rng), *plan_remark(state, view, rng, joined=True))
 
 
-def _repeated(action: ActionValue, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
-    draw = rng.random()
-    if draw < 0.25:
-        return (remark(DialogueMove.CONFIRM, action, wording=replace(wording, topic="taken")),)
-    if draw < 0.35:
-        return (remark(DialogueMove.ACKNOWLEDGE, action, wording=wording),)
-    move = DialogueMove.ACKNOWLEDGE if draw < 0.85 else DialogueMove.CONFIRM
-    words = remark(move, wording=Wording(topic="taken"))
-    return words, remark(DialogueMove.EXPLAIN, action, wording=wording, joined=True)
+def taken_on(state: CoWizardState, wanted: Proposition, rng: np.random.Generator) -> Remark:
+    """Returns an acceptance ("will do") of what is wanted, or the sign that it was heard ("okay"), by chance."""
+    function = Function.ACCEPT if rng.random() < state.config.accepts else Function.POSITIVE_FEEDBACK
+    return intend(function, wanted, elided=contents.arguments_of(wanted), wording=Wording(topic="taken"))
+
+
+def _repeated(wanted: Proposition, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Takes on an instruction by repeating it: "turning left", or "okay, I'm turning left"."""
+    if rng.random() < 0.35:
+        return (intend(Function.ACCEPT, wanted, wording=replace(wording, topic="taken")),)
+    heard = intend(Function.POSITIVE_FEEDBACK, wanted, elided=contents.arguments_of(wanted))
+    return heard, intend(Function.INFORM, wanted, wording=wording, joined=True)
 
 
 def plan_remark(

@@ -36,7 +36,8 @@ class CoWizardConfig:
         detour_by_street: probability that a proposed detour is named by its street.
         detour_answer_time: time after which a detour is taken without an answer [s].
         street_lanes: largest number of lanes of a street that are compared to find the nearest.
-        confirms_changes: probability that a change of tasks is confirmed instead of acknowledged.
+        accepts_changes: probability that a change of tasks is accepted ("skipping Ikea") rather than only heard.
+        accepts_goals: probability that a destination is accepted ("KFC it is") rather than only heard ("KFC, got it").
         search_silence: time without navigation instructions after which a described place is searched for [s].
         search_radius: distance to a guessed place at which the guess is given up [m].
         wish_time: time after which a manoeuvre that finds no room is given up [s].
@@ -61,7 +62,7 @@ class CoWizardConfig:
         gps_variance: variance of the position that shows that it is not measured [m^2]; 0.02 to 0.15 while it is.
         found_variance: variance of the position below which it is measured again [m^2].
         leaves_weather: probability that mentioning the weather is left to the participant.
-        confirms: probability that an instruction is confirmed instead of acknowledged.
+        accepts: probability that an instruction is accepted ("will do") rather than only heard ("okay").
     """
 
     turn_lead: float = 85.0
@@ -83,7 +84,8 @@ class CoWizardConfig:
     detour_by_street: float = 0.65
     detour_answer_time: float = 6.0
     street_lanes: int = 40
-    confirms_changes: float = 0.8
+    accepts_changes: float = 0.8
+    accepts_goals: float = 0.4
     search_silence: float = 15.0
     search_radius: float = 8.0
     wish_time: float = 30.0
@@ -108,7 +110,7 @@ class CoWizardConfig:
     gps_variance: float = 0.4
     found_variance: float = 0.08
     leaves_weather: float = 0.25
-    confirms: float = 0.45
+    accepts: float = 0.45
 
 
 @dataclass(frozen=True, kw_only=True)

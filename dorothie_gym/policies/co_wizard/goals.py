@@ -6,24 +6,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dorothie_gym.dialogue import Wording
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Predicate, Proposition, Wording
 from dorothie_gym.maps.routing import Place, router
 from dorothie_gym.ontology import (
     ActionValue,
-    DialogueMove,
     GoalStatus,
     LandmarkName,
     MentalAction,
-    SlotValue,
     StreetName,
 )
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
 from dorothie_gym.policies.route_progress import RouteProgress, streets_named
-from dorothie_gym.policies.speech import remark
+from dorothie_gym.policies.speech import intend
 from dorothie_gym.spaces import LanePosition, Mental
 
 _COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
@@ -103,21 +103,19 @@ def set_goal(
     aim(state, view, mark)
     if dropped is not None:
         wording = Wording(topic="changed", dropped=dropped)
-        state.say(remark(DialogueMove.CONFIRM, name, wording=wording))
+        state.say(intend(Function.ACCEPT, contents.destination(name), wording=wording))
         progress = state.route.progress
         if progress is not None and progress.turns_round_first(state.town, view.station):
-            state.say(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=True))
+            state.say(intend(Function.INFORM, contents.action(ActionValue.U_TURN), joined=True))
     elif corrected:
-        state.say(remark(DialogueMove.CONFIRM, name, wording=Wording(topic="sorry")))
+        state.say(intend(Function.ACCEPT, contents.destination(name), wording=Wording(topic="sorry")))
     elif not sure or (not streets and rng.random() < state.style.checks * (2.0 if name in _COMMON else 0.6)):
-        state.say(remark(DialogueMove.CHECK, name, mark.street))
+        state.say(intend(Function.CHECK_QUESTION, contents.destination(name, mark.street)))
     else:
-        values: list[SlotValue] = [name]
-        if streets and rng.random() < state.style.echoes:
-            values.append(mark.street)
-        move = DialogueMove.CONFIRM if rng.random() < 0.4 else DialogueMove.ACKNOWLEDGE
-        words = remark(move, *values, wording=Wording(topic="taken"))
-        state.say(words, *plan_remark(state, view, rng, joined=True))
+        street = mark.street if streets and rng.random() < state.style.echoes else None
+        function = Function.ACCEPT if rng.random() < state.config.accepts_goals else Function.POSITIVE_FEEDBACK
+        taken = intend(function, contents.destination(name, street), wording=Wording(topic="taken"))
+        state.say(taken, *plan_remark(state, view, rng, joined=True))
 
 
 def _set_unknown_goal(
@@ -125,21 +123,25 @@ def _set_unknown_goal(
 ) -> None:
     """Takes up a destination that is not on the map and says so; the car then needs guidance."""
     again = state.beliefs.goal is name and not state.beliefs.exact
+    where = contents.located(name, StreetName.QUERIED)
     state.beliefs = state.beliefs.with_unknown_goal(name).with_status(name, GoalStatus.UNKNOWN)
     state.route = state.route.with_progress(None)
     state.intentions = state.intentions.for_unknown_goal()
     if again:
-        state.say(remark(DialogueMove.QUERY_W, name))
+        state.say(intend(Function.SET_QUESTION, where, elided=("street",)))
         return
-    no_map = remark(DialogueMove.EXPLAIN, name, GoalStatus.UNKNOWN, wording=Wording(topic="no_map"))
+    unknown = Proposition.of(Predicate.KNOWS, negated=True, place=name)
+    unmarked = contents.errand(name, GoalStatus.UNKNOWN)
+    no_map = intend(Function.INFORM, unknown, unmarked, wording=Wording(topic="no_map"))
     draw = rng.random()
     if draw < 0.25 and not streets:
-        which = remark(DialogueMove.QUERY_W, name, StreetName.QUERIED, joined=True)
-        state.say(no_map, which)
+        state.say(no_map, intend(Function.SET_QUESTION, where, joined=True))
     elif draw < 0.4:
-        state.say(no_map, remark(DialogueMove.QUERY_W, name, joined=True))
+        state.say(no_map, intend(Function.SET_QUESTION, where, elided=("street",), joined=True))
     elif draw < 0.6:
-        state.say(no_map, remark(DialogueMove.INSTRUCT, joined=True, wording=Wording(topic="help")))
+        route = Proposition.of(Predicate.HAS_ROUTE, place=name)
+        help_me = intend(Function.REQUEST, route, elided=("place",), wording=Wording(topic="help"), joined=True)
+        state.say(no_map, help_me)
     else:
         state.say(no_map)
 
@@ -147,25 +149,31 @@ def _set_unknown_goal(
 def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: np.random.Generator) -> None:
     """Records a place to visit later: acknowledges it, asks for the order, or offers to go there first."""
     state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
-    mark = known_landmark(state, view, name, ())
+    mark, later = known_landmark(state, view, name, ()), contents.errand(name, GoalStatus.PENDING)
     goal, progress = state.beliefs.goal, state.route.progress
     if goal is None or goal is name:
-        state.say(remark(DialogueMove.ACKNOWLEDGE, name, GoalStatus.PENDING))
+        state.say(intend(Function.ACCEPT, later))
         return
     if mark is not None and progress is not None and rng.random() < state.style.offers:
         route = router(state.town).route(view.here, mark.place, state.route.blocked)
         if route is not None and route.length < progress.left(view.station):
             state.dialogue = state.dialogue.with_offer(name)
             state.say(
-                remark(DialogueMove.EXPLAIN, name, wording=Wording(topic="nearer")),
-                remark(DialogueMove.QUERY_YN, name, wording=Wording(topic="first"), joined=True),
+                intend(
+                    Function.INFORM,
+                    Proposition.of(Predicate.NEARER, place=name, landmark=goal),
+                    elided=("landmark",),
+                ),
+                intend(Function.OFFER, contents.destination(name), wording=Wording(topic="first"), joined=True),
             )
             return
     if rng.random() < 0.5:
-        state.say(remark(DialogueMove.QUERY_W, goal, wording=Wording(topic="order")))
+        order = Proposition.of(Predicate.ORDER, place=name, then=goal)
+        state.say(intend(Function.SET_QUESTION, order, elided=("place",)))
+    elif rng.random() < state.config.accepts_changes:
+        state.say(intend(Function.ACCEPT, later))
     else:
-        move = DialogueMove.CONFIRM if rng.random() < state.config.confirms_changes else DialogueMove.ACKNOWLEDGE
-        state.say(remark(move, name, GoalStatus.PENDING))
+        state.say(intend(Function.POSITIVE_FEEDBACK, later, elided=contents.arguments_of(later)))
 
 
 def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
@@ -178,7 +186,7 @@ def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
     if state.beliefs.goal is not None:
         state.beliefs = state.beliefs.with_status(state.beliefs.goal, GoalStatus.PENDING)
     aim(state, view, mark)
-    state.say(remark(DialogueMove.CONFIRM, mark.name, wording=Wording(topic="taken")))
+    state.say(intend(Function.ACCEPT, contents.destination(mark.name), wording=Wording(topic="taken")))
 
 
 def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName | None, distance: float) -> None:
@@ -195,7 +203,7 @@ def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName |
         if mark is not None and mark.name not in _COMMON:
             if state.beliefs.place != mark.place:
                 aim(state, view, mark)
-            state.say(remark(DialogueMove.ACKNOWLEDGE, name))
+            state.say(intend(Function.POSITIVE_FEEDBACK, contents.destination(name)))
             return
     state.beliefs = state.beliefs.with_goal_ahead(name)
     state.intentions = state.intentions.creeping_up()
@@ -224,10 +232,11 @@ def hear_description(
             note_plan(state)
         if not state.intentions.arrived:
             state.intentions = state.intentions.resumed()
-    values: tuple[SlotValue, ...] = tuple(streets[:1]) if rng.random() < state.style.echoes else ()
-    state.say(remark(DialogueMove.ACKNOWLEDGE, *values))
+    street = streets[0] if streets and rng.random() < state.style.echoes else None
+    heard = None if street is None else contents.located(goal, street)
+    state.say(intend(Function.POSITIVE_FEEDBACK, heard, elided=("place",)))
     if rng.random() < state.style.reassures:
-        state.say(remark(DialogueMove.ALIGN, joined=True))
+        state.say(intend(Function.FEEDBACK_ELICITATION, joined=True))
 
 
 def _described_place(

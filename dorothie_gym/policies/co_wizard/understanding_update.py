@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, ParsedText, Wording
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, Wording
 from dorothie_gym.ontology import (
     SPEED_STEP,
     ActionValue,
@@ -20,6 +21,7 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
 from dorothie_gym.policies.co_wizard.driving import place_ahead
@@ -34,11 +36,13 @@ from dorothie_gym.policies.co_wizard.goals import (
     postpone,
     set_goal,
 )
+from dorothie_gym.policies.co_wizard.judgement import believes
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance, street_of
-from dorothie_gym.policies.speech import remark
+from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.speech import intend, repeated
 
 STRAIGHT_ON_DISTANCE = 60.0
 """Distance to a junction within which "go on" means straight across it [m]."""
@@ -71,7 +75,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     state.speech = state.speech.heard_other(view.time, heard.acts)
     before = state.speech.queue
     if _mishears(state, heard, rng):
-        state.say_first(remark(DialogueMove.CONFUSE))
+        state.say_first(intend(Function.NEGATIVE_FEEDBACK))
         return
     for act in heard.acts:
         react = _REACTIONS.get(act.move)
@@ -106,7 +110,7 @@ def _instruction(
         name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
         approach_stop(state, view, name, float(words.distance))
         if state.speech.idle and rng.random() > state.style.silent:
-            state.say(remark(DialogueMove.ACKNOWLEDGE))
+            state.say(intend(Function.POSITIVE_FEEDBACK))
     elif actions:
         if state.intentions.arrived and _STEERING & set(actions) and not words.further:
             doubt(state)
@@ -123,7 +127,7 @@ def _instruction(
     elif state.dialogue.detour_asked_at is not None:
         take_detour(state, view, rng)
     elif not act.slots and state.beliefs.goal is None:
-        state.say(remark(DialogueMove.CONFUSE))
+        state.say(intend(Function.NEGATIVE_FEEDBACK))
 
 
 def _instructed_place(
@@ -138,7 +142,7 @@ def _instructed_place(
         postpone(state, view, landmarks[0], rng)
     elif landmarks[0] is state.beliefs.goal and known and not state.intentions.arrived and not streets:
         state.intentions = state.intentions.resumed()
-        state.say(remark(DialogueMove.ACKNOWLEDGE, landmarks[0]))
+        state.say(intend(Function.POSITIVE_FEEDBACK, contents.destination(landmarks[0])))
     else:
         set_goal(state, view, landmarks[0], _named(streets), rng, sure=landmarks[0] not in words.guessed)
 
@@ -154,13 +158,21 @@ def _abandoned_place(
         beliefs = state.beliefs.with_status(dropped, GoalStatus.ABANDONED)
         state.beliefs = beliefs.with_status(others[0], GoalStatus.PENDING)
         wording = Wording(topic="changed", dropped=dropped)
-        state.say(remark(DialogueMove.CONFIRM, others[0], wording=wording))
+        later = contents.errand(others[0], GoalStatus.PENDING)
+        state.say(intend(Function.ACCEPT, later, elided=("status",), wording=wording))
     elif others:
         set_goal(state, view, others[0], _named(act.values(Slot.STREET)), rng, dropped=dropped)
     else:
         abandon(state, dropped)
-        move = DialogueMove.CONFIRM if rng.random() < state.config.confirms_changes else DialogueMove.ACKNOWLEDGE
-        state.say(remark(move, dropped, GoalStatus.ABANDONED))
+        _accept_change(state, contents.errand(dropped, GoalStatus.ABANDONED), rng)
+
+
+def _accept_change(state: CoWizardState, change: Proposition, rng: np.random.Generator) -> None:
+    """Accepts a change of the tasks by repeating it, or shows that it was heard, by chance."""
+    if rng.random() < state.config.accepts_changes:
+        state.say(intend(Function.ACCEPT, change))
+    else:
+        state.say(intend(Function.POSITIVE_FEEDBACK, change, elided=contents.arguments_of(change)))
 
 
 def _landmarks(act: DialogueAct) -> list[LandmarkName]:
@@ -178,11 +190,12 @@ def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetN
         state.dialogue = state.dialogue.with_detour_question(None)
         state.intentions = state.intentions.resumed()
         plan_route(state, view)
-        state.say(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
+        over = contents.action(None, street=street)
+        state.say(intend(Function.ACCEPT, over, wording=Wording(topic="detour")))
         return
     directive = Directive(direction=None, street=street, junction=view.junction)
     state.intentions = state.intentions.directed(directive).resumed()
-    state.say(remark(DialogueMove.ACKNOWLEDGE, street))
+    state.say(intend(Function.ACCEPT, contents.action(None, street=street), wording=Wording(topic="taken")))
 
 
 # --- instructed actions ---------------------------------------------------------------------------------------------
@@ -278,23 +291,24 @@ def _explanation(
     elif GoalStatus.COMPLETE in statuses:
         complete(state, name)
         if rng.random() < 0.5:
-            state.say(remark(DialogueMove.ACKNOWLEDGE))
+            state.say(intend(Function.POSITIVE_FEEDBACK))
     elif GoalStatus.ABANDONED in statuses:
         abandon(state, name)
-        values = (name, GoalStatus.ABANDONED) if name is not None else ()
-        confirms = values and rng.random() < state.config.confirms_changes
-        state.say(remark(DialogueMove.CONFIRM if confirms else DialogueMove.ACKNOWLEDGE, *values))
+        if name is None:
+            state.say(intend(Function.POSITIVE_FEEDBACK))
+        else:
+            _accept_change(state, contents.errand(name, GoalStatus.ABANDONED), rng)
     elif act.values(Slot.STREET):
         hear_description(state, view, _named(act.values(Slot.STREET)), landmarks, rng)
     elif "wrong" in words.text.lower():
         if not state.beliefs.exact:
             state.route = state.route.with_progress(None)
-        state.say(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="sorry")))
+        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
-        state.say(remark(DialogueMove.ACKNOWLEDGE))
+        state.say(intend(Function.POSITIVE_FEEDBACK))
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
-        state.say(remark(DialogueMove.ACKNOWLEDGE))
+        state.say(intend(Function.POSITIVE_FEEDBACK))
 
 
 def _reply(
@@ -315,9 +329,9 @@ def _reply(
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         _reply_with_place(state, view, act, rng)
     elif view.time - state.dialogue.asked_at < state.config.answer_time and words.order is None and not act.slots:
-        state.say(remark(DialogueMove.CONFUSE))  # it does not answer the question
+        state.say(intend(Function.NEGATIVE_FEEDBACK))  # it does not answer the question
     elif rng.random() < 0.5:
-        state.say(remark(DialogueMove.ACKNOWLEDGE))
+        state.say(intend(Function.POSITIVE_FEEDBACK))
 
 
 def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
@@ -347,7 +361,7 @@ def _yes(
         speed = state.config.bad_weather_speed
         state.intentions = state.intentions.with_speed(speed)
         wording = Wording(faster=False, speed=speed)
-        state.say(remark(DialogueMove.EXPLAIN, ActionValue.SPEED_CHANGE, wording=wording))
+        state.say(intend(Function.INFORM, contents.action(ActionValue.SPEED_CHANGE, speed=speed), wording=wording))
 
 
 def _no(
@@ -364,20 +378,38 @@ def _alignment(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     if state.beliefs.goal is not None or state.intentions.directive is not None:
-        state.say(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
+        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="align")))
     else:
-        state.say(remark(DialogueMove.CONFUSE))
+        state.say(intend(Function.NEGATIVE_FEEDBACK))
 
 
 def _check(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
-    right = not landmarks or state.beliefs.goal in landmarks
-    if streets and not landmarks:
-        right = street_of(view.raw, state.town, view.lane) in streets
-    move = DialogueMove.CONFIRM if right else DialogueMove.REPLY_N
-    state.say(remark(move), *plan_remark(state, view, rng, joined=True))
+    checked = _checked(state, act, words)
+    held = believes(state, view, checked)
+    elided = contents.arguments_of(checked)
+    if held is None:
+        state.say(intend(Function.UNCERTAIN_ANSWER, checked, elided=elided))
+        return
+    said = intend(
+        Function.CONFIRM if held else Function.NEGATIVE_ANSWER, checked if held else checked.opposite, elided=elided
+    )
+    state.say(said, *plan_remark(state, view, rng, joined=True))
+
+
+def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Proposition:
+    """Returns what the participant wants verified: a destination, a street, an action, or the present destination."""
+    places, streets, actions = _landmarks(act), _named(act.values(Slot.STREET)), act.values(Slot.ACTION)
+    if places:
+        return contents.destination(places[0])
+    if streets:
+        return Proposition.of(Predicate.ON_STREET, street=streets[0])
+    if words.asked is not None:
+        return words.asked
+    if actions:
+        return Proposition.of(Predicate.DOES, action=actions[0])
+    return contents.destination(state.beliefs.goal)
 
 
 def _confusion(
@@ -389,17 +421,16 @@ def _confusion(
         return
     last = said[-1]
     repeats = last.act.move in _QUESTIONS or not last.act.slots
-    move = last.act.move if repeats else DialogueMove.CLARIFY
-    state.say(remark(move, *last.act.slots, wording=last.wording))
+    state.say(replace(last, text="", joined=False) if repeats else repeated(last, Function.CORRECTION))
 
 
 def _small_talk(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     if view.time - state.dialogue.asked_at < state.config.answer_time and state.beliefs.goal is None:
-        state.say(remark(DialogueMove.CONFUSE))  # an answer was expected
+        state.say(intend(Function.NEGATIVE_FEEDBACK))  # an answer was expected
     elif rng.random() < state.style.chats:
-        state.say(remark(DialogueMove.IRRELEVANT if rng.random() < 0.6 else DialogueMove.ACKNOWLEDGE))
+        state.say(intend(Function.OTHER if rng.random() < 0.6 else Function.POSITIVE_FEEDBACK))
 
 
 _REACTIONS: dict[

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Predicate, Proposition, Wording
 from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import (
     ActionValue,
@@ -14,9 +15,9 @@ from dorothie_gym.ontology import (
     GoalStatus,
     LandmarkName,
     ObjectClass,
-    SlotValue,
     StreetName,
 )
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
@@ -64,8 +65,8 @@ def _report_done(
 ) -> None:
     landmark = view.landmark(subgoal.landmark)
     named = landmark is not None and rng.random() < 0.4
-    values: tuple[SlotValue, ...] = (landmark.name,) if landmark is not None and named else ()
-    done = remark(DialogueMove.EXPLAIN, *values, GoalStatus.COMPLETE)
+    finished = contents.errand(None if landmark is None else landmark.name, GoalStatus.COMPLETE)
+    done = intend(Function.INFORM, finished, elided=() if named else ("place",))
     # leaves the car time to report its arrival first
     delay = float(rng.uniform(*state.config.report_delay))
     state.speech = state.speech.cleared().hold(view.time + delay).plan(done)
@@ -87,12 +88,13 @@ def _report_added(
     if on_the_way or _has_to_wait(state, view, subgoal, landmark):
         _go_first(state, view, subgoal, landmark)
         return
-    news = remark(DialogueMove.INSTRUCT, landmark.name, GoalStatus.PENDING, wording=Wording(topic="added"))
+    later = contents.errand(landmark.name, GoalStatus.PENDING)
+    news = intend(Function.REQUEST, later, wording=Wording(topic="added"))
     progress = state.route.progress
     far = progress is not None and progress.left(view.station) > state.config.wait_distance
     if view.speed > 2.0 and far and state.speech.idle and rng.random() < state.style.waits:
         state.task = state.task.waiting_until(view.time + state.config.thinking_time)
-        stop = remark(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
+        stop = intend(Function.REQUEST, contents.action(ActionValue.STOP), urgent=True)
         state.say(stop, replace(news, joined=True))
     else:
         state.say(news)
@@ -129,12 +131,11 @@ def _go_first(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgo
     former = state.task.goal
     assert former is not None
     switch_target(state, view, subgoal, landmark)
-    first: list[SlotValue] = [landmark.name, GoalStatus.ONGOING]
-    if not view.unique(landmark):
-        first.append(landmark.street)
+    street = None if view.unique(landmark) else landmark.street
+    now = contents.errand(landmark.name, GoalStatus.ONGOING, street)
     state.say_only(
-        remark(DialogueMove.INSTRUCT, *first, wording=Wording(topic="added")),
-        remark(DialogueMove.INSTRUCT, former.name, GoalStatus.PENDING, joined=True),
+        intend(Function.REQUEST, now, wording=Wording(topic="added")),
+        intend(Function.REQUEST, contents.errand(former.name, GoalStatus.PENDING), joined=True),
     )
 
 
@@ -153,7 +154,7 @@ def resume_after_wait(state: ParticipantState, view: ParticipantView) -> None:
         return
     state.task = state.task.waiting_until(math.inf)
     if view.standing:
-        state.say(remark(DialogueMove.INSTRUCT, ActionValue.START))
+        state.say(intend(Function.REQUEST, contents.action(ActionValue.START)))
 
 
 def _report_dropped(
@@ -167,8 +168,8 @@ def _report_dropped(
         state.forget_target()
         state.task = state.task.with_same_breath(True)
         state.speech = state.speech.cleared()
-    move = DialogueMove.INSTRUCT if rng.random() < 0.8 else DialogueMove.EXPLAIN
-    state.say(remark(move, landmark.name, GoalStatus.ABANDONED))
+    function = Function.REQUEST if rng.random() < 0.8 else Function.INFORM
+    state.say(intend(function, contents.errand(landmark.name, GoalStatus.ABANDONED)))
 
 
 def _report_changed(
@@ -181,9 +182,10 @@ def _report_changed(
     if new.index != task.target:
         busy = task.goal is not None and task.goal.name in (former.name, landmark.name)
         if former.name is not landmark.name and not busy and rng.random() < state.config.announces_ahead:
-            values = (former.name, landmark.name, GoalStatus.ABANDONED, GoalStatus.PENDING)
             wording = Wording(topic="changed_later", dropped=former.name)
-            state.say(remark(DialogueMove.INSTRUCT, *values, wording=wording))
+            dropped = contents.errand(former.name, GoalStatus.ABANDONED)
+            instead = contents.errand(landmark.name, GoalStatus.PENDING)
+            state.say(intend(Function.REQUEST, instead, dropped, wording=wording))
         return  # the change is announced when the subgoal becomes the target
     was_announced = task.announced
     state.forget_target()
@@ -191,8 +193,9 @@ def _report_changed(
     if was_announced and former.name is not landmark.name:
         _aim_at(state, view, new, landmark)
         state.task = state.task.after_announcement(view.time)
-        changed = (former.name, landmark.name, GoalStatus.ABANDONED, GoalStatus.ONGOING)
-        state.say(remark(DialogueMove.INSTRUCT, *changed, wording=Wording(dropped=former.name), urgent=True))
+        dropped = contents.errand(former.name, GoalStatus.ABANDONED)
+        instead = contents.errand(landmark.name, GoalStatus.ONGOING)
+        state.say(intend(Function.REQUEST, instead, dropped, wording=Wording(dropped=former.name), urgent=True))
 
 
 # --- target ---------------------------------------------------------------------------------------------------------
@@ -226,16 +229,19 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
     """Returns the target as an instruction, with its street where that helps."""
     task = state.task
     assert task.goal is not None
-    values: list[SlotValue] = [task.goal.name]
+    street = None
     if not view.unique(task.goal) or rng.random() < state.style.names_street:
-        values.append(task.goal.street)
+        street = contents.named(task.goal.street)
     if task.target in task.put_off:
-        return remark(DialogueMove.INSTRUCT, task.goal.name, GoalStatus.ONGOING, wording=Wording(topic="resume"))
+        resumed = contents.errand(task.goal.name, GoalStatus.ONGOING)
+        return intend(Function.REQUEST, resumed, wording=Wording(topic="resume"))
+    goal = contents.destination(task.goal.name, street)
     more = sum(subgoal.open for subgoal in view.subgoals) > 2
-    topic = "first" if more and len(values) == 1 and rng.random() < 0.5 else None
-    if topic is None and len(values) == 1 and rng.random() < state.config.leaves_route:
-        values.append(ActionValue.UNKNOWN)
-    return remark(DialogueMove.INSTRUCT, *values, wording=Wording(topic=topic))
+    if street is None and more and rng.random() < 0.5:
+        return intend(Function.REQUEST, goal, wording=Wording(topic="first"))
+    if street is None and rng.random() < state.config.leaves_route:
+        return intend(Function.REQUEST, goal, contents.action(ActionValue.UNKNOWN))
+    return intend(Function.REQUEST, goal)
 
 
 LONGEST_REASON = 55
@@ -264,7 +270,7 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
         Predicate.PURPOSE, place=goal.name, purpose=options.get("purpose") if topic == "purpose" else None,
         reason=options.get("reason") if topic == "reason" else None, person=told.person, item=item,
     )  # fmt: skip
-    return (intend(CommunicativeFunction.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
+    return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
 
 
 def _purpose(state: ParticipantState, view: ParticipantView) -> Purpose | None:
@@ -289,9 +295,9 @@ def _say_announcement(
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != target]
     named = [mark for mark in later if mark is not None and goal is not None and mark.name is not goal.name]
     if named and rng.random() < 0.25:
-        state.say(remark(DialogueMove.EXPLAIN, named[0].name, GoalStatus.PENDING, joined=True))
+        state.say(intend(Function.INFORM, contents.errand(named[0].name, GoalStatus.PENDING), joined=True))
     elif rng.random() < state.style.aligns:
-        state.say(remark(DialogueMove.ALIGN, joined=True))
+        state.say(intend(Function.FEEDBACK_ELICITATION, joined=True))
 
 
 def announce_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -313,7 +319,7 @@ def announce_target(state: ParticipantState, view: ParticipantView, rng: np.rand
         state.guidance = state.guidance.after_reminding()
         state.task = task.after_reminding(view.time)
         if state.guidance.repeats == 1:
-            state.say(remark(DialogueMove.ALIGN))
+            state.say(intend(Function.FEEDBACK_ELICITATION))
         else:
             state.say(announcement(state, view, rng))
 
@@ -321,19 +327,22 @@ def announce_target(state: ParticipantState, view: ParticipantView, rng: np.rand
 # --- description of the target --------------------------------------------------------------------------------------
 
 
-def describe(state: ParticipantState, view: ParticipantView, move: DialogueMove, rng: np.random.Generator) -> None:
+def describe(state: ParticipantState, view: ParticipantView, function: Function, rng: np.random.Generator) -> None:
     """Describes the place of the target by street, a landmark nearby and an object; guidance follows now or later."""
     goal = state.task.goal
     assert goal is not None
     no_street = goal.street is StreetName.UNKNOWN
     state.set_guiding(bool(no_street or state.task.described or rng.random() < state.config.guides_at_once))
     state.task = state.task.after_describing()
-    values: list[SlotValue] = [] if no_street else [goal.street]
     near = _famous_nearby(goal, view, state.config.near_landmark)
-    if near is not None:
-        values.append(near.name)
+    beside = None if near is None else Proposition.of(Predicate.NEAR, place=goal.name, landmark=near.name)
+    on_street = None if no_street else contents.located(goal.name, goal.street)
+    facts = [fact for fact in (on_street, beside) if fact is not None]
     looks = (_looks(goal),) if rng.random() < state.config.describes_looks else ()
-    state.say_first(remark(move, *values, wording=Wording(topic="where")), *looks)
+    if not facts:
+        state.say_first(intend(Function.UNCERTAIN_ANSWER), *looks)
+        return
+    state.say_first(intend(function, *facts, elided=("place",), wording=Wording(topic="where")), *looks)
 
 
 def _looks(goal: SeenLandmark) -> Remark:

@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, ParsedText, Wording
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, Wording
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -18,7 +19,9 @@ from dorothie_gym.ontology import (
     Role,
     Slot,
     SlotValue,
+    StreetName,
 )
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.observation_parser import SeenSubgoal, heard_utterance
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, describe, route_length, story_remark, switch_target
@@ -29,7 +32,7 @@ from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
-from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, remark
+from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, intend, remark, repeated
 
 _FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
 """Actions that are left to the car."""
@@ -83,15 +86,39 @@ def _check(
     if goal is not None and landmarks:
         right = landmarks == (goal.name,) and streets in ((), (goal.street,))
         if not right:
-            again = remark(DialogueMove.INSTRUCT, goal.name, goal.street, joined=True)
-            state.say_first(remark(DialogueMove.REPLY_N), again)
+            again = intend(Function.REQUEST, contents.destination(goal.name, goal.street), joined=True)
+            state.say_first(_denied(_checked(state, act, words)), again)
             return
     elif act.values(Slot.ACTION) and not _fits(state, view, act, words, rng):
-        _refuse_with_step(state, view, rng)
+        _refuse_with_step(state, view, act, words, rng)
         return
     if landmarks:
         state.set_guiding(False)  # the car knows the place
-    state.say_first(remark(DialogueMove.CONFIRM), *_addition(state, view, rng))
+    checked = _checked(state, act, words)
+    state.say_first(_short(Function.CONFIRM, checked), *_addition(state, view, rng))
+
+
+def _checked(state: ParticipantState, act: DialogueAct, words: ParsedText) -> Proposition:
+    """Returns what the car wants verified or proposes: a destination, an action, or the present destination."""
+    place = contents.first_name(act.values(Slot.LANDMARK))
+    street = next((value for value in act.values(Slot.STREET) if isinstance(value, StreetName)), None)
+    wanted = next((value for value in act.values(Slot.ACTION) if isinstance(value, ActionValue)), None)
+    if place is not None:
+        return contents.destination(place, street)
+    if wanted is not None or street is not None:
+        return contents.action(wanted, words if wanted is not None else None, street=street)
+    goal = state.task.goal
+    return contents.destination(None if goal is None else goal.name)
+
+
+def _short(function: Function, content: Proposition) -> Remark:
+    """Returns an answer whose content goes without saying: "yes", "that's it"."""
+    return intend(function, content, elided=contents.arguments_of(content))
+
+
+def _denied(content: Proposition) -> Remark:
+    """Returns the answer that a content is wrong or not wanted: "no"."""
+    return _short(Function.NEGATIVE_ANSWER, content.opposite)
 
 
 def _fits(
@@ -121,17 +148,19 @@ def _addition(state: ParticipantState, view: ParticipantView, rng: np.random.Gen
     return story_remark(state, view, rng)
 
 
-def _refuse_with_step(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+def _refuse_with_step(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
     """Says no, and names the right step unless a stop instruction is under way."""
     step = next_step(state, view, DialogueMove.INSTRUCT, rng)
-    refusal = remark(DialogueMove.REPLY_N)
+    refusal = _denied(_checked(state, act, words))
     just_stopped = view.time - state.guidance.stopped_at < state.config.just_said
     if step is None or just_stopped or (step[0][0] == "on" and step[1] < state.config.stop_distance):
         state.say_first(refusal)
         return
-    key, _, words = step
+    key, _, instead = step
     note_step(state, view, key)
-    state.say_first(refusal, replace(words, joined=True))
+    state.say_first(refusal, replace(instead, joined=True))
 
 
 def _yes_or_no(
@@ -145,24 +174,27 @@ def _yes_or_no(
         _answer_street(state, view, act)
     elif objects:
         seen = any(thing.kind in objects for thing in view.objects)
-        state.say_first(remark(DialogueMove.REPLY_Y if seen else DialogueMove.REPLY_N))
+        sight = Proposition.of(Predicate.SEES, object=objects[0])
+        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, sight) if seen else _denied(sight))
     elif landmarks and state.task.goal is not None:
         if state.task.goal.name in landmarks and _is_elsewhere(state, view):
             _deny_arrival(state)
         elif state.task.goal.name in landmarks:
-            state.say_first(remark(DialogueMove.REPLY_Y))
+            state.say_first(_short(Function.AFFIRMATIVE_ANSWER, words.asked or _checked(state, act, words)))
         else:
             again = announcement(state, view, rng)
-            state.say_first(remark(DialogueMove.REPLY_N), replace(again, joined=True))
+            state.say_first(_denied(words.asked or _checked(state, act, words)), replace(again, joined=True))
     elif set(act.values(Slot.ACTION)) & _WAYS:
         state.set_guiding(True)
         _answer_proposal(state, view, act, words, rng)
     elif not act.slots and _is_just_short(state, view):
-        state.say_only(remark(DialogueMove.REPLY_N), replace(creep_instruction(state, view), joined=True))
-    elif rng.random() < state.config.unsure:
-        state.say_first(remark(DialogueMove.REPLY_U), remark(DialogueMove.REPLY_Y))
+        refusal = _denied(words.asked or _checked(state, act, words))
+        state.say_only(refusal, replace(creep_instruction(state, view), joined=True))
     else:
-        state.say_first(remark(DialogueMove.REPLY_Y), *_addition(state, view, rng))
+        asked = words.asked or _checked(state, act, words)
+        unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
+        yes = _short(Function.AFFIRMATIVE_ANSWER, asked)
+        state.say_first(*unsure, yes, *(() if unsure else _addition(state, view, rng)))
 
 
 def _offered_subgoal(
@@ -186,20 +218,25 @@ def _answer_offer(state: ParticipantState, view: ParticipantView, offered: SeenS
     left = progress.left(view.station) if progress is not None else math.inf
     if landmark is not None and route_length(state, view, landmark) < left:
         switch_target(state, view, offered, landmark)
-        state.say_first(remark(DialogueMove.REPLY_Y))
+        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, contents.destination(landmark.name)))
         return
-    first = remark(DialogueMove.INSTRUCT, goal.name, wording=Wording(topic="first"), joined=True)
-    state.say_first(remark(DialogueMove.REPLY_N), first)
+    state.say_first(_denied(contents.destination(None if landmark is None else landmark.name)), _first(goal.name))
+
+
+def _first(name: LandmarkName) -> Remark:
+    """Returns the instruction to go to a place first, as the rest of an answer."""
+    return intend(Function.REQUEST, contents.destination(name), wording=Wording(topic="first"), joined=True)
 
 
 def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
     """Accepts a detour that is the participant's own, and insists on the own one otherwise."""
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
+    proposed = contents.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
     if own is None or own in act.values(Slot.STREET):
-        state.say_first(remark(DialogueMove.REPLY_Y))
+        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, proposed))
         return
-    instead = remark(DialogueMove.INSTRUCT, own, wording=Wording(topic="detour"), joined=True)
-    state.say_first(remark(DialogueMove.REPLY_N), instead)
+    over = contents.action(None, street=own)
+    state.say_first(_denied(proposed), intend(Function.REQUEST, over, wording=Wording(topic="detour"), joined=True))
 
 
 def _answer_proposal(
@@ -207,13 +244,14 @@ def _answer_proposal(
 ) -> None:
     """Accepts the right way, and names it otherwise."""
     if not _fits(state, view, act, words, rng):
-        _refuse_with_step(state, view, rng)
+        _refuse_with_step(state, view, act, words, rng)
         return
     step = next_step(state, view, DialogueMove.INSTRUCT, rng)
     if step is not None:
         note_step(state, view, step[0])
-    first = (remark(DialogueMove.REPLY_U),) if rng.random() < state.config.unsure else ()
-    state.say_first(*first, remark(DialogueMove.REPLY_Y), *_addition(state, view, rng))
+    proposed = _checked(state, act, words)
+    first = (_short(Function.UNCERTAIN_ANSWER, proposed),) if rng.random() < state.config.unsure else ()
+    state.say_first(*first, _short(Function.AFFIRMATIVE_ANSWER, proposed), *_addition(state, view, rng))
 
 
 # --- open questions -------------------------------------------------------------------------------------------------
@@ -224,7 +262,7 @@ def _open_question(
 ) -> None:
     landmarks, actions = act.values(Slot.LANDMARK), act.values(Slot.ACTION)
     if state.task.goal is None:
-        state.say_first(remark(DialogueMove.REPLY_U))
+        state.say_first(intend(Function.UNCERTAIN_ANSWER))
     elif words.order is not None and landmarks:
         _name_order(state, rng)
     elif _correct(state, view, act, words):
@@ -240,14 +278,17 @@ def _open_question(
             state.set_guiding(True)
             _name_step(state, view, DialogueMove.REPLY_W, rng)
     else:
-        describe(state, view, DialogueMove.REPLY_W, rng)
+        describe(state, view, Function.ANSWER, rng)
 
 
 def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
     """Answers the question where to go."""
     state.task = state.task.after_announcement(view.time)
-    named = [value for value in announcement(state, view, rng).act.slots if value.slot in (Slot.LANDMARK, Slot.STREET)]
-    answer = remark(DialogueMove.REPLY_W, *named, wording=Wording(topic="goal"))
+    announced = announcement(state, view, rng).meaning[0]
+    street = announced.get("street")
+    place = contents.first_name([announced.get("place")])
+    wanted = contents.destination(place, street if isinstance(street, StreetName) else None)
+    answer = intend(Function.ANSWER, wanted)
     state.say_only(answer, *more)
 
 
@@ -255,10 +296,10 @@ def _name_order(state: ParticipantState, rng: np.random.Generator) -> None:
     """Answers the question about the order of two tasks: the target is finished first."""
     goal = state.task.goal
     assert goal is not None
-    state.say_first(remark(DialogueMove.REPLY_W, wording=Wording(topic="after")))
+    order = Proposition.of(Predicate.ORDER, place=goal.name)
+    state.say_first(intend(Function.ANSWER, order, elided=("place",), wording=Wording(topic="after")))
     if rng.random() < state.config.explains_order:
-        first = remark(DialogueMove.INSTRUCT, goal.name, wording=Wording(topic="first"), joined=True)
-        state.speech = state.speech.with_second(first)
+        state.speech = state.speech.with_second(_first(goal.name))
 
 
 def _was_just_named(state: ParticipantState, view: ParticipantView) -> bool:
@@ -306,7 +347,8 @@ def _deny_arrival(state: ParticipantState) -> None:
     """Corrects a car that has mistaken another place for the target."""
     assert state.task.goal is not None
     state.set_guiding(True)
-    state.say_first(remark(DialogueMove.REPLY_N, state.task.goal.name))
+    away = Proposition.of(Predicate.ARRIVED, negated=True, place=state.task.goal.name)
+    state.say_first(intend(Function.NEGATIVE_ANSWER, away))
 
 
 def _explanation(
@@ -317,7 +359,7 @@ def _explanation(
         return
     names_goal = state.task.goal is not None and state.task.goal.name in landmarks
     if GoalStatus.UNKNOWN in statuses and names_goal:
-        describe(state, view, DialogueMove.EXPLAIN, rng)
+        describe(state, view, Function.INFORM, rng)
         return
     if names_goal and not statuses and _is_elsewhere(state, view):
         _deny_arrival(state)
@@ -334,11 +376,11 @@ def _nod(state: ParticipantState, view: ParticipantView, rng: np.random.Generato
     if waiting and not waiting[0].urgent and not waiting[0].text:
         done = GoalStatus.COMPLETE in waiting[0].act.slots
         if waiting[0].act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:
-            state.speech = state.speech.led_by(remark(DialogueMove.ACKNOWLEDGE))
+            state.speech = state.speech.led_by(intend(Function.POSITIVE_FEEDBACK))
     elif not alone or not state.speech.idle or (state.guidance.guiding and about_to_arrive(state, view)):
         return
     elif rng.random() < state.style.nods:
-        state.say(remark(DialogueMove.ACKNOWLEDGE), *_addition(state, view, rng))
+        state.say(intend(Function.POSITIVE_FEEDBACK), *_addition(state, view, rng))
 
 
 def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:
@@ -347,7 +389,7 @@ def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, w
     if again is None:
         return False
     state.task = state.task.after_reminding(view.time)
-    refusal = (remark(DialogueMove.REPLY_N),) if act.move is DialogueMove.CONFIRM else ()
+    refusal = (_denied(_checked(state, act, words)),) if act.move is DialogueMove.CONFIRM else ()
     state.say_only(*refusal, replace(again, joined=bool(refusal)))
     return True
 
@@ -360,9 +402,9 @@ def _confusion(
     if state.guidance.guiding and state.guidance.step is not None:
         _name_step(state, view, DialogueMove.CLARIFY, rng)
     elif goal is not None and state.task.announced:
-        state.say_first(remark(DialogueMove.CLARIFY, goal.name))
+        state.say_first(intend(Function.CORRECTION, contents.destination(goal.name)))
     elif last is not None:
-        state.say_first(remark(DialogueMove.CLARIFY, *last.act.slots, wording=last.wording))
+        state.say_first(repeated(last, Function.CORRECTION))
 
 
 def _acknowledgement(
@@ -378,7 +420,7 @@ def _acknowledgement(
 def _alignment(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    state.say_first(remark(DialogueMove.ACKNOWLEDGE, wording=Wording(topic="align")))
+    state.say_first(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="align")))
 
 
 def _request(

@@ -1,0 +1,65 @@
+"""Contents that the scripted speakers often have: destinations, errands, and actions of the car."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition
+from dorothie_gym.ontology import ActionValue, GoalStatus, LandmarkName, StreetName
+
+
+def destination(place: LandmarkName | None, street: StreetName | None = None) -> Proposition:
+    """Returns that the car is to go to a place now, and on which street that lies, if the street is known."""
+    return Proposition.of(Predicate.GOAL, place=place, street=named(street))
+
+
+def errand(place: LandmarkName | None, status: GoalStatus, street: StreetName | None = None) -> Proposition:
+    """Returns that the errand at a place has a status."""
+    return Proposition.of(Predicate.TASK, place=place, street=named(street), status=status)
+
+
+def located(place: LandmarkName | None, street: StreetName | None) -> Proposition:
+    """Returns that a place lies on a street."""
+    return Proposition.of(Predicate.LOCATED, place=place, street=street)
+
+
+def action(
+    value: ActionValue | None,
+    words: ParsedText | None = None,
+    *,
+    direction: Direction | None = None,
+    street: StreetName | None = None,
+    place: LandmarkName | None = None,
+    speed: int | None = None,
+) -> Proposition:
+    """Returns that the car will carry out an action, which is wanted or planned.
+
+    Args:
+        value: the action; None where only the street is said.
+        words: words of the other speaker that give direction and speed.
+        direction: direction, where no words give it.
+        street: street on which, or onto which.
+        place: place at which.
+        speed: speed [km/h], where no words give it.
+    """
+    if words is not None:
+        direction = words.direction
+        speed = round(words.speed) if words.speed is not None and value is ActionValue.SPEED_CHANGE else None
+    return Proposition.of(
+        Predicate.WILL, action=value, direction=direction, street=named(street), place=place, speed=speed
+    )
+
+
+def named(street: StreetName | None) -> StreetName | None:
+    """Returns a street, or None for one whose name is unknown."""
+    return None if street is StreetName.UNKNOWN else street
+
+
+def arguments_of(content: Proposition, *kept: str) -> tuple[str, ...]:
+    """Returns the names of the arguments of a content, without some: what is left out of a short answer."""
+    return tuple(name for name, _ in content.arguments if name not in kept)
+
+
+def first_name(values: Iterable[object]) -> LandmarkName | None:
+    """Returns the first landmark among slot values; None if there is none."""
+    return next((value for value in values if isinstance(value, LandmarkName)), None)
