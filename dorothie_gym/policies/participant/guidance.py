@@ -8,7 +8,7 @@ import numpy as np
 
 from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
 from dorothie_gym.maps.routing import LaneEntry
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, Slot, SlotValue, StreetName
+from dorothie_gym.ontology import ActionValue, DialogueMove, Role, Slot, SlotValue, StreetName
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, approach
@@ -115,7 +115,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     again = state.guidance.step == key
     if near and (not again or overdue):
         if key[0] in ("turn", "lane") and not again and rng.random() < state.style.hints:
-            words = replace(words, act=DialogueAct(DialogueMove.EXPLAIN, words.act.slots))
+            words = replace(words, wording=replace(words.wording, topic="indirect"))
         note_step(state, view, key)
         state.say(*_with_addition(state, words, again, rng))
 
