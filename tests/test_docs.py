@@ -20,7 +20,7 @@ from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.dialogue.grammar import parse_grammar
 from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.maps import describe, load_town
-from dorothie_gym.ontology import WeatherParameter
+from dorothie_gym.ontology import Question, WeatherParameter, paths
 from dorothie_gym.policies import policy_loader
 from dorothie_gym.recording import Task
 from dorothie_gym.rollout.closed_loop import METRICS, RecoverySeconds
@@ -88,6 +88,24 @@ def test_the_talk_of_its_page_is_worded_misheard_and_read() -> None:
 def test_the_phrases_of_the_talk_page_are_grammar() -> None:
     text = example("talk.md", "text").replace("<soon>", "<soon_enough>")
     assert parse_grammar({**read_talk_files(), "page.talk": text})
+
+
+def test_the_annotation_page_shows_the_decision_tree() -> None:
+    page = (DOCS / "annotation.md").read_text().split("## Rules")[0]
+    rows = re.findall(r"^(?:(\d+)\. (.+\?)|    - (.+?)(?:: \*\*(\w+)\*\*| \((\d+)\)))$", page, re.MULTILINE)
+    shown: dict[str, list[tuple[str, str]]] = {}
+    number = ""
+    for question, text, label, move, following in rows:
+        number = question or number
+        shown.setdefault(number, []).append((text, "") if question else (label, move or following))
+    numbers = {entries[0][0]: number for number, entries in shown.items()}
+    found: dict[str, dict[str, str]] = {}
+    for path, _ in paths():
+        for question, answer in path:
+            after = answer.next
+            goes = numbers[after.text] if isinstance(after, Question) else after.label
+            found.setdefault(numbers[question.text], {})[answer.label] = goes
+    assert found == {number: dict(entries[1:]) for number, entries in shown.items()}
 
 
 def test_the_example_of_the_camera_page_takes_a_picture() -> None:

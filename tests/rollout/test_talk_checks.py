@@ -11,10 +11,11 @@ import pytest
 from dorothie_gym.analysis.talk.checks import TalkChecks, check_session, has_loop
 from dorothie_gym.analysis.talk.session_world import SessionWorld
 from dorothie_gym.analysis.talk.truth import agrees, is_right_cause, is_true
-from dorothie_gym.dialogue import ASKED, Predicate, Proposition
+from dorothie_gym.dialogue import ASKED, Direction, Predicate, Proposition
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass, Role, StreetName
-from dorothie_gym.recording import EventType
+from dorothie_gym.ontology import ActionValue, GoalStatus, LandmarkName, ObjectClass, PhysicalAction, Role, StreetName
+from dorothie_gym.recording import FRAME_RATE, ActionRecord, EventType
+from dorothie_gym.recording.header import LandmarkRow
 from tests.analysis.builders import A, M, car, drive, human
 from tests.benchmark.features.played import play
 
@@ -91,6 +92,53 @@ def test_lights_and_hidden_places(world):
         name = next(name for name in LandmarkName if name.label == row["name"])
         if len(world.landmarks(name)) == 1:
             assert told(world, Proposition.of(P.KNOWS, place=name), 10.0) is not row["hidden"]
+
+
+def test_announced_turn_is_true_if_the_car_turns_to_that_side(world):
+    turns = [taken for taken in world.session.physical_actions if taken.action is PhysicalAction.J_TURN]
+    turn = next(taken for taken in turns if taken.angle is not None and abs(taken.angle) > 45.0)
+    side = Direction.LEFT if turn.angle > 0.0 else Direction.RIGHT
+    before = turn.frame / FRAME_RATE - 5.0
+    announced = Proposition.of(P.WILL, action=ActionValue.J_TURN, direction=side)
+    assert told(world, announced, before) is True
+    assert told(world, Proposition.of(P.WILL, action=ActionValue.LANE_FOLLOW), before) is None
+    calm = [
+        t
+        for t in np.arange(5.0, 150.0)
+        if not any(0.0 <= u.frame / FRAME_RATE - t + 6.0 <= 66.0 for u in u_turns(world))
+    ]
+    assert all(told(world, Proposition.of(P.WILL, action=ActionValue.U_TURN), time) is not True for time in calm)
+
+
+def u_turns(world: SessionWorld) -> list[ActionRecord]:
+    return [taken for taken in world.session.physical_actions if taken.action is PhysicalAction.U_TURN]
+
+
+def test_status_of_a_task_follows_the_record(world):
+    event = next(event for event in world.changes if event.data.get("cause") == "arrival")
+    name = next(name for name in LandmarkName if name.label == event.data["landmark"])
+    done = Proposition.of(P.TASK, place=name, status=GoalStatus.COMPLETE)
+    open_task = Proposition.of(P.TASK, place=name, status=GoalStatus.PENDING)
+    assert told(world, done, event.time - 1.0) is False and told(world, done, event.time + 1.0) is True
+    assert told(world, open_task, event.time - 1.0) is True
+    assert told(world, Proposition.of(P.GOAL, place=name), event.time - 1.0) is True
+    later = [number for number, row in enumerate(world.session.header.subgoals) if row["trigger"]]
+    tasks = {world.session.header.landmarks[row["landmark"]]["name"] for row in world.session.header.subgoals}
+    foreign = next(row for row in world.session.header.landmarks if row["name"] not in tasks)
+    assert not later and told(world, Proposition.of(P.GOAL, place=name_of(foreign)), event.time - 1.0) is False
+
+
+def test_nearer_place_has_the_shorter_way(world):
+    single = [row for row in world.session.header.landmarks if len(world.landmarks(name_of(row))) == 1]
+    ways = sorted((world.way_to(20.0, row), name_of(row).value, name_of(row)) for row in single)
+    near, far = ways[0][2], ways[-1][2]
+    assert ways[-1][0] > ways[0][0] + 50.0
+    assert told(world, Proposition.of(P.NEARER, place=near, landmark=far), 20.0) is True
+    assert told(world, Proposition.of(P.NEARER, place=far, landmark=near), 20.0) is False
+
+
+def name_of(row: LandmarkRow) -> LandmarkName:
+    return next(name for name in LandmarkName if name.label == row["name"])
 
 
 def checked(world: SessionWorld, move: str, *meaning: Proposition) -> TalkChecks:

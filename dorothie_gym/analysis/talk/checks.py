@@ -33,7 +33,6 @@ SAME_ORDERS: Final = 3
 _FACTUAL: Final = frozenset(
     {
         DialogueMove.EXPLAIN, DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM,
-        DialogueMove.ACKNOWLEDGE, DialogueMove.CLARIFY,
     }
 )  # fmt: skip
 _YES_NO: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N})

@@ -185,6 +185,19 @@ class SessionWorld:
         """Changes of the subgoals, in order."""
         return self.session.of_type(EventType.SUBGOAL)
 
+    def statuses(self, time: float, name: LandmarkName) -> tuple[GoalStatus, ...]:
+        """Returns the statuses of the tasks at places of a name that have come up by a time [s]."""
+        found: list[GoalStatus] = []
+        for number, subgoal in enumerate(self.session.header.subgoals):
+            place = str(self.session.header.landmarks[subgoal["landmark"]]["name"])
+            status = None if subgoal["trigger"] else GoalStatus.PENDING.label
+            for event in self.changes:
+                if event.data.get("subgoal") == number and event.time <= time:
+                    place, status = str(event.data.get("landmark")), str(event.data.get("status"))
+            if status is not None and place == name.label:
+                found.append(next(value for value in GoalStatus if value.label == status))
+        return tuple(found)
+
     def arrival(self, time: float, name: LandmarkName) -> float | None:
         """Returns the time of the next arrival, if it is at a landmark of a name and no task changes before [s]."""
         following = next((event for event in self.changes if event.time > time), None)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from dorothie_gym.analysis.talk import plans
 from dorothie_gym.analysis.talk.session_world import ACTORS, SessionWorld
 from dorothie_gym.dialogue import Predicate, Proposition
 from dorothie_gym.ontology import (
@@ -157,10 +158,6 @@ def _because(world: SessionWorld, said: Proposition, time: float, speaker: Role)
     return is_right_cause(world, cause, effect if isinstance(effect, Proposition) else None, when)
 
 
-def _goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    return world.goal_named(time) if said.get("place") is None else None
-
-
 def _failed(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
     """Whether a sensor has failed, or had until a moment ago: the effect of a fault fades."""
     sensor = said.get("sensor")
@@ -186,6 +183,7 @@ def _crowded(world: SessionWorld, said: Proposition, time: float, speaker: Role)
 
 
 _EVALUATORS: Final[dict[Predicate, Evaluator]] = {
+    **plans.EVALUATORS,
     Predicate.SEES: _sees,
     Predicate.ON_STREET: _on_street,
     Predicate.LOCATED: _located,
@@ -195,7 +193,6 @@ _EVALUATORS: Final[dict[Predicate, Evaluator]] = {
     Predicate.VISIBILITY: _visibility,
     Predicate.ARRIVED: _arrived,
     Predicate.BECAUSE: _because,
-    Predicate.GOAL: _goal,
     Predicate.LIGHTS_ON: lambda world, said, time, speaker: world.lights_on(time),
     Predicate.STANDS: lambda world, said, time, speaker: world.stands(time),
     Predicate.FAILED: _failed,

@@ -1,0 +1,103 @@
+"""Truth of what is said about tasks, destinations and plans, held against what was recorded afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from dorothie_gym.analysis.talk.session_world import SessionWorld
+from dorothie_gym.dialogue import Direction, Predicate, Proposition
+from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, PhysicalAction, Role
+from dorothie_gym.recording import FRAME_RATE
+
+CARRIED_OUT_WITHIN: Final = 60.0
+"""Time within which an announced action is carried out [s]."""
+
+_JUST_DONE: Final = 6.0  # time before the words within which the action may already have been taken [s]
+_STRAIGHT: Final = 30.0  # largest angle of a way that counts as straight [degrees]
+_SHORTER: Final = 30.0  # difference of two ways that is not noticed [m]
+
+_COMMANDS: Final[Mapping[ActionValue, tuple[PhysicalAction, ...]]] = MappingProxyType(
+    {
+        ActionValue.J_TURN: (PhysicalAction.J_TURN,),
+        ActionValue.U_TURN: (PhysicalAction.U_TURN,),
+        ActionValue.LANE_SWITCH: (PhysicalAction.LANE_SWITCH,),
+        ActionValue.SPEED_CHANGE: (PhysicalAction.SPEED_CHANGE,),
+        ActionValue.LIGHT_CHANGE: (PhysicalAction.LIGHT_CHANGE,),
+        ActionValue.STOP: (PhysicalAction.STOP,),
+    }
+)
+"""Physical actions by which an announcement is carried out; following a lane needs none."""
+
+_COUNTERMANDS: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_N, DialogueMove.CLARIFY})
+
+
+def is_carried_out(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Returns whether the car carries out an announced action; None if it is told otherwise or the session ends."""
+    value, direction = said.get("action"), said.get("direction")
+    commands = _COMMANDS.get(value) if isinstance(value, ActionValue) else None
+    if commands is None or speaker is not Role.CO_WIZARD:
+        return None
+    until = time + CARRIED_OUT_WITHIN
+    for taken in world.session.physical_actions:
+        when = taken.frame / FRAME_RATE
+        fits = taken.action in commands and _goes(taken.angle, direction)
+        if fits and time - _JUST_DONE <= when <= until:
+            return True
+    told = any(
+        move.act.move in _COUNTERMANDS and time < move.end <= until for move in world.session.moves(Role.PARTICIPANT)
+    )
+    changed = any(time < event.time <= until for event in world.changes)
+    over = len(world.session.trajectory) and world.session.trajectory["frame"][-1] < until * FRAME_RATE
+    return None if told or changed or over else False
+
+
+def _goes(angle: float | None, direction: object) -> bool:
+    if angle is None or direction not in (Direction.LEFT, Direction.RIGHT):
+        return True
+    return angle > -_STRAIGHT if direction is Direction.LEFT else angle < _STRAIGHT
+
+
+def is_goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Returns whether a place is one of the open tasks; without a place, whether one has been named."""
+    place = said.get("place")
+    if place is None:
+        return world.goal_named(time)
+    statuses = world.statuses(time, place) if isinstance(place, LandmarkName) else ()
+    return bool({GoalStatus.PENDING, GoalStatus.ONGOING} & set(statuses))
+
+
+def has_status(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Returns whether the task at a place has a status: open ones may be called pending or ongoing."""
+    place, status = said.get("place"), said.get("status")
+    if not isinstance(place, LandmarkName) or not isinstance(status, GoalStatus):
+        return None
+    found = set(world.statuses(time, place))
+    if status in (GoalStatus.PENDING, GoalStatus.ONGOING):
+        return bool(found & {GoalStatus.PENDING, GoalStatus.ONGOING})
+    return status in found if status in (GoalStatus.COMPLETE, GoalStatus.ABANDONED) else None
+
+
+def is_nearer(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Returns whether the way to a place is shorter than that to another one."""
+    ways = []
+    for name in (said.get("place"), said.get("landmark")):
+        rows = world.landmarks(name) if isinstance(name, LandmarkName) else []
+        if len(rows) != 1:
+            return None
+        ways.append(world.way_to(time, rows[0]))
+    return ways[0] <= ways[1] + _SHORTER
+
+
+EVALUATORS: Final[Mapping[Predicate, Callable[[SessionWorld, Proposition, float, Role], bool | None]]] = (
+    MappingProxyType(
+        {
+            Predicate.WILL: is_carried_out,
+            Predicate.GOAL: is_goal,
+            Predicate.TASK: has_status,
+            Predicate.NEARER: is_nearer,
+        }
+    )
+)
+"""Evaluators of statements about tasks and plans, by predicate; see `truth.Evaluator`."""
