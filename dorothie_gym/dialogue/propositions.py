@@ -55,11 +55,11 @@ class Predicate(enum.StrEnum):
     ON_STREET = "on_street"
     """The car is on a street."""
     LOCATED = "located"
-    """A landmark lies on a street."""
+    """A landmark lies on a street, near the corner of another one (`cross`), or on a side of it, seen from the car."""
     NEAR = "near"
-    """A landmark lies near another one."""
+    """A landmark lies near another one, or near an object."""
     LOOKS = "looks"
-    """The building at a landmark has a feature."""
+    """The building or person at a landmark has a feature."""
     WEATHER = "weather"
     """A parameter of the weather is high (or low)."""
     VISIBILITY = "visibility"
@@ -126,7 +126,7 @@ class Predicate(enum.StrEnum):
     BECAUSE = "because"
     """An effect has a cause, or had it at a time of the session [s]."""
     FEELS = "feels"
-    """The speaker has a feeling."""
+    """The speaker has a feeling, which may have a cause."""
 
 
 Argument: TypeAlias = (
@@ -145,9 +145,9 @@ PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
     {
         Predicate.SEES: {"object": ObjectClass, "place": LandmarkName},
         Predicate.ON_STREET: {"street": StreetName},
-        Predicate.LOCATED: {**_PLACE, "street": StreetName},
-        Predicate.NEAR: {**_PLACE, "landmark": LandmarkName},
-        Predicate.LOOKS: {**_PLACE, "feature": str},
+        Predicate.LOCATED: {**_PLACE, "street": StreetName, "cross": StreetName, "side": Direction},
+        Predicate.NEAR: {**_PLACE, "landmark": LandmarkName, "object": ObjectClass},
+        Predicate.LOOKS: {**_PLACE, "object": ObjectClass, "feature": str},
         Predicate.WEATHER: {"parameter": WeatherParameter, "high": bool, "object": ObjectClass},
         Predicate.VISIBILITY: {},
         Predicate.BLOCKED: {"object": ObjectClass, "prop": PropKind, "street": StreetName},

@@ -169,8 +169,17 @@ class SlotRealizer:
 
     def distance(self) -> str:
         """Returns the distance in tens of metres, in words."""
-        metres = cardinal(max(10, 10 * round((self._wording.distance or 0) / 10)))
-        return f"{metres} {'metres' if self.idiolect % 3 == 1 else 'meters'}"
+        return self._length(self._wording.distance or 0)
+
+    def metres(self) -> str:
+        """Returns the distance of the content in words."""
+        metres = self.argument("metres")
+        assert isinstance(metres, int)
+        return self._length(metres)
+
+    def _length(self, metres: float) -> str:
+        words = cardinal(max(10, 10 * round(metres / 10)))
+        return f"{words} {'metres' if self.idiolect % 3 == 1 else 'meters'}"
 
     def direction(self) -> str:
         """Returns the direction."""
@@ -258,6 +267,7 @@ _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
         "past": SlotRealizer.past,
         "dropped": SlotRealizer.dropped,
         "seconds": SlotRealizer.duration,
+        "metres": SlotRealizer.metres,
         "cause": SlotRealizer.clause,
         "prop": SlotRealizer.prop,
         "feature": lambda realizer: str(realizer.argument("feature")),

@@ -35,6 +35,7 @@ class ParticipantArrays(NamedTuple):
     pose: Array
     lane: Integers
     station: Array
+    sight: Array
     lights: Integers
     objects: Array
 
@@ -48,6 +49,7 @@ class CoWizardArrays(NamedTuple):
     pose: Array
     lane: Integers
     station: Array
+    sight: Array
     pose_covariance: Array
     cruise_speed: Array
     lights: Integers

@@ -192,6 +192,7 @@ def observe_as_participant(world: WorldArrays, views: ParticipantArrays, number:
     views.time[number, 0], views.speed[number, 0] = world.clock[0].frame / FRAME_RATE, car.speed
     views.pose[number, 0], views.pose[number, 1], views.pose[number, 2] = car.x, car.y, car.heading
     views.lane[number], views.station[number, 0], views.lights[number] = plan.lane, plan.station, plan.lights
+    views.sight[number, 0] = world.eye[0].sight
 
 
 @compiled
@@ -220,6 +221,7 @@ def observe_as_co_wizard(
         town, x, y, heading, math.cos(heading), math.sin(heading), car.height, int(plan.lane)
     )
     views.lane[number], views.station[number, 0] = lane, min(max(station, 0.0), town.lanes[lane].length)
+    views.sight[number, 0] = world.eye[0].sight
     views.cruise_speed[number, 0], views.lights[number], views.motion[number] = (
         plan.cruise,
         plan.lights,

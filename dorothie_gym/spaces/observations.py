@@ -28,6 +28,7 @@ from dorothie_gym.ontology import (
     WeatherParameter,
     decode_slots,
 )
+from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.spaces.actions import NO_MOVE
 from dorothie_gym.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
@@ -162,6 +163,7 @@ def observation_fields(role: Role, limits: SpaceLimits, observe_acts: bool = Tru
 
 def _participant_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpec, ...]:
     return (
+        _sight(),
         _objects(limits),
         _lights(),
         _subgoals(limits),
@@ -175,6 +177,7 @@ def _participant_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldS
 
 def _co_wizard_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpec, ...]:
     return (
+        _sight(),
         real("pose_covariance", 3, 3, unit="m, m, rad", meaning="covariance of the estimated x, y and heading"),
         real("cruise_speed", 1, unit="km/h", meaning="speed set by the Co-Wizard"),
         _lights(),
@@ -245,6 +248,11 @@ def camera_perception_fields(limits: SpaceLimits) -> tuple[FieldSpec, ...]:
     view.
     """
     return (flags("landmarks_in_view", limits.landmarks, meaning="1 for landmarks that the picture shows"),)
+
+
+def _sight() -> FieldSpec:
+    meaning = "range within which all objects are seen, as weather, light, head lights and the camera leave it"
+    return real("sight", 1, low=0.0, high=CLEAR_SIGHT, unit="m", meaning=meaning)
 
 
 def _objects(limits: SpaceLimits) -> FieldSpec:

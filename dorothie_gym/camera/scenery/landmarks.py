@@ -1,14 +1,9 @@
-"""Landmarks of a session as buildings that one recognises: brands by colours, form and totem, others by a pictogram.
-
-All houses are alike, and all persons: nothing shows which of them is a goal. The designs are our own.
-"""
+"""Landmarks of a session as buildings that one recognises: brands by colours, form and totem, others by a pictogram."""
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -22,6 +17,7 @@ from dorothie_gym.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import LandmarkName, ObjectClass
 from dorothie_gym.rendering.shapes import disc
+from dorothie_gym.tasks.landmark_designs import COAT, HOUSE, MIDDLE_STRIPE, STORES, StoreDesign, Top
 from dorothie_gym.tasks.storyboard import Landmark
 
 TOTEM = 6.4, 1.6
@@ -43,50 +39,7 @@ def landmark_key(index: int) -> int:
     return -1 - index
 
 
-class _Top(enum.Enum):
-    """Form of a store above its walls."""
-
-    FLAT = enum.auto()
-    MANSARD = enum.auto()
-    """Slanted on all sides."""
-    GABLE = enum.auto()
-    TOWER = enum.auto()
-    """Flat, with a tower at a corner."""
-    STEPPED = enum.auto()
-    """Flat, with a higher middle."""
-    STRIPED = enum.auto()
-    """Flat, with a fascia of three stripes."""
-    HALL = enum.auto()
-    """A high hall without windows."""
-    CANOPY = enum.auto()
-    """A roof over pumps before a small building."""
-
-
-@dataclass(frozen=True)
-class _Design:
-    """Form and colours of a store: of its walls, of what is above them, and of accents."""
-
-    top: _Top
-    wall: Rgb
-    fascia: Rgb
-    accent: Rgb
-    most: tuple[float, float] = (17.0, 12.0)
-    """Largest length and depth [m]."""
-
-
-_DESIGNS = {
-    LandmarkName.BURGER_KING: _Design(_Top.MANSARD, (226, 204, 172), (112, 56, 28), (206, 60, 34)),
-    LandmarkName.COCO: _Design(_Top.FLAT, (250, 206, 148), (246, 150, 36), (70, 34, 8), (13.0, 10.0)),
-    LandmarkName.IKEA: _Design(_Top.HALL, (0, 78, 158), (0, 78, 158), (255, 218, 26), (20.0, 15.0)),
-    LandmarkName.KFC: _Design(_Top.TOWER, (240, 238, 234), (196, 16, 40), (196, 16, 40)),
-    LandmarkName.PANERA: _Design(_Top.GABLE, (232, 218, 186), (74, 98, 34), (74, 98, 34)),
-    LandmarkName.QDOBA: _Design(_Top.STEPPED, (222, 196, 150), (112, 26, 78), (230, 150, 40)),
-    LandmarkName.SEVEN_ELEVEN: _Design(_Top.STRIPED, (244, 244, 242), (0, 126, 84), (238, 118, 36), (14.0, 10.0)),
-    LandmarkName.SHELL: _Design(_Top.CANOPY, (240, 240, 238), (252, 208, 20), (206, 26, 26)),
-}
-
-_HOUSE_WALL, _HOUSE_ROOF, _HOUSE_TRIM = (46, 178, 184), (222, 74, 36), (250, 250, 246)
-_PERSON = Look(Outfit.COAT, (250, 216, 30), (30, 40, 90), (198, 148, 114), (40, 32, 28), (250, 216, 30))
+_PERSON = Look(Outfit.COAT, COAT, (30, 40, 90), (198, 148, 114), (40, 32, 28), COAT)
 
 
 def build_landmarks(landmarks: Iterable[Landmark], lots: Sequence[Lot], ground: Heights) -> Mesh:
@@ -108,8 +61,8 @@ def build_landmarks(landmarks: Iterable[Landmark], lots: Sequence[Lot], ground: 
 def landmark_form(name: LandmarkName, lot: Lot, ground: Heights) -> Mesh:
     """Returns the triangles of a landmark on a lot; none for a name without a building."""
     works = _Works(lot, ground)
-    if name in _DESIGNS:
-        _store(works, _DESIGNS[name], BRAND_SIGNS[name][0])
+    if name in STORES:
+        _store(works, STORES[name], BRAND_SIGNS[name][0])
     elif name is LandmarkName.HOUSE:
         _house(works)
     elif name is LandmarkName.PERSON:
@@ -195,38 +148,38 @@ class _Works:
             )  # fmt: skip
 
 
-def _store(works: _Works, design: _Design, texture: Texture) -> None:
+def _store(works: _Works, design: StoreDesign, texture: Texture) -> None:
     length, depth = min(works.lot.length, design.most[0]), min(works.lot.depth, design.most[1])
     side = length / 2.0
-    totem = 9.4 if design.top is _Top.HALL else 5.6
+    totem = 9.4 if design.top is Top.HALL else 5.6
     works.sign(side + 0.9, totem, TOTEM, texture, design.fascia)
     match design.top:
-        case _Top.CANOPY:
+        case Top.CANOPY:
             _petrol_station(works, design, texture, length, depth)
             return
-        case _Top.HALL:
+        case Top.HALL:
             _hall(works, design, texture, length, depth)
             return
     _walls(works, (0.0, depth), side, design.wall)
     top = _fascia(works, design, texture, length, depth)
     match design.top:
-        case _Top.MANSARD:
+        case Top.MANSARD:
             works.box(
                 (0.5, depth - 0.5), (0.5 - side, side - 0.5), (top, top + 1.8), design.fascia, shrunk=1.6, top=_ROOF
             )
-        case _Top.GABLE:
+        case Top.GABLE:
             _gable(works, (0.0, depth), side, top, design.fascia, design.wall)
-        case _Top.TOWER:
+        case Top.TOWER:
             # red and white stripes on the walls, and a tower higher than the roof
             for k in np.linspace(-side + 0.8, side - 5.2, 5).tolist():
                 works.panel(-0.03, k, _WALL / 2.0, 0.5, _WALL, colour=design.accent)
             works.box((0.0 - 0.25, 3.4), (side - 4.0, side - 0.3), (0.0, top + 2.4), design.accent, top=_ROOF)
             works.panel(-0.28, side - 2.15, top + 1.1, 3.5, 0.875, texture=texture)
-        case _Top.STEPPED:
+        case Top.STEPPED:
             works.box((-0.3, 2.0), (-0.3 * side, 0.3 * side), (top, top + 1.5), design.fascia, top=_ROOF)
             works.box((-0.32, 0.0), (-0.32 * side, 0.32 * side), (top + 1.5, top + 1.75), design.accent)
-        case _Top.STRIPED:
-            for k, colour in enumerate((design.accent, (208, 30, 44), design.fascia)):
+        case Top.STRIPED:
+            for k, colour in enumerate((design.accent, MIDDLE_STRIPE, design.fascia)):
                 low = top - 1.5 + 0.5 * k
                 works.box(
                     (-0.34, depth + 0.34), (-side - 0.34, side + 0.34), (low, low + 0.5), colour, top=_ROOF, bottom=True
@@ -251,7 +204,7 @@ def _walls(works: _Works, deep: tuple[float, float], side: float, colour: Rgb) -
     )  # fmt: skip
 
 
-def _fascia(works: _Works, design: _Design, texture: Texture, length: float, depth: float) -> float:
+def _fascia(works: _Works, design: StoreDesign, texture: Texture, length: float, depth: float) -> float:
     """Adds the band with the name above the walls; returns its height above the ground."""
     side, height = length / 2.0, 2.2
     works.box(
@@ -259,9 +212,9 @@ def _fascia(works: _Works, design: _Design, texture: Texture, length: float, dep
         top=_ROOF, bottom=True,
     )  # fmt: skip
     middle = _WALL - 0.3 + height / 2.0
-    shown = 1.9 if design.top is not _Top.STRIPED else 1.5
-    offset = -0.36 if design.top is _Top.STRIPED else -0.27
-    works.panel(offset, -1.8 if design.top is _Top.TOWER else 0.0, middle, 4.0 * shown, shown, texture=texture)
+    shown = 1.9 if design.top is not Top.STRIPED else 1.5
+    offset = -0.36 if design.top is Top.STRIPED else -0.27
+    works.panel(offset, -1.8 if design.top is Top.TOWER else 0.0, middle, 4.0 * shown, shown, texture=texture)
     return _WALL - 0.3 + height
 
 
@@ -282,7 +235,7 @@ def _gable(works: _Works, deep: tuple[float, float], side: float, low: float, co
     works.builder.quad([a, b, c, d], colour=np.array(wall) * 0.7, kind=kind)
 
 
-def _hall(works: _Works, design: _Design, texture: Texture, length: float, depth: float) -> None:
+def _hall(works: _Works, design: StoreDesign, texture: Texture, length: float, depth: float) -> None:
     side, height = length / 2.0, 8.4
     works.foundation((0.0, depth), (-side, side))
     works.box((0.0, depth), (-side, side), (0.0, height), design.wall, top=_ROOF)
@@ -293,7 +246,7 @@ def _hall(works: _Works, design: _Design, texture: Texture, length: float, depth
     works.panel(-0.05, 0.0, 6.2, width, width / 4.0, texture=texture)
 
 
-def _petrol_station(works: _Works, design: _Design, texture: Texture, length: float, depth: float) -> None:
+def _petrol_station(works: _Works, design: StoreDesign, texture: Texture, length: float, depth: float) -> None:
     side = length / 2.0
     shop = depth > 9.0  # a small lot has the canopy only
     reach = 6.4 if shop else max(2.0, depth - 0.5)
@@ -318,11 +271,11 @@ def _house(works: _Works) -> None:
     side, walls = length / 2.0, 3.3
     deep = (0.8, max(depth, 2.0))
     works.foundation(deep, (-side, side))
-    works.box(deep, (-side, side), (0.0, walls), _HOUSE_WALL)
-    _gable(works, deep, side, walls, _HOUSE_ROOF, _HOUSE_TRIM)
+    works.box(deep, (-side, side), (0.0, walls), HOUSE.wall)
+    _gable(works, deep, side, walls, HOUSE.roof, HOUSE.trim)
     works.panel(deep[0] - 0.03, 0.0, 1.1, 1.2, 2.2, texture=Texture.DOOR)
     for right in (-0.6 * side, 0.6 * side):
-        works.panel(deep[0] - 0.02, right, 1.7, 1.7, 1.5, colour=_HOUSE_TRIM)
+        works.panel(deep[0] - 0.02, right, 1.7, 1.7, 1.5, colour=HOUSE.trim)
         works.panel(deep[0] - 0.04, right, 1.7, 1.4, 1.2, colour=(74, 96, 116), surface=Surface.GLASS)
     works.sign(side + 0.9, 2.5, (PICTOGRAM, PICTOGRAM), Texture.HOUSE_SIGN, (24, 74, 168), deep=0.2)
 

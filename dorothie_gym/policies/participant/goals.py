@@ -11,36 +11,18 @@ from dorothie_gym.dialogue import Predicate, Proposition, Wording
 from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import (
     ActionValue,
-    DialogueMove,
     GoalStatus,
-    LandmarkName,
-    ObjectClass,
     StreetName,
 )
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
+from dorothie_gym.policies.participant.hints import famous_nearby, looks_remark
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
-from dorothie_gym.policies.speech import Remark, intend, remark
+from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.tasks.purposes import Purpose, read_purposes
-
-_FAMOUS = frozenset(LandmarkName) - {
-    LandmarkName.HOUSE,
-    LandmarkName.PERSON,
-    LandmarkName.UNKNOWN,
-    LandmarkName.QUERIED,
-}
-"""Landmarks that help to describe another place."""
-
-_FEATURES = (
-    ObjectClass.BUILDING, ObjectClass.FENCE, ObjectClass.WALL, ObjectClass.POLE, ObjectClass.VEGETATION,
-    ObjectClass.TRAFFIC_SIGN, ObjectClass.SIDE_WALK, ObjectClass.TERRAIN, ObjectClass.GROUND, ObjectClass.WATER,
-    ObjectClass.BRIDGE, ObjectClass.GUARD_RAIL, ObjectClass.RAIL_TRACK, ObjectClass.OTHER, ObjectClass.ROAD_LINE,
-)  # fmt: skip
-"""Objects that houses and people may be recognized by."""
-
 
 # --- changes of the tasks -------------------------------------------------------------------------------------------
 
@@ -334,28 +316,12 @@ def describe(state: ParticipantState, view: ParticipantView, function: Function,
     no_street = goal.street is StreetName.UNKNOWN
     state.set_guiding(bool(no_street or state.task.described or rng.random() < state.config.guides_at_once))
     state.task = state.task.after_describing()
-    near = _famous_nearby(goal, view, state.config.near_landmark)
+    near = famous_nearby(goal, view, state.config.near_landmark)
     beside = None if near is None else Proposition.of(Predicate.NEAR, place=goal.name, landmark=near.name)
     on_street = None if no_street else contents.located(goal.name, goal.street)
     facts = [fact for fact in (on_street, beside) if fact is not None]
-    looks = (_looks(goal),) if rng.random() < state.config.describes_looks else ()
+    looks = looks_remark(state, goal, rng) if rng.random() < state.config.describes_looks else ()
     if not facts:
         state.say_first(intend(Function.UNCERTAIN_ANSWER), *looks)
         return
     state.say_first(intend(function, *facts, elided=("place",), wording=Wording(topic="where")), *looks)
-
-
-def _looks(goal: SeenLandmark) -> Remark:
-    """Returns a remark about an object at a place; always the same object for the same place."""
-    thing = _FEATURES[int(abs(goal.x) * 7.0 + abs(goal.y) * 3.0) % len(_FEATURES)]
-    return remark(DialogueMove.EXPLAIN, thing, wording=Wording(topic="looks"), joined=True)
-
-
-def _famous_nearby(goal: SeenLandmark, view: ParticipantView, within: float) -> SeenLandmark | None:
-    """Returns the well-known landmark closest to the target, if one is near [m]."""
-    found = [
-        (abs(other.x - goal.x) + abs(other.y - goal.y), other.row, other)
-        for other in view.landmarks
-        if other.name in _FAMOUS and other.name is not goal.name
-    ]
-    return min(found)[2] if found and min(found)[0] < within else None

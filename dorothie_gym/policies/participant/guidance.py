@@ -12,6 +12,7 @@ from dorothie_gym.ontology import ActionValue, DialogueMove, Role, Slot, SlotVal
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, approach
+from dorothie_gym.policies.participant.hints import hint
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
@@ -117,7 +118,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         if key[0] in ("turn", "lane") and not again and rng.random() < state.style.hints:
             words = replace(words, wording=replace(words.wording, topic="indirect"))
         note_step(state, view, key)
-        state.say(*_with_addition(state, words, again, rng))
+        state.say(*_with_addition(state, view, words, again, rng))
 
 
 def _stop_circling(state: ParticipantState, view: ParticipantView) -> None:
@@ -140,7 +141,9 @@ def _may_speak(state: ParticipantState, view: ParticipantView) -> bool:
     return state.speech.idle and view.speaking <= 0.0
 
 
-def _with_addition(state: ParticipantState, words: Remark, again: bool, rng: np.random.Generator) -> tuple[Remark, ...]:
+def _with_addition(
+    state: ParticipantState, view: ParticipantView, words: Remark, again: bool, rng: np.random.Generator
+) -> tuple[Remark, ...]:
     """Returns a step with a possible addition in the same breath: a hint, or a question whether it was understood."""
     draw = rng.random()
     if words.act.values(Slot.ACTION) == (ActionValue.U_TURN,):
@@ -152,7 +155,7 @@ def _with_addition(state: ParticipantState, words: Remark, again: bool, rng: np.
     if draw < state.style.aligns:
         return words, remark(DialogueMove.ALIGN, joined=True)
     if draw < state.style.aligns + 0.7 * state.style.reasons:
-        return words, remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic="hint"))
+        return words, *hint(state, view, rng)
     return (words,)
 
 

@@ -26,13 +26,14 @@ from dorothie_gym.policies.observation_parser import SeenSubgoal, heard_utteranc
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, describe, route_length, story_remark, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
+from dorothie_gym.policies.participant.hints import hint
 from dorothie_gym.policies.participant.reactions import note_blocked
 from dorothie_gym.policies.participant.repairs import correction, has_missed
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
-from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, intend, remark, repeated
+from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, intend, repeated
 
 _FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
 """Actions that are left to the car."""
@@ -144,7 +145,7 @@ def _addition(state: ParticipantState, view: ParticipantView, rng: np.random.Gen
     if rng.random() >= state.style.reasons:
         return ()
     if state.guidance.guiding or rng.random() < 0.5:
-        return (remark(DialogueMove.EXPLAIN, joined=True, wording=Wording(topic="hint")),)
+        return hint(state, view, rng)
     return story_remark(state, view, rng)
 
 

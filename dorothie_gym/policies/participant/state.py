@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from dorothie_gym.dialogue import Proposition
 from dorothie_gym.policies.noticing import Noticed
 from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
@@ -106,6 +107,7 @@ class TaskProgress:
         next_at: time before which the next task is not named unless the car asks [s].
         resume_at: time at which a car that was asked to wait is sent on [s]; infinite where it does not wait.
         put_off: subgoals that were interrupted and are to be resumed.
+        told: what has been said about the way to the target, its place, and what the speaker feels about it.
     """
 
     subgoals: tuple[SeenSubgoal, ...] = ()
@@ -118,6 +120,7 @@ class TaskProgress:
     next_at: float = -math.inf
     resume_at: float = math.inf
     put_off: frozenset[int] = frozenset()
+    told: frozenset[Proposition] = frozenset()
 
     def with_subgoals(self, subgoals: tuple[SeenSubgoal, ...]) -> TaskProgress:
         """Sets the subgoals as observed."""
@@ -129,7 +132,11 @@ class TaskProgress:
 
     def without_target(self) -> TaskProgress:
         """Drops the target."""
-        return replace(self, target=None, goal=None, announced=False, described=False)
+        return replace(self, target=None, goal=None, announced=False, described=False, told=frozenset())
+
+    def after_telling(self, said: Proposition) -> TaskProgress:
+        """Records what has been said about the target."""
+        return replace(self, told=self.told | {said})
 
     def after_announcement(self, now: float) -> TaskProgress:
         """Records that the target was announced."""

@@ -1,0 +1,146 @@
+"""Hints of the participant that help to find the target, from its map and from what the place looks like; feelings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Proposition, Wording
+from dorothie_gym.maps.model import SignalKind
+from dorothie_gym.maps.whereabouts import corner_of, is_on_right, signals_near
+from dorothie_gym.ontology import LandmarkName, ObjectClass, StreetName
+from dorothie_gym.policies.observation_parser import SeenLandmark, street_of
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.tasks.landmark_designs import features_of
+
+_FAMOUS = frozenset(LandmarkName) - {
+    LandmarkName.HOUSE,
+    LandmarkName.PERSON,
+    LandmarkName.UNKNOWN,
+    LandmarkName.QUERIED,
+}
+"""Landmarks that help to describe another place."""
+
+_SIGNS = {
+    SignalKind.TRAFFIC_LIGHT: ObjectClass.TRAFFIC_LIGHT,
+    SignalKind.STOP: ObjectClass.TRAFFIC_SIGN,
+    SignalKind.YIELD: ObjectClass.TRAFFIC_SIGN,
+    SignalKind.SPEED: ObjectClass.TRAFFIC_SIGN,
+}
+
+_CLOSE, _FAR = 120.0, 220.0
+"""Way to the target up to which it is called close, and from which on it is called far [m]."""
+
+_MEASURED = 60.0, 600.0
+"""Ways to the target whose length is told [m]."""
+
+_FEELINGS = 0.25
+"""Probability of a remark about a feeling that has a cause, instead of a hint."""
+
+
+def hint(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns a remark that helps to find the target or tells a feeling; nothing where all of it has been said."""
+    felt = _feeling(state, view)
+    if felt is not None and rng.random() < _FEELINGS:
+        return (_said(state, felt),)
+    facts = [fact for fact in _facts(state, view) if fact not in state.task.told]
+    if not facts:
+        return ()
+    return (_said(state, facts[int(rng.integers(len(facts)))]),)
+
+
+def looks_remark(state: ParticipantState, goal: SeenLandmark, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns a remark about what a place looks like, as the scene of the camera has it; nothing if it is unknown."""
+    features = list(_looks(goal))
+    return (_said(state, features[int(rng.integers(len(features)))]),) if features else ()
+
+
+def famous_nearby(goal: SeenLandmark, view: ParticipantView, within: float) -> SeenLandmark | None:
+    """Returns the well-known landmark closest to the target, if one is near [m]."""
+    found = [
+        (abs(other.x - goal.x) + abs(other.y - goal.y), other.row, other)
+        for other in view.landmarks
+        if other.name in _FAMOUS and other.name is not goal.name
+    ]
+    return min(found)[2] if found and min(found)[0] < within else None
+
+
+def _said(state: ParticipantState, content: Proposition) -> Remark:
+    """Returns the remark that states a proposition, and remembers it."""
+    state.task = state.task.after_telling(content)
+    side, topic = content.get("side"), str(content.predicate)
+    if content.predicate is Predicate.LOCATED:
+        topic = next(f"located_{name}" for name in ("side", "cross", "street") if content.get(name) is not None)
+    if content.predicate is Predicate.FEELS:
+        topic = f"feels_{content.get('feeling')}"
+    topic = f"{'not_' * content.negated}{topic}"
+    wording = Wording(topic=topic, direction=side if isinstance(side, Direction) else None)
+    return intend(CommunicativeFunction.INFORM, content, elided=("place",), wording=wording, joined=True)
+
+
+def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Proposition]:
+    """Yields what is known of the way to the target and of its place."""
+    goal, progress = state.task.goal, state.route.progress
+    if goal is None:
+        return
+    if progress is not None:
+        left = progress.left(view.station)
+        if left < _CLOSE or left > _FAR:
+            yield Proposition.of(Predicate.CLOSE, place=goal.name, negated=left > _FAR)
+        if _MEASURED[0] < left < _MEASURED[1]:
+            yield Proposition.of(Predicate.DISTANCE, place=goal.name, metres=_rounded(left))
+        if not progress.astray and not view.standing:
+            yield Proposition.of(Predicate.RIGHT_WAY, place=goal.name)
+        direct = not progress.turns_round_first(state.town, view.station)
+        if direct and progress.next_crossing(state.town, view.station) is None:
+            yield Proposition.of(Predicate.LOCATED, place=goal.name, side=_side(state, view, goal))
+    if goal.street is not StreetName.UNKNOWN and street_of(view.raw, state.town, view.lane) is goal.street:
+        yield Proposition.of(Predicate.LOCATED, place=goal.name, street=goal.street)
+    cross = corner_of(state.town, state.town.lanes[goal.lane].street, goal.x, goal.y)
+    names = view.raw["street_names"]
+    if cross is not None and cross < len(names) and StreetName(int(names[cross])) is not StreetName.UNKNOWN:
+        yield Proposition.of(Predicate.LOCATED, place=goal.name, cross=StreetName(int(names[cross])))
+    near = famous_nearby(goal, view, state.config.near_landmark)
+    if near is not None:
+        yield Proposition.of(Predicate.NEAR, place=goal.name, landmark=near.name)
+    signs = signals_near(state.town, goal.x, goal.y)
+    for sign in dict.fromkeys(_SIGNS[kind] for kind in _SIGNS if kind in signs):
+        yield Proposition.of(Predicate.NEAR, place=goal.name, object=sign)
+    yield from _looks(goal)
+
+
+def _looks(goal: SeenLandmark) -> Iterator[Proposition]:
+    person = goal.name is LandmarkName.PERSON
+    for feature in features_of(goal.name):
+        kinds = (ObjectClass.PEDESTRIAN,) if person else (ObjectClass.BUILDING, None)
+        for kind in kinds:
+            yield Proposition.of(Predicate.LOOKS, place=goal.name, object=kind, feature=feature)
+
+
+def _side(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> Direction:
+    return Direction.RIGHT if is_on_right(state.town, goal.lane, goal.x, goal.y) else Direction.LEFT
+
+
+def _rounded(metres: float) -> int:
+    """Returns a length as it is told: to tens, from 200 m on to hundreds [m]."""
+    step = 10.0 if metres < 195.0 else 100.0
+    return round(step * round(metres / step))
+
+
+def _feeling(state: ParticipantState, view: ParticipantView) -> Proposition | None:
+    """Returns what the participant feels now, and why; None for nothing particular, or if it was said before."""
+    goal, progress, motion = state.task.goal, state.route.progress, state.motion
+    if motion.standstill(view.time) > state.style.patience and view.time >= motion.excused_until:
+        felt = Proposition.of(Predicate.FEELS, feeling="impatient", cause=Proposition.of(Predicate.STANDS))
+    elif state.conversation.bad_weather_since < view.time:
+        poor = Proposition.of(Predicate.VISIBILITY, negated=True)
+        felt = Proposition.of(Predicate.FEELS, feeling="nervous", cause=poor)
+    elif goal is not None and progress is not None and progress.left(view.station) < _CLOSE and not progress.astray:
+        close = Proposition.of(Predicate.CLOSE, place=goal.name)
+        felt = Proposition.of(Predicate.FEELS, feeling="pleased", cause=close)
+    else:
+        return None
+    return None if felt in state.task.told else felt

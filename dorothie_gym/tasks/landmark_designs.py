@@ -1,0 +1,157 @@
+"""Designs of the landmarks' buildings: forms and colours, as the camera draws them and speakers describe them.
+
+All houses are alike, and all persons: nothing shows which of them is a goal. The designs are our own.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Final, TypeAlias
+
+from dorothie_gym.ontology import LandmarkName
+
+Colour: TypeAlias = tuple[int, int, int]
+"""Red, green and blue, 0 to 255."""
+
+
+class Top(enum.Enum):
+    """Form of a store above its walls."""
+
+    FLAT = enum.auto()
+    """Flat, with an awning over the front."""
+    MANSARD = enum.auto()
+    """Slanted on all sides."""
+    GABLE = enum.auto()
+    TOWER = enum.auto()
+    """Flat, with a tower at a corner."""
+    STEPPED = enum.auto()
+    """Flat, with a higher middle."""
+    STRIPED = enum.auto()
+    """Flat, with a fascia of three stripes."""
+    HALL = enum.auto()
+    """A high hall without windows."""
+    CANOPY = enum.auto()
+    """A roof over pumps before a small building."""
+
+
+@dataclass(frozen=True)
+class StoreDesign:
+    """Form and colours of a store.
+
+    Attributes:
+        top: form above the walls.
+        wall: colour of the walls.
+        fascia: colour of what is above them, and of the sign.
+        accent: colour of smaller parts.
+        most: largest length and depth [m].
+    """
+
+    top: Top
+    wall: Colour
+    fascia: Colour
+    accent: Colour
+    most: tuple[float, float] = (17.0, 12.0)
+
+
+@dataclass(frozen=True)
+class HouseDesign:
+    """Colours of a house: walls, gabled roof, and frames of the windows."""
+
+    wall: Colour
+    roof: Colour
+    trim: Colour
+
+
+STORES: Final[Mapping[LandmarkName, StoreDesign]] = MappingProxyType(
+    {
+        LandmarkName.BURGER_KING: StoreDesign(Top.MANSARD, (226, 204, 172), (112, 56, 28), (206, 60, 34)),
+        LandmarkName.COCO: StoreDesign(Top.FLAT, (250, 206, 148), (246, 150, 36), (70, 34, 8), (13.0, 10.0)),
+        LandmarkName.IKEA: StoreDesign(Top.HALL, (0, 78, 158), (0, 78, 158), (255, 218, 26), (20.0, 15.0)),
+        LandmarkName.KFC: StoreDesign(Top.TOWER, (240, 238, 234), (196, 16, 40), (196, 16, 40)),
+        LandmarkName.PANERA: StoreDesign(Top.GABLE, (232, 218, 186), (74, 98, 34), (74, 98, 34)),
+        LandmarkName.QDOBA: StoreDesign(Top.STEPPED, (222, 196, 150), (112, 26, 78), (230, 150, 40)),
+        LandmarkName.SEVEN_ELEVEN: StoreDesign(
+            Top.STRIPED, (244, 244, 242), (0, 126, 84), (238, 118, 36), (14.0, 10.0)
+        ),
+        LandmarkName.SHELL: StoreDesign(Top.CANOPY, (240, 240, 238), (252, 208, 20), (206, 26, 26)),
+    }
+)
+"""Designs of the brands."""
+
+MIDDLE_STRIPE: Final[Colour] = (208, 30, 44)
+"""Colour of the stripe between those of accent and fascia (`Top.STRIPED`)."""
+
+HOUSE: Final = HouseDesign((46, 178, 184), (222, 74, 36), (250, 250, 246))
+
+COAT: Final[Colour] = (250, 216, 30)
+"""Colour of the coat of a waiting person."""
+
+
+@lru_cache(maxsize=64)
+def features_of(name: LandmarkName) -> tuple[str, ...]:
+    """Returns what can be seen of a landmark, as phrases with an article ("a red roof"); empty for other names."""
+    if name is LandmarkName.HOUSE:
+        wall, roof, trim = map(colour_name, (HOUSE.wall, HOUSE.roof, HOUSE.trim))
+        return f"{_with_article(wall)} facade", f"{_with_article(roof)} roof", f"{trim} window frames"
+    if name is LandmarkName.PERSON:
+        return (f"{_with_article(colour_name(COAT))} coat",)
+    design = STORES.get(name)
+    if design is None:
+        return ()
+    seen = (_top_feature(design), f"a big {colour_name(design.fascia)} billboard")
+    if design.top is Top.CANOPY:  # of the building behind it, little is seen
+        return seen
+    return (f"{_with_article(colour_name(design.wall))} facade", *seen)
+
+
+def _with_article(words: str) -> str:
+    return f"{'an' if words[0] in 'aeiou' else 'a'} {words}"
+
+
+def _top_feature(design: StoreDesign) -> str:
+    fascia, accent = colour_name(design.fascia), colour_name(design.accent)
+    match design.top:
+        case Top.MANSARD:
+            return f"{_with_article(fascia)} slanted roof"
+        case Top.GABLE:
+            return f"{_with_article(fascia)} gable roof"
+        case Top.TOWER:
+            return f"{_with_article(accent)} tower"
+        case Top.STEPPED:
+            return f"a high {fascia} front"
+        case Top.STRIPED:
+            return f"{_with_article(accent)}, {colour_name(MIDDLE_STRIPE)} and {fascia} band"
+        case Top.HALL:
+            return f"a big {accent} entrance"
+        case Top.CANOPY:
+            return f"{_with_article(fascia)} roof over the pumps"
+        case Top.FLAT:
+            return f"{_with_article(accent)} awning"
+
+
+_HUES: Final = (
+    (16.0, "red"), (43.0, "orange"), (66.0, "yellow"), (164.0, "green"), (196.0, "turquoise"), (256.0, "blue"),
+    (336.0, "purple"), (360.0, "red"),
+)  # fmt: skip
+"""Upper limits of the hues [degrees] of the basic colour terms (Berlin and Kay 1969), and turquoise."""
+
+
+def colour_name(colour: Colour) -> str:
+    """Returns the everyday name of a colour."""
+    hue, saturation, value = colorsys.rgb_to_hsv(*(part / 255.0 for part in colour))
+    if value < 0.2:
+        return "black"
+    if saturation < 0.1:
+        return "white" if value > 0.85 else "gray"
+    degrees = 360.0 * hue
+    warm = 10.0 <= degrees <= 50.0
+    if warm and value < 0.6:
+        return "brown"
+    if warm and saturation < 0.45:
+        return "beige"
+    return next(name for limit, name in _HUES if degrees <= limit)
