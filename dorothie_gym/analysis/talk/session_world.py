@@ -75,9 +75,12 @@ class SessionWorld:
 
     def street(self, time: float) -> str | None:
         """Returns the label of the name of the street that the car is on; None if it has none."""
-        index = self.town.lanes[int(self.row(time)["lane"])].street
+        return self.street_name(self.town.lanes[int(self.row(time)["lane"])].street)
+
+    def street_name(self, street: int) -> str | None:
+        """Returns the label of the name of a street by its index in the town; None if it has none."""
         names = self.session.header.street_names
-        return names[index] if 0 <= index < len(names) else None
+        return names[street] if 0 <= street < len(names) else None
 
     def bearing(self, time: float, x: float, y: float) -> float:
         """Returns the angle between the heading of the car and a point, in 0..180 [degrees]."""

@@ -8,7 +8,9 @@ from typing import Final
 
 from dorothie_gym.analysis.talk import plans
 from dorothie_gym.analysis.talk.session_world import ACTORS, SessionWorld
-from dorothie_gym.dialogue import Predicate, Proposition
+from dorothie_gym.dialogue import Direction, Predicate, Proposition
+from dorothie_gym.maps.model import SignalKind
+from dorothie_gym.maps.whereabouts import is_near_corner, is_on_right, signals_near
 from dorothie_gym.ontology import (
     ActionValue,
     LandmarkName,
@@ -18,6 +20,8 @@ from dorothie_gym.ontology import (
     StreetName,
     WeatherParameter,
 )
+from dorothie_gym.recording.header import LandmarkRow
+from dorothie_gym.tasks.landmark_designs import features_of
 
 CLOSE, FAR = 130.0, 200.0
 """Ways up to the first length count as short, and from the second on as long [m]; in between, both may be said."""
@@ -32,6 +36,10 @@ SHORT_TIME: Final = 15.0
 """Differences of times that nobody minds [s]."""
 
 _FOG, _RAIN, _SUN = (25.0, 40.0), (45.0, 60.0), (-3.0, 6.0)  # where the view may be called good or poor [%, degrees]
+_NEAR: Final = 130.0  # largest distance of two places near each other [m]
+_BESIDE: Final = 40.0  # largest distance of a light or sign from a place near it [m]
+_CORNER: Final = 80.0  # largest distance of a place near a corner from the middle of the junction [m]
+_SHORT_WAY, _WAY_ERROR = 40.0, 0.25  # errors of a way that agrees [m], as a share of the way
 _NOW: Final = 4.0  # time within which "now" may lie [s]
 _FADING: Final = 16  # time for which a fault is felt after its end [s]
 _CHANGED: Final = 0.15  # share of a parameter's range that is a change
@@ -97,13 +105,60 @@ def _on_street(world: SessionWorld, said: Proposition, time: float, speaker: Rol
 
 
 def _located(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    place, street = said.get("place"), said.get("street")
-    if not isinstance(place, LandmarkName) or not isinstance(street, StreetName):
+    place, street, cross, side = (said.get(name) for name in ("place", "street", "cross", "side"))
+    rows = world.landmarks(place) if isinstance(place, LandmarkName) else []
+    if not rows:
         return None
-    names = world.session.header.street_names
-    return any(
-        names[row["street"]] == street.label for row in world.landmarks(place) if 0 <= row["street"] < len(names)
-    )
+    if isinstance(street, StreetName):
+        return any(world.street_name(row["street"]) == street.label for row in rows)
+    if isinstance(cross, StreetName):
+        return any(_is_at_corner(world, row, cross) for row in rows)
+    if isinstance(side, Direction):
+        right = side is Direction.RIGHT
+        return any(is_on_right(world.town, row["lane"], row["x"], row["y"]) is right for row in rows)
+    return None
+
+
+def _is_at_corner(world: SessionWorld, row: LandmarkRow, cross: StreetName) -> bool:
+    crossing = (number for number in range(len(world.town.streets)) if world.street_name(number) == cross.label)
+    here = row["x"], row["y"], _CORNER
+    return any(is_near_corner(world.town, row["street"], number, *here) for number in crossing)
+
+
+def _near(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    place, other, kind = said.get("place"), said.get("landmark"), said.get("object")
+    rows = world.landmarks(place) if isinstance(place, LandmarkName) else []
+    if not rows:
+        return None
+    if isinstance(other, LandmarkName):
+        pairs = [(row, there) for row in rows for there in world.landmarks(other)]
+        return any(math.hypot(row["x"] - there["x"], row["y"] - there["y"]) <= _NEAR for row, there in pairs)
+    if kind in (ObjectClass.TRAFFIC_LIGHT, ObjectClass.TRAFFIC_SIGN):
+        light = kind is ObjectClass.TRAFFIC_LIGHT
+        found = {sign for row in rows for sign in signals_near(world.town, row["x"], row["y"], _BESIDE)}
+        return any((sign is SignalKind.TRAFFIC_LIGHT) is light for sign in found)
+    return None
+
+
+def _looks(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    place, feature = said.get("place"), said.get("feature")
+    return feature in features_of(place) if isinstance(place, LandmarkName) and feature is not None else None
+
+
+def _distance(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Whether the shortest way has about the length; a detour around a roadblock is not known."""
+    place, metres = said.get("place"), said.get("metres")
+    rows = world.landmarks(place) if isinstance(place, LandmarkName) else []
+    if len(rows) != 1 or not isinstance(metres, int):
+        return None
+    way = world.way_to(time, rows[0])
+    return abs(way - metres) <= max(_SHORT_WAY, _WAY_ERROR * way) if math.isfinite(way) else None
+
+
+def _feels(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Whether the cause of a feeling holds; the feeling itself is the speaker's."""
+    cause = said.get("cause")
+    return is_true(world, cause, time, speaker) if isinstance(cause, Proposition) else None
 
 
 def _arrives_in(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
@@ -187,6 +242,10 @@ _EVALUATORS: Final[dict[Predicate, Evaluator]] = {
     Predicate.SEES: _sees,
     Predicate.ON_STREET: _on_street,
     Predicate.LOCATED: _located,
+    Predicate.NEAR: _near,
+    Predicate.LOOKS: _looks,
+    Predicate.DISTANCE: _distance,
+    Predicate.FEELS: _feels,
     Predicate.ARRIVES_IN: _arrives_in,
     Predicate.CLOSE: _close,
     Predicate.KNOWS: _knows,

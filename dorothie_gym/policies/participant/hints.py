@@ -78,7 +78,7 @@ def _said(state: ParticipantState, content: Proposition) -> Remark:
         topic = f"feels_{content.get('feeling')}"
     topic = f"{'not_' * content.negated}{topic}"
     wording = Wording(topic=topic, direction=side if isinstance(side, Direction) else None)
-    return intend(CommunicativeFunction.INFORM, content, elided=("place",), wording=wording, joined=True)
+    return intend(CommunicativeFunction.INFORM, content, elided=("place", "cause"), wording=wording, joined=True)
 
 
 def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Proposition]:
@@ -125,8 +125,8 @@ def _side(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) ->
 
 
 def _rounded(metres: float) -> int:
-    """Returns a length as it is told: to tens, from 200 m on to hundreds [m]."""
-    step = 10.0 if metres < 195.0 else 100.0
+    """Returns a length as it is told: to tens, from 200 m on to fifties [m]."""
+    step = 10.0 if metres < 195.0 else 50.0
     return round(step * round(metres / step))
 
 
