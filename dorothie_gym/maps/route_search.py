@@ -137,7 +137,9 @@ def _follow(graph: RoutingGraph, extra: RecordArray[RoutingEdge], number: int, l
 
 
 @compiled
-def _add_arrivals(graph: RoutingGraph, search: RouteSearch, number: int, lane: int, station: float) -> int:
+def _add_arrivals(
+    graph: RoutingGraph, search: RouteSearch, number: int, lane: int, station: float, manoeuvre_cost: float
+) -> int:
     """Adds the edges to a goal: along its cell, and lane changes and U-turns that end before it in its cell.
 
     Each node gets its cheapest one. Returns the new number of edges.
@@ -148,7 +150,8 @@ def _add_arrivals(graph: RoutingGraph, search: RouteSearch, number: int, lane: i
         if graph.manoeuvres[k].land <= station:
             extra[number] = graph.manoeuvres[k]
             edge = extra[number]
-            edge.target, edge.cost = goal, edge.cost + max(station - edge.land, 0.0) * row.weight
+            edge.target = goal
+            edge.cost += max(station - edge.land, 0.0) * row.weight + manoeuvre_cost
             node = nodes[edge.source]
             if node.arrival < 0 or edge.cost < extra[node.arrival].cost:
                 node.arrival = number
@@ -167,7 +170,7 @@ def _add_arrivals(graph: RoutingGraph, search: RouteSearch, number: int, lane: i
 @compiled
 def find_route(
     graph: RoutingGraph, search: RouteSearch, lane: int, station: float, goal_lane: int, goal_station: float,
-    blocked: RecordArray[PlaceRecord], count: int,
+    blocked: RecordArray[PlaceRecord], count: int, manoeuvre_cost: float,
 ) -> bool:  # fmt: skip
     """Finds the cheapest route between two places and writes it to `search`; returns whether there is one.
 
@@ -183,13 +186,16 @@ def find_route(
         blocked: impassable places (roadblocks). The route does not enter their cells, nor by lane changes; in the cell
             of the start only those ahead count.
         count: number of impassable places.
+        manoeuvre_cost: extra cost of each lane change and U-turn [m].
     """
     result, goal, extra = search.result[0], len(graph.rows) - 2, search.extra
     result.steps, result.legs, result.cost = 0, 0, math.inf
     _prepare(graph, search, blocked, count, True)
     departures = find_departures(graph, search, lane, station, goal_lane, goal_station, blocked, count)
+    for k in range(departures):
+        extra[k].cost += manoeuvre_cost if extra[k].entry != FOLLOW else 0.0
     _drop_dearer(extra, departures)
-    result.extra = _add_arrivals(graph, search, departures, goal_lane, goal_station)
+    result.extra = _add_arrivals(graph, search, departures, goal_lane, goal_station, manoeuvre_cost)
     _drop_closed(search, count)
     size = 0
     for k in range(departures):
@@ -203,7 +209,8 @@ def find_route(
         cost = search.nodes[node].cost
         for k in range(graph.rows[node], graph.rows[node + 1]):
             if count == 0 or _is_clear(search.closed, graph.edges, k):
-                size = _reach(search, size, graph.edges[k].target, k, cost + graph.edges[k].cost)
+                extra_cost = manoeuvre_cost if graph.edges[k].entry != FOLLOW else 0.0
+                size = _reach(search, size, graph.edges[k].target, k, cost + (graph.edges[k].cost + extra_cost))
         k = search.nodes[node].arrival
         if k >= 0:
             size = _reach(search, size, goal, len(graph.edges) + k, cost + extra[k].cost)
@@ -233,7 +240,7 @@ def find_costs(
             the starts of the lanes behind, without the turn.
     """
     _prepare(graph, search, blocked, count, True)
-    search.result[0].extra = _add_arrivals(graph, search, 0, lane, station)
+    search.result[0].extra = _add_arrivals(graph, search, 0, lane, station, 0.0)
     _drop_closed(search, count)
     size = 0
     for k in range(search.result[0].extra):

@@ -212,7 +212,9 @@ class Router:
         """Returns the cells that contain the given places."""
         return {self.cell(lane, station) for lane, station in places}
 
-    def route(self, start: Place, goal: Place, blocked: Sequence[Place] = ()) -> Route | None:
+    def route(
+        self, start: Place, goal: Place, blocked: Sequence[Place] = (), manoeuvre_cost: float = 0.0
+    ) -> Route | None:
         """Returns the cheapest route between two places, or None if there is none; see `find_route`.
 
         Args:
@@ -220,13 +222,14 @@ class Router:
             goal: goal; one slightly behind the start on the same lane needs a detour.
             blocked: impassable places (roadblocks). The route does not enter their cells, nor by lane changes; in
                 the cell of the start only those ahead count.
+            manoeuvre_cost: extra cost of each lane change and U-turn [m].
 
         Raises:
             IndexError: the town has no such lane.
         """
         self._check(start, goal, *blocked)
-        search = self.search
-        if not find_route(self._graph, search, *start, *goal, place_records(blocked), len(blocked)):
+        search, places = self.search, place_records(blocked)
+        if not find_route(self._graph, search, *start, *goal, places, len(blocked), manoeuvre_cost):
             return None
         cost, _, steps, count = fields(search.result, "cost", "extra", "steps", "legs").item()
         rows = plain(search.legs)[:count].tolist()

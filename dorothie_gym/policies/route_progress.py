@@ -199,6 +199,7 @@ class RouteProgress:
     Attributes:
         goal: lane and station of the goal.
         blocked: places that the route was planned to avoid.
+        manoeuvre_cost: extra cost of each lane change and U-turn in planning [m].
         route: the route; None if there is none.
         leg: index of the leg that the car is on.
         astray: number of decisions for which the car has been off the route.
@@ -206,21 +207,26 @@ class RouteProgress:
 
     goal: Place
     blocked: tuple[Place, ...] = ()
+    manoeuvre_cost: float = 0.0
     route: Route | None = None
     leg: int = 0
     astray: int = 0
 
     @classmethod
-    def plan(cls, town: Town, start: Place, goal: Place, blocked: tuple[Place, ...] = ()) -> RouteProgress:
+    def plan(
+        cls, town: Town, start: Place, goal: Place, blocked: tuple[Place, ...] = (), manoeuvre_cost: float = 0.0
+    ) -> RouteProgress:
         """Plans a route; where the blocked places leave none, one that ignores them."""
-        route = router(town).route(start, goal, blocked)
+        route = router(town).route(start, goal, blocked, manoeuvre_cost)
         if route is None and blocked:
-            route = router(town).route(start, goal)
-        return cls(goal=goal, blocked=blocked, route=route)
+            route = router(town).route(start, goal, (), manoeuvre_cost)
+        return cls(goal=goal, blocked=blocked, manoeuvre_cost=manoeuvre_cost, route=route)
 
     def replanned(self, town: Town, start: Place, blocked: tuple[Place, ...] | None = None) -> RouteProgress:
         """Plans a route from `start` to the same goal."""
-        return RouteProgress.plan(town, start, self.goal, self.blocked if blocked is None else blocked)
+        return RouteProgress.plan(
+            town, start, self.goal, self.blocked if blocked is None else blocked, self.manoeuvre_cost
+        )
 
     @property
     def legs(self) -> tuple[Leg, ...]:

@@ -26,6 +26,7 @@ from dorothie_gym.policies.route_progress import (
     stopping_distance,
     streets_named,
 )
+from dorothie_gym.policies.turn_lanes import next_turn_lane
 from dorothie_gym.spaces import Motion, Physical
 
 CRUISE_TOLERANCE = 2.6
@@ -181,12 +182,26 @@ def _needs_switch(state: CoWizardState, view: CoWizardView, crossing: RouteJunct
     return any(abs(wrap_degrees(way.angle - crossing.exit.angle)) <= SAME_WAY for way in view.choice.exits)
 
 
+def junction_ahead(state: CoWizardState, view: CoWizardView) -> Choice | None:
+    """Returns the next junction at which a turn can be meant: with a choice or, for an instructed turn, turn lanes."""
+    directive = state.intentions.directive
+    if directive is None or (view.choice is not None and directive.junction == view.choice.junction):
+        return view.choice
+    return junction_meant(state, view)
+
+
+def junction_meant(state: CoWizardState, view: CoWizardView) -> Choice | None:
+    """Returns the next junction with a choice or with turn lanes."""
+    turn_lane = next_turn_lane(state.town, view.lane, view.station)
+    nearer = turn_lane is not None and (view.choice is None or turn_lane.distance < view.choice.distance)
+    return turn_lane if nearer else view.choice
+
+
 def wanted_exit(state: CoWizardState, view: CoWizardView) -> Exit | None:
     """Returns the exit to take at the next junction with a choice: as instructed, else by the route, else None."""
-    choice = view.choice
+    directive, choice = state.intentions.directive, junction_ahead(state, view)
     if choice is None:
         return None
-    directive = state.intentions.directive
     if directive is not None:
         streets = streets_named(view.raw["street_names"], directive.street)
         way = find_exit(state.town, choice, directive.direction, streets)
@@ -218,14 +233,15 @@ def _straight_on(state: CoWizardState, choice: Choice) -> Exit | None:
 
 def _turn(state: CoWizardState, view: CoWizardView) -> Physical | None:
     """Commands the turn at the next junction."""
-    if state.intentions.halted or view.choice is None or state.intentions.nudge is not None:
+    choice = junction_ahead(state, view)
+    if state.intentions.halted or choice is None or state.intentions.nudge is not None:
         return None
     way = wanted_exit(state, view)
-    if way is None or (view.choice.distance > state.config.turn_lead and view.motion is not Motion.WAITING):
+    if way is None or (choice.distance > state.config.turn_lead and view.motion is not Motion.WAITING):
         return None
     commands, turns = state.commands, view.manoeuvre is PhysicalAction.J_TURN
     set_already = turns and abs(view.angle - way.angle) < 1.0
-    turn = (view.choice.lane, way.angle)
+    turn = (choice.lane, way.angle)
     again = commands.turn_sent != turn or view.time - commands.turn_sent_at > state.config.command_interval
     on_way = turns and commands.turn_sent == turn and view.motion is not Motion.WAITING
     if (set_already and view.motion is not Motion.STOPPED) or not again or on_way or view.manoeuvring:
@@ -297,7 +313,8 @@ def _go(state: CoWizardState, view: CoWizardView) -> Physical | None:
 
 def _turns_soon(state: CoWizardState, view: CoWizardView) -> bool:
     """Returns whether a turn is near for which this style slows down."""
-    if not state.style.eases or view.choice is None or view.choice.distance > state.config.turn_ease_distance:
+    choice = junction_ahead(state, view)
+    if not state.style.eases or choice is None or choice.distance > state.config.turn_ease_distance:
         return False
     way = wanted_exit(state, view)
     return way is not None and way.type in (LinkType.LEFT, LinkType.RIGHT)

@@ -10,7 +10,7 @@ from dorothie_gym.dialogue import draw_style
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ObjectClass, Role
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
-from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, rest
+from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, junction_ahead, rest
 from dorothie_gym.policies.co_wizard.goals import note_plan, recognise_goal, search_on
 from dorothie_gym.policies.co_wizard.initiative import announce_action, scene_of, take_initiative
 from dorothie_gym.policies.co_wizard.judgement import reason_to_stand
@@ -135,16 +135,16 @@ def _update_route(state: CoWizardState, view: CoWizardView) -> None:
 
 def _pass_junction(state: CoWizardState, view: CoWizardView) -> None:
     """Drops a directive when its junction has been passed, or counts down the junctions to skip."""
-    directive = state.intentions.directive
-    if directive is None or view.choice is None or view.manoeuvring:
+    directive, choice = state.intentions.directive, junction_ahead(state, view)
+    if directive is None or choice is None or view.manoeuvring:
         return
-    if directive.junction == view.junction:
+    if directive.junction == choice.junction:
         return
     passed = directive.junction >= 0
     if passed and directive.skip == 0:
         state.intentions = state.intentions.directed(None)
     else:
-        updated = replace(directive, skip=max(directive.skip - passed, 0), junction=view.junction)
+        updated = replace(directive, skip=max(directive.skip - passed, 0), junction=choice.junction)
         state.intentions = state.intentions.directed(updated)
 
 

@@ -24,7 +24,7 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
-from dorothie_gym.policies.co_wizard.driving import place_ahead
+from dorothie_gym.policies.co_wizard.driving import junction_meant, place_ahead
 from dorothie_gym.policies.co_wizard.goals import (
     abandon,
     accept_offer,
@@ -193,7 +193,8 @@ def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetN
         over = contents.action(None, street=street)
         state.say(intend(Function.ACCEPT, over, wording=Wording(topic="detour")))
         return
-    directive = Directive(direction=None, street=street, junction=view.junction)
+    junction = junction_meant(state, view)
+    directive = Directive(direction=None, street=street, junction=-1 if junction is None else junction.junction)
     state.intentions = state.intentions.directed(directive).resumed()
     state.say(intend(Function.ACCEPT, contents.action(None, street=street), wording=Wording(topic="taken")))
 
@@ -202,12 +203,12 @@ def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetN
 
 
 def _do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    streets = _named(act.values(Slot.STREET))
+    streets, junction = _named(act.values(Slot.STREET)), junction_meant(state, view)
     directive = Directive(
         direction=words.direction,
         street=streets[0] if streets else StreetName.UNKNOWN,
         skip=max((words.ordinal or 1) - 1, 0),
-        junction=view.junction,
+        junction=-1 if junction is None else junction.junction,
     )
     state.intentions = state.intentions.turning(directive)
 
@@ -218,7 +219,7 @@ def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
         distance = float(words.distance) if words.distance is not None else state.config.nudge_distance
         state.intentions = state.intentions.nudged(place_ahead(state, view, distance))
         return
-    choice = view.choice
+    choice = junction_meant(state, view)
     state.intentions = state.intentions.proceeding()
     if choice is not None and (words.direction is Direction.STRAIGHT or choice.distance < STRAIGHT_ON_DISTANCE):
         straight = Directive(direction=Direction.STRAIGHT, junction=choice.junction)

@@ -168,7 +168,7 @@ def _find_route(graph: RoutingGraph, search: RouteSearch, guide: InstructorArray
     """Finds a route to a landmark; where the roadblocks leave none, one that ignores them. Returns its cost [m]."""
     view, mark, count = guide.now[0], guide.marks[landmark], guide.route[0].closed
     while True:
-        found = find_route(graph, search, view.lane, view.station, mark.lane, mark.station, guide.closed, count)
+        found = find_route(graph, search, view.lane, view.station, mark.lane, mark.station, guide.closed, count, 0.0)
         if found or count == 0:
             return float(search.result[0].cost)
         count = 0

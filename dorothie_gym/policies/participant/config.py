@@ -37,6 +37,7 @@ class ParticipantConfig(GuidanceConfig):
         corner_distance: distance to a junction within which a goal right behind it is easily missed [m].
         behind_corner: distance from the junction to such a goal [m].
         careful_speed: speed asked for where the goal is easily missed [km/h].
+        manoeuvre_cost: extra cost of each lane change and U-turn on a way that is to be described in words [m].
         run_up: least distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
@@ -95,6 +96,7 @@ class ParticipantConfig(GuidanceConfig):
     corner_distance: float = 50.0
     behind_corner: float = 55.0
     careful_speed: float = 15.0
+    manoeuvre_cost: float = 60.0
     run_up: float = 45.0
     run_up_per_lane: float = 50.0
     lane_return_time: float = 30.0

@@ -203,7 +203,8 @@ def choose_target(state: ParticipantState, view: ParticipantView, rng: np.random
 
 def _aim_at(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
     state.task = state.task.with_target(subgoal.index, landmark)
-    progress = RouteProgress.plan(state.town, view.place, landmark.place, state.route.blocked)
+    blocked, manoeuvre_cost = state.route.blocked, state.config.manoeuvre_cost
+    progress = RouteProgress.plan(state.town, view.place, landmark.place, blocked, manoeuvre_cost)
     state.route = state.route.with_progress(progress)
 
 

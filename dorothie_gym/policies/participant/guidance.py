@@ -19,6 +19,7 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
 from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.turn_lanes import leads_beside, next_turn, turn_lanes
 
 ANNOUNCING_TIME = 1.5
 """Time that the car drives on while a U-turn is being announced [s]."""
@@ -38,6 +39,8 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
     config = state.config
     before = former.left(view.station)
     former = former.followed(state.town, view.lane, view.station)
+    if former.astray and _is_changing_for_turn(state, view):
+        former = replace(former, astray=0)
     state.route = state.route.with_progress(former)
     passed = view.standing and former.left(view.station) < -config.arrived_within
     if passed:
@@ -52,6 +55,14 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
         _point_out_wrong_turn(state, view, before)
     assert state.route.progress is not None
     state.guidance = state.guidance.with_distance(state.route.progress.left(view.station))
+
+
+def _is_changing_for_turn(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car is on its way to the lane of the turn that was announced, by lanes of its own choice."""
+    step = state.guidance.step
+    if step is None or step[0] != "turn" or not state.guidance.guiding:
+        return False
+    return leads_beside(state.town, view.lane, step[1])
 
 
 def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before: float) -> None:
@@ -110,7 +121,8 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         key, words = ("on", view.lane, 0), remark(DialogueMove.INSTRUCT, ActionValue.START)
         near = True
     overdue = stuck or (key[0] != "turn" and waited > config.repeat_after)
-    switching = view.time - state.guidance.step_at < config.switch_time
+    changing = state.guidance.step is not None and state.guidance.step[0] == "lane"
+    switching = changing and view.time - state.guidance.step_at < config.switch_time
     if key[0] == "lane" and (switching or view.time < state.motion.excused_until):
         return
     again = state.guidance.step == key
@@ -170,6 +182,10 @@ def _is_left_to_ask(
     """Returns whether a turn is announced only if the car asks; driving straight on needs no announcement."""
     if key[0] != "turn" or state.guidance.step == key:
         return False
+    if key[1] in turn_lanes(state.town) and (goes_straight or view.lane == key[1]):
+        return state.motion.standstill(view.time) <= state.config.repeat_after  # the lane leads there by itself
+    if key[1] in turn_lanes(state.town):
+        return False  # the car needs time to change lanes
     if state.guidance.considered != key:
         state.guidance = state.guidance.with_consideration(key, bool(rng.random() < state.style.waits))
     if not state.guidance.left_to_ask or state.motion.standstill(view.time) > state.config.repeat_after:
@@ -269,14 +285,13 @@ def next_step(
     progress = state.route.progress
     if progress is None:
         return None
-    crossing = progress.next_crossing(state.town, view.station)
+    crossing = next_turn(progress, state.town, view.station)
     manoeuvre = progress.next_manoeuvre(view.station)
     u_turn = manoeuvre is not None and manoeuvre[0] is LaneEntry.U_TURN
     if manoeuvre is not None and u_turn and (crossing is None or manoeuvre[1] < crossing.distance):
         return ("round", 0, 0), manoeuvre[1], remark(move, ActionValue.U_TURN)
     switch = manoeuvre is not None and (
-        crossing is None
-        or (manoeuvre[1] < crossing.distance and progress.needs_switch(state.town, view.lane, view.station, crossing))
+        crossing is None or (manoeuvre[1] < crossing.distance and _needs_switch(state, view, crossing))
     )
     if crossing is not None and not switch:
         key = ("turn", crossing.lane, crossing.exit.connector)
@@ -286,6 +301,15 @@ def next_step(
         wording = Wording(direction=Direction.LEFT if left else Direction.RIGHT)
         return ("lane", view.lane, int(left)), manoeuvre[1], remark(move, ActionValue.LANE_SWITCH, wording=wording)
     return ("on", view.lane, 0), progress.left(view.station), remark(move, ActionValue.LANE_FOLLOW)
+
+
+def _needs_switch(state: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
+    """Returns whether the lane before a junction has to be asked for; "turn left" includes the way to the turn lane."""
+    progress = state.route.progress
+    assert progress is not None
+    if crossing.lane in turn_lanes(state.town):
+        return crossing.direction is Direction.STRAIGHT
+    return progress.needs_switch(state.town, view.lane, view.station, crossing)
 
 
 def _turn_remark(
@@ -311,6 +335,8 @@ def _turn_remark(
 
 def _is_ambiguous(state: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
     """Returns whether the direction alone refers to another exit."""
+    if crossing.lane in turn_lanes(state.town):
+        return False
     choice = next_choice(state.town, view.lane, view.station)
     own = choice is not None and choice.lane == crossing.lane
     asked = choice if own else Choice(lane=crossing.lane, distance=0.0, exits=state.town.exits(crossing.lane))

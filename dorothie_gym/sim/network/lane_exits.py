@@ -50,7 +50,7 @@ def build_exits(town: Town, lanes: RecordArray[LaneRecord]) -> LaneExits:
         if found and not record.chooses:
             record.onward = min(found, key=lambda way: (abs(way.angle), way.connector)).connector
         beside, candidates = side_by_side(town, lane.id), oncoming.candidates(lane.id).tolist()
-        record.offers = record.chooses or (bool(found) and _parts(town, beside))
+        record.offers = record.chooses or (bool(found) and ways_part(town, beside))
         record.beside, record.besides = len(lists), len(beside)
         record.oncoming, record.oncomings = len(lists) + len(beside), len(candidates)
         lists += beside + candidates
@@ -75,7 +75,7 @@ def _is_choice(exits: tuple[Exit, ...]) -> bool:
     return len(exits) > 1 and any(way.junction_id >= 0 for way in exits)
 
 
-def _parts(town: Town, beside: list[int]) -> bool:
+def ways_part(town: Town, beside: list[int]) -> bool:
     """Returns whether the exits of lanes that lie side by side lead different ways."""
     turns = [way.angle for lane in beside for way in town.exits(lane) if way.junction_id >= 0]
     return max((abs(wrap_degrees(turn - turns[0])) for turn in turns), default=0.0) > ANOTHER_WAY
