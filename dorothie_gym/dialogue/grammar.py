@@ -47,7 +47,9 @@ SLOT_FIELDS: Mapping[str, Slot] = {
 }
 """Gaps that are filled by slot values, with their slot."""
 
-CONTENT_FIELDS = frozenset({"seconds", "metres", "prop", "feature", "purpose", "person", "item", "reason", "cause"})
+CONTENT_FIELDS = frozenset(
+    {"seconds", "metres", "prop", "feature", "purpose", "person", "item", "the_item", "reason", "cause"}
+)
 """Gaps that are filled by the arguments of the content of the same names."""
 
 CONTEXT_FIELDS = frozenset({"side", "nth", "speed", "distance", "past", "dropped"}) | CONTENT_FIELDS

@@ -79,8 +79,9 @@ class Wording:
             "dropped": self.dropped is not None,
             "here": self.here,
         }
-        told = () if self.content is None else (name for name, _ in self.content.arguments)
-        return frozenset((*(name for name, is_known in found.items() if is_known), *told))
+        told = {} if self.content is None else dict(self.content.arguments)
+        known = {name for name, is_known in found.items() if is_known} | told.keys()
+        return frozenset(known | {"the_item"} if "item" in told else known)
 
 
 @dataclass(frozen=True, kw_only=True)

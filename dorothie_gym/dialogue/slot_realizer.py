@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import re
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Protocol, TypeVar
@@ -215,6 +216,11 @@ class SlotRealizer:
         assert isinstance(kind, PropKind)
         return load_grammar().props[kind].say(self)
 
+    def definite_item(self) -> str:
+        """Returns the item of the content with a definite article: "the newspaper" of "a newspaper"."""
+        item = str(self.argument("item"))
+        return item if _POSSESSED.match(item) else f"the {_INDEFINITE.sub('', item)}"
+
     def past(self) -> str:
         """Returns the name of the landmark to drive past."""
         return self.place(self._wording.past)
@@ -244,6 +250,8 @@ class SlotRealizer:
         return name
 
 
+_INDEFINITE = re.compile(r"^(an?|some|another|the) ")
+_POSSESSED = re.compile(r"^(my|your|our|his|her|their|\w+'s) ")
 _NAMELESS = frozenset({"Unknown", "Queried"})
 
 _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
@@ -274,6 +282,7 @@ _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
         "purpose": lambda realizer: str(realizer.argument("purpose")),
         "person": lambda realizer: str(realizer.argument("person")),
         "item": lambda realizer: str(realizer.argument("item")),
+        "the_item": SlotRealizer.definite_item,
         "reason": lambda realizer: str(realizer.argument("reason")),
     }
 )

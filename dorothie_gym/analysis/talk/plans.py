@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
@@ -30,6 +31,7 @@ _COMMANDS: Final[Mapping[ActionValue, tuple[PhysicalAction, ...]]] = MappingProx
 )
 """Physical actions by which an announcement is carried out; following a lane needs none."""
 
+_ARTICLE: Final = re.compile(r"^(an?|the|some|my|your|our) ")
 _COUNTERMANDS: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_N, DialogueMove.CLARIFY})
 
 
@@ -90,6 +92,16 @@ def is_nearer(world: SessionWorld, said: Proposition, time: float, speaker: Role
     return ways[0] <= ways[1] + _SHORTER
 
 
+def has_purpose(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Returns whether the story or the tasks name the person and the thing that an errand is said to be about."""
+    header = world.session.header
+    texts = [header.story, *(str(row["description"]) for row in header.subgoals)]
+    texts += [str(row["change"] or "") for row in header.subgoals]
+    known = " ".join(texts).casefold()
+    named = [str(said.get(name)) for name in ("person", "item") if said.get(name) is not None]
+    return all(_ARTICLE.sub("", words.casefold()) in known for words in named) if named else None
+
+
 EVALUATORS: Final[Mapping[Predicate, Callable[[SessionWorld, Proposition, float, Role], bool | None]]] = (
     MappingProxyType(
         {
@@ -97,6 +109,7 @@ EVALUATORS: Final[Mapping[Predicate, Callable[[SessionWorld, Proposition, float,
             Predicate.GOAL: is_goal,
             Predicate.TASK: has_status,
             Predicate.NEARER: is_nearer,
+            Predicate.PURPOSE: has_purpose,
         }
     )
 )

@@ -133,6 +133,7 @@ class CoWizardStyle:
         offers: probability that a task on the way is proposed as the first one.
         reassures: probability that a description is followed by a question whether it was understood.
         notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
+        recalls: probability that the thing or person of an errand is repeated, or mentioned on arrival.
         pace: cruise speed where nothing is said about it [km/h].
     """
 
@@ -151,6 +152,7 @@ class CoWizardStyle:
     offers: float = 0.0
     reassures: float = 0.0
     notices: float = 0.0
+    recalls: float = 0.0
     pace: int = USUAL_SPEED
 
     @classmethod
@@ -173,4 +175,5 @@ class CoWizardStyle:
             pace=int(rng.choice((30, 35, 40))),
             chats=float(rng.uniform(0.1, 0.6)),
             notices=float(rng.uniform(0.4, 0.95)),
+            recalls=float(rng.uniform(0.1, 0.6)),
         )

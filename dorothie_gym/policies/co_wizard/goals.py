@@ -20,6 +20,7 @@ from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.story import kept_for_later
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
 from dorothie_gym.policies.route_progress import RouteProgress, streets_named
@@ -152,7 +153,7 @@ def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: 
     mark, later = known_landmark(state, view, name, ()), contents.errand(name, GoalStatus.PENDING)
     goal, progress = state.beliefs.goal, state.route.progress
     if goal is None or goal is name:
-        state.say(intend(Function.ACCEPT, later))
+        state.say(kept_for_later(state, name))
         return
     if mark is not None and progress is not None and rng.random() < state.style.offers:
         route = router(state.town).route(view.here, mark.place, state.route.blocked)
@@ -171,7 +172,7 @@ def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: 
         order = Proposition.of(Predicate.ORDER, place=name, then=goal)
         state.say(intend(Function.SET_QUESTION, order, elided=("place",)))
     elif rng.random() < state.config.accepts_changes:
-        state.say(intend(Function.ACCEPT, later))
+        state.say(kept_for_later(state, name))
     else:
         state.say(intend(Function.POSITIVE_FEEDBACK, later, elided=contents.arguments_of(later)))
 

@@ -22,6 +22,7 @@ from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, is_localised, reason_to_stand, visibility_topic
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
+from dorothie_gym.policies.co_wizard.story import arrival_reminder
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.noticing import notice
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
@@ -154,7 +155,7 @@ def _say_arrived(state: CoWizardState, view: CoWizardView, rng: np.random.Genera
     state.dialogue = state.dialogue.after_asking(view.time)
     arrived = Wording(topic="arrived")
     if state.beliefs.exact and rng.random() < state.style.echoes + 0.15:
-        state.say(remark(DialogueMove.EXPLAIN, goal, wording=arrived))
+        state.say(remark(DialogueMove.EXPLAIN, goal, wording=arrived), *arrival_reminder(state, rng))
     elif not state.beliefs.exact:
         state.say(remark(DialogueMove.QUERY_YN, wording=arrived))
 

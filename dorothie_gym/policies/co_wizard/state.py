@@ -180,6 +180,7 @@ class BeliefState:
         plan: junctions of the route as sent in the last plan update.
         ruled_out: places of houses and people that were visited, or that were not the ones meant.
         updates: belief updates (mental actions) to be sent, the next first.
+        told: purposes of errands that the participant has told, the latest last.
     """
 
     goal: LandmarkName | None = None
@@ -190,6 +191,7 @@ class BeliefState:
     statuses: tuple[tuple[LandmarkName, GoalStatus], ...] = ()
     ruled_out: tuple[Place, ...] = ()
     updates: tuple[Mental, ...] = ()
+    told: tuple[Proposition, ...] = ()
 
     @property
     def stop_place(self) -> Place | None:
@@ -199,6 +201,10 @@ class BeliefState:
     def with_update(self, update: Mental) -> BeliefState:
         """Queues a belief update, unless an equal one is queued already."""
         return self if update in self.updates else replace(self, updates=(*self.updates, update))
+
+    def with_told(self, told: Proposition) -> BeliefState:
+        """Keeps what the participant has told about an errand."""
+        return replace(self, told=(*self.told, told))
 
     def after_sending(self) -> BeliefState:
         """Removes the first queued update."""

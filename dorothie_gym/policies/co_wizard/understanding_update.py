@@ -39,6 +39,7 @@ from dorothie_gym.policies.co_wizard.goals import (
 from dorothie_gym.policies.co_wizard.judgement import believes
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
+from dorothie_gym.policies.co_wizard.story import remember
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
 from dorothie_gym.policies.policy import replace
@@ -81,10 +82,13 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         react = _REACTIONS.get(act.move)
         if react is not None:
             react(state, view, act, heard.words, rng)
+    remember(state, heard, rng)
     # one plain acknowledgement is enough for an utterance
     added = state.speech.queue[len(before) :]
     kept = tuple(
-        item for k, item in enumerate(added) if not k or item.act.move is not DialogueMove.ACKNOWLEDGE or item.act.slots
+        item
+        for k, item in enumerate(added)
+        if not k or item.act.move is not DialogueMove.ACKNOWLEDGE or item.act.slots or item.meaning
     )
     state.speech = state.speech.cleared().plan(*before, *kept)
 

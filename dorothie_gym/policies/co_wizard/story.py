@@ -1,0 +1,76 @@
+"""Memory of the Co-Wizard for the errands that the participant tells about, and remarks that come back to them."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Predicate, Proposition, Wording
+from dorothie_gym.ontology import DialogueMove, GoalStatus, LandmarkName, Slot
+from dorothie_gym.policies import contents
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.observation_parser import HeardUtterance
+from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.tasks.purposes import read_purpose
+
+_TELLING = frozenset({DialogueMove.INSTRUCT, DialogueMove.EXPLAIN, DialogueMove.REPLY_W})
+_CLAUSE = re.compile(
+    r"\b(?:have to|need to|want to|supposed to) (?P<errand>(?:[^,.?]|(?<=\b(?:Mr|Ms|Dr))\.|(?<=\bMrs)\.)+)"
+)
+_OF_SPEAKER = re.compile(r"^(my|our) ")
+_OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
+
+
+def remember(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> None:
+    """Keeps the thing or person of an errand that the participant has told, and perhaps repeats it.
+
+    Args:
+        state: working copy of the state, after the reaction to the utterance.
+        heard: the utterance.
+        rng: random generator of the decision.
+    """
+    told = _told(state, heard)
+    if told is None or told in state.beliefs.told:
+        return
+    state.beliefs = state.beliefs.with_told(told)
+    if rng.random() < state.style.recalls:
+        joined = not state.speech.idle
+        state.say(intend(Function.POSITIVE_FEEDBACK, told, elided=("place",), joined=joined))
+
+
+def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:
+    """Returns what an utterance tells about an errand: its thing, or its person; None if it tells neither."""
+    if not any(act.move in _TELLING for act in heard.acts) or any(_OVER & act.slots for act in heard.acts):
+        return None
+    named = [value for act in heard.acts for value in act.values(Slot.LANDMARK)]
+    place = contents.first_name(named) or state.beliefs.goal
+    clause = _CLAUSE.search(heard.words.text)
+    if place is None or clause is None:
+        return None
+    purpose = read_purpose(clause["errand"])
+    item = _OF_SPEAKER.sub("your ", purpose.items[0]) if purpose.items else None
+    person = None if purpose.person is None else _OF_SPEAKER.sub("your ", purpose.person)
+    return None if item is person is None else Proposition.of(Predicate.PURPOSE, place=place, item=item, person=person)
+
+
+def told_of(state: CoWizardState, place: LandmarkName | None) -> Proposition | None:
+    """Returns what the participant has told last about the errand at a place; None if it has told nothing."""
+    return next((told for told in reversed(state.beliefs.told) if told.get("place") is place), None)
+
+
+def arrival_reminder(state: CoWizardState, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns a remark about what the car has come for, or nothing, by chance."""
+    told = told_of(state, state.beliefs.goal)
+    if told is None or rng.random() >= state.style.recalls:
+        return ()
+    return (intend(Function.INFORM, told, elided=("place",), wording=Wording(topic="come_for"), joined=True),)
+
+
+def kept_for_later(state: CoWizardState, place: LandmarkName) -> Remark:
+    """Returns the acceptance of a task for later, by the thing that it is about if that is known."""
+    later, told = contents.errand(place, GoalStatus.PENDING), told_of(state, place)
+    if told is None or told.get("item") is None:
+        return intend(Function.ACCEPT, later)
+    return intend(Function.ACCEPT, told.without("person"), later, wording=Wording(topic="later_purpose"))
