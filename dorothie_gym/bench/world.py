@@ -12,13 +12,13 @@ import numpy as np
 from dorothie_gym.bench.timing import Figures, Progress, alternate, cpu_seconds, ignore_progress, machine, rounded
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.batch.worlds import alone, step_batch_of_one
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_prop, populate
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.step import step
 
 SUBSTEPS: Final = 15
 """Substeps of a call: a decision of half a second."""
@@ -68,10 +68,11 @@ def measure(
     arrays = town_arrays(network)
     world = crowd(network, arrays, vehicles=vehicles, pedestrians=pedestrians, props=props, seed=seed)
     progress("warming up", 0.0)
-    step(arrays, world, WARM_UP_SUBSTEPS, 1.0 / FRAME_RATE)
+    batch = alone(world)
+    step_batch_of_one(arrays, batch, WARM_UP_SUBSTEPS, 1.0 / FRAME_RATE)
     timings = alternate(
         {
-            KERNEL: lambda: cpu_seconds(partial(_run, arrays, world, calls)) / (calls * SUBSTEPS),
+            KERNEL: lambda: cpu_seconds(partial(_run, arrays, batch, calls)) / (calls * SUBSTEPS),
             STOCK: _stock_work(network, world, stock_substeps),
         },
         repeats,
@@ -131,9 +132,9 @@ def bytes_per_world(world: WorldArrays) -> int:
         tracemalloc.stop()
 
 
-def _run(arrays: TownArrays, world: WorldArrays, calls: int) -> None:
+def _run(arrays: TownArrays, batch: WorldArrays, calls: int) -> None:
     for _ in range(calls):
-        step(arrays, world, SUBSTEPS, 1.0 / FRAME_RATE)
+        step_batch_of_one(arrays, batch, SUBSTEPS, 1.0 / FRAME_RATE)
 
 
 def _stock_work(network: TownNetwork, world: WorldArrays, substeps: int) -> Callable[[], float]:

@@ -12,6 +12,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Obstacle, RoadObject
 
 from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.bodies import Bodies, Cyclist, Pedestrian, Prop, TrafficVehicle
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_pedestrian, add_prop, add_vehicle, populate
@@ -19,7 +20,6 @@ from dorothie_gym.sim.road import TownRoad, enlarged
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
 from tests.sim.network.towns import (
     EAST_OUT,
     WEST_EAST,
@@ -44,7 +44,7 @@ def crowd(network: TownNetwork, *, seconds: float = 8.0) -> tuple[Any, TownRoad,
     world = empty_world(town, vehicles=14, pedestrians=8, seed=2)
     populate(network, town, world, seed=2, vehicles=12, pedestrians=6, cyclists=0.4)
     add_prop(network, town, world, PropKind.DUMPSTER, 3, 12.0)
-    step(town, world, round(seconds / DT), DT)
+    step_alone(town, world, round(seconds / DT), DT)
     holder, road = SimpleNamespace(arrays=world), TownRoad(network)
     bodies = Bodies(road, holder)
     road.vehicles, road.objects = list(bodies.vehicles()), [*bodies.pedestrians(), *bodies.props()]
@@ -90,7 +90,7 @@ def test_views_follow_the_world_during_steps(brookside: TownNetwork) -> None:
     holder, _, bodies = crowd(brookside)
     vehicle = max(bodies.vehicles(), key=lambda each: each.speed)
     before, place = vehicle.position.copy(), vehicle.position
-    step(town_arrays(brookside), holder.arrays, 5, DT)
+    step_alone(town_arrays(brookside), holder.arrays, 5, DT)
     assert math.dist(vehicle.position, before) > 1.0
     assert (place == vehicle.position).all()  # as highway-env's own, which move their array in place
 
@@ -148,7 +148,7 @@ def test_assigned_route_is_driven() -> None:
         last = network.get_lane(view.route[-1])
         assert view.destination.tolist() == last.position(last.length).tolist()
         for _ in range(200):
-            step(town_arrays(network), view._holder.arrays, 1, DT)
+            step_alone(town_arrays(network), view._holder.arrays, 1, DT)
             if view.lane_id != WEST_IN:
                 break
         assert view.lane_id == connector

@@ -5,12 +5,12 @@ from highway_env.utils import are_polygons_intersecting
 from shapely.geometry import Polygon
 
 from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.collisions import overlap
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_prop
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
 from tests.sim.network.towns import overpass_town, straight_town
 from tests.sim.state.states import DT, Pose, kernel_world
 
@@ -74,7 +74,7 @@ def test_all_crashes_of_a_crowd_are_found_and_no_others():
                 other = outline(places[j], vehicles[j].heading, 5.0, 2.0)
                 if are_polygons_intersecting(one, other, np.zeros(2), np.zeros(2))[0]:
                     expected[[i, j]] = True
-        step(town, world, 1, 0.0)
+        step_alone(town, world, 1, 0.0)
         assert vehicles.crashed.tolist() == expected.tolist()
         assert 0 < expected.sum() < len(poses)
 
@@ -83,17 +83,17 @@ def test_vehicles_on_a_bridge_do_not_touch_those_below():
     network = TownNetwork(overpass_town())
     town, world = kernel_world(network, [Pose(0, 100.0), Pose(1, network.town.lanes[1].length / 2)])
     assert abs(world.vehicles[0].x - world.vehicles[1].x) < 1.0
-    step(town, world, 3, DT)
+    step_alone(town, world, 3, DT)
     assert not world.vehicles.crashed.any()
 
 
 def test_crashed_vehicle_respawns_elsewhere():
     network = TownNetwork(straight_town())
     town, world = kernel_world(network, [Pose(0, 50.0, speed=5.0), Pose(0, 54.0)])
-    step(town, world, 1, DT)
+    step_alone(town, world, 1, DT)
     assert world.vehicles.crashed.all() and world.clock[0].collisions == 1
     before = world.vehicles.x.copy()
-    step(town, world, 600, DT)
+    step_alone(town, world, 600, DT)
     assert not world.vehicles.crashed.any() and world.clock[0].towed == 2
     assert (np.abs(world.vehicles.x - before) > 5.0).all()
 
@@ -105,5 +105,5 @@ def test_vehicle_placed_inside_a_prop_crashes():
     _, placed = kernel_world(network, [Pose(0, 50.0)])
     world.vehicles[0] = placed.vehicles[0]
     add_prop(network, town, world, PropKind.DUMPSTER, 0, 51.0)
-    step(town, world, 1, DT)
+    step_alone(town, world, 1, DT)
     assert world.vehicles[0].crashed

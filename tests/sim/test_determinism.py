@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import populate
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.world import World
 from tests.sim.network.towns import find_town
 from tests.sim.state.states import DT
@@ -26,7 +26,7 @@ from dorothie_gym.sim.population import add_prop, add_street_walker, populate
 from dorothie_gym.sim.state.codes import Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.maps import load_town
 network = TownNetwork(load_town("brookside"))
@@ -38,7 +38,7 @@ for lane in (0, 5):
     walker = world.pedestrians[add_street_walker(network, town, world, lane, 30.0)]
     walker.state, walker.far = Walk.STRAYING, 10.2
 world.vehicles[1].crashed = world.pedestrians[0].crashed = True  # who comes back elsewhere
-step(town, world, 300, 1 / 30)
+step_alone(town, world, 300, 1 / 30)
 assert world.vehicles.odometer.max() > 30.0
 print(hashlib.sha256(world.tobytes()).hexdigest())
 """
@@ -116,9 +116,9 @@ def test_ten_seconds_are_the_same_bytes_in_another_process(digests, what):
 def test_one_long_call_equals_many_short_ones():
     town, world = crowd()
     other = world.copy()
-    step(town, world, 450, DT)
+    step_alone(town, world, 450, DT)
     for _ in range(30):
-        step(town, other, 15, DT)
+        step_alone(town, other, 15, DT)
     assert world.tobytes() == other.tobytes()
 
 
@@ -127,17 +127,17 @@ def test_worlds_are_independent():
     alone = world.copy()
     _, other = crowd(seed=2)
     for _ in range(10):
-        step(town, other, 15, DT)
-        step(town, world, 15, DT)
-    step(town, alone, 150, DT)
+        step_alone(town, other, 15, DT)
+        step_alone(town, world, 15, DT)
+    step_alone(town, alone, 150, DT)
     assert world.tobytes() == alone.tobytes() != other.tobytes()
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_seed_gives_the_same_world(seed):
     (town, world), (_, other) = crowd(seed=seed), crowd(seed=seed)
-    step(town, world, 30, DT)
-    step(town, other, 30, DT)
+    step_alone(town, world, 30, DT)
+    step_alone(town, other, 30, DT)
     assert world.tobytes() == other.tobytes()
 
 

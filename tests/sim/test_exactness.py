@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from highway_env.vehicle.kinematics import Vehicle
 
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.codes import Kind
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.idm_traffic import drive
 from dorothie_gym.sim.traffic.vehicle_models import slip_of, steering_angle
 from tests.sim.network.towns import curve_town, find_town, straight_town
@@ -116,7 +116,7 @@ def test_single_vehicle_drives_as_highway_envs_for_90_substeps(town, speed, late
     for _ in range(90):
         road.act()
         road.step(DT)
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         assert vehicle.x == pytest.approx(stock.position[0], abs=1e-9)
         assert vehicle.y == pytest.approx(stock.position[1], abs=1e-9)
         assert vehicle.heading == pytest.approx(stock.heading, abs=1e-9)
@@ -136,7 +136,7 @@ def test_externally_controlled_car_moves_as_highway_envs_bicycle(steering):
         stock.act({"acceleration": acceleration, "steering": steering})
         for _ in range(30):
             stock.step(DT)
-        step(arrays, world, 30, DT, acceleration, steering)
+        step_alone(arrays, world, 30, DT, acceleration, steering)
         car = world.vehicles[0]
         assert (car.x, car.y) == pytest.approx(tuple(stock.position), abs=1e-9)
         assert (car.heading, car.speed) == pytest.approx((stock.heading, stock.speed), abs=1e-9)
@@ -146,7 +146,7 @@ def test_brakes_stop_the_car_and_do_not_reverse_it():
     network = TownNetwork(straight_town())
     arrays, world = kernel_world(network, [Pose(1, 50.0, speed=6.0)])
     world.vehicles.kind = Kind.EGO
-    step(arrays, world, 60, DT, -8.0, 0.0)
+    step_alone(arrays, world, 60, DT, -8.0, 0.0)
     assert world.vehicles[0].speed == 0.0
     assert world.vehicles[0].x == pytest.approx(50.0 + 36.0 / 16.0, abs=0.2)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import (
     add_pedestrian,
@@ -18,7 +19,6 @@ from dorothie_gym.sim.population import (
 from dorothie_gym.sim.state.codes import NOBODY, Kind, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world, grown
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import CLEAR_OF_CAR, CYCLIST_SPEEDS
 from dorothie_gym.sim.traffic.respawn import is_free
 from tests.sim.network.towns import find_town, straight_town
@@ -37,13 +37,13 @@ def test_grown_world_evolves_as_one_with_room_from_the_start():
     network = TownNetwork(find_town("brookside"))
     arrays, small = crowd(network, vehicles=20, pedestrians=15, props=1)
     _, large = crowd(network, vehicles=27, pedestrians=22, props=4)
-    step(arrays, small, 100, DT)
-    step(arrays, large, 100, DT)
+    step_alone(arrays, small, 100, DT)
+    step_alone(arrays, large, 100, DT)
     small = grown(arrays, small, vehicles=27, pedestrians=22, props=4)
     for world in (small, large):
         add_pedestrian(arrays, world, 2, 10.0, pace=1.2)
         add_vehicle(arrays, world, 5, 20.0, desired=7.0)
-        step(arrays, world, 300, DT)
+        step_alone(arrays, world, 300, DT)
     for name in ("vehicles", "pedestrians", "props", "clock", "lamps", "busy", "heads"):
         assert getattr(small, name).tobytes() == getattr(large, name).tobytes(), name
 
@@ -74,10 +74,10 @@ def test_world_does_not_shrink():
 
 def test_removed_vehicle_no_longer_blocks_the_road():
     arrays, world = kernel_world(TownNetwork(straight_town(lanes=1)), [Pose(0, 20.0), Pose(0, 45.0, desired=0.01)])
-    step(arrays, world, 300, DT)
+    step_alone(arrays, world, 300, DT)
     assert world.vehicles[0].x < 45.0
     remove_vehicle(arrays, world, 1)
-    step(arrays, world, 300, DT)
+    step_alone(arrays, world, 300, DT)
     assert world.vehicles[0].x > 60.0 and world.vehicles[1].kind == Kind.EMPTY
     key = int(world.vehicles[1].key)
     assert add_vehicle(arrays, world, 0, 10.0, desired=5.0) == 1
@@ -92,7 +92,7 @@ def test_removed_pedestrian_is_absent():
         add_pedestrian(arrays, world, 0, station, pace=1.2)
     world.pedestrians[0].crashed = True
     remove_pedestrian(world, 0)
-    step(arrays, world, 300, DT)
+    step_alone(arrays, world, 300, DT)
     assert world.pedestrians.state.tolist() == [Walk.EMPTY, Walk.WALKING]
     assert add_pedestrian(arrays, world, 0, 10.0, pace=1.2) == 0
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps import LightColour
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_street_walker, populate
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
 from tests.sim.crossings import lit
 from tests.sim.network.towns import find_town
 from tests.sim.state.states import DT
@@ -30,7 +30,7 @@ def soak(name, *, minutes, seed, vehicles=60, pedestrians=40, strollers=20, ever
     fleet, lengths, signalled = world.vehicles, town.lanes.length, town.lanes.programme >= 0
     before, runs, farthest = np.zeros(vehicles, dtype=bool), 0, 0.0
     for _ in range(round(minutes * 60 / DT)):
-        step(town, world, 1, DT)
+        step_alone(town, world, 1, DT)
         over = there & signalled[fleet.lane] & (fleet.own_station + 0.5 * fleet.length > lengths[fleet.lane])
         for i in np.flatnonzero(over & ~before & ~fleet.crashed):
             runs += lights(int(fleet.lane[i]), float(world.clock[0].time)) is LightColour.RED

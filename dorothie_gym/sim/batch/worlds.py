@@ -94,6 +94,35 @@ def step_share(
 _step_share = direct(step_share)
 
 
+def step_alone(
+    town: TownArrays, world: WorldArrays, substeps: int, dt: float, acceleration: float = 0.0, steering: float = 0.0
+) -> int:
+    """Steps a world as `sim.step.step` does, by the machine code of sessions: a batch of one.
+
+    Args:
+        town: arrays of the town.
+        world: arrays of the world, changed in place.
+        substeps: how many.
+        dt: time of each [s].
+        acceleration: of vehicles of the kind `Kind.EGO` [m/s^2].
+        steering: angle of their front wheels, positive to the right [rad].
+
+    Returns:
+        The answer of `step`.
+    """
+    return step_batch_of_one(town, alone(world), substeps, dt, acceleration, steering)
+
+
+def step_batch_of_one(
+    town: TownArrays, batch: WorldArrays, substeps: int, dt: float, acceleration: float = 0.0, steering: float = 0.0
+) -> int:
+    """As `step_alone`, of a world that is a batch already (`alone`), which saves 30 us."""
+    answers = np.full(1, NO_SPACE, dtype=np.int64)
+    actions = np.array([acceleration], dtype=np.float64), np.array([steering], dtype=np.float64)
+    _step_share(turns_of(1, 1), 0, town, batch, int(substeps), float(dt), *actions, answers)
+    return int(answers[0])
+
+
 # --- Batch of worlds --------------------------------------------------------------------------------------------------
 
 

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from dorothie_gym.processors import available_processors
-from dorothie_gym.sim.batch.worlds import VectorWorld
+from dorothie_gym.sim.batch.worlds import VectorWorld, step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle, populate
 from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.step import step
 from tests.sim.network.towns import find_town
 
 DT = 1.0 / 30.0
@@ -53,7 +52,7 @@ def throttle(seed: int) -> float:
 def alone(seed: int) -> bytes:
     """State of a world that is stepped by itself."""
     world = crowd(seed)
-    step(town(), world, SUBSTEPS, DT, throttle(seed), 0.01 * seed)
+    step_alone(town(), world, SUBSTEPS, DT, throttle(seed), 0.01 * seed)
     return world.tobytes()
 
 

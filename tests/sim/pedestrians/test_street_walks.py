@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps import Town
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.pacing import (
     FROM_JUNCTION,
@@ -13,7 +14,6 @@ from dorothie_gym.sim.population import add_street_walker, add_vehicle, populate
 from dorothie_gym.sim.state.codes import Footway, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
 from tests.sim.network.towns import find_town, lane, town
 from tests.sim.state.states import DT
 
@@ -63,7 +63,7 @@ def test_pedestrians_cross_the_street_and_continue_on_the_other_side():
     assert (walker.x, walker.y) == pytest.approx((60.0, 4.0 + KERB), abs=0.5)
     sides, strayed = set(), 0
     for _ in range(3000):
-        step(arrays, world, 5, DT)
+        step_alone(arrays, world, 5, DT)
         assert 3.0 < walker.x < 157.0
         strayed += walker.state == Walk.STRAYING
         if walker.state == Walk.WALKING:
@@ -83,7 +83,7 @@ def test_no_pedestrian_steps_out_while_a_vehicle_is_close():
     add_vehicle(arrays, world, 0, 20.0, desired=8.0)
     for _ in range(300):
         world.vehicles[0].x, world.vehicles[0].speed = 20.0, 20.0  # 114 m are too close for that
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         assert not (world.pedestrians.state == Walk.STRAYING).any()
 
 
@@ -99,13 +99,13 @@ def test_vehicle_stops_for_a_straying_pedestrian(speed):
     world.vehicles[0].speed = speed
     slowest = speed
     for _ in range(900):
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         slowest = min(slowest, float(world.vehicles[0].speed))
         if walker.state != Walk.STRAYING:
             break
     assert walker.state == Walk.WALKING and arrays.walks.lane[walker.walk] == 0
     assert slowest < 0.5 and world.vehicles[0].x < 80.0 and not walker.crashed
-    step(arrays, world, 300, DT)
+    step_alone(arrays, world, 300, DT)
     assert world.vehicles[0].x > 85.0 and not walker.crashed
 
 
@@ -129,5 +129,5 @@ def test_pedestrians_walk_beside_the_streets_of_a_town_without_pavements():
     populate(network, arrays, world, seed=1, vehicles=0, pedestrians=8)
     assert (world.pedestrians.state == Walk.WALKING).all()
     assert set(arrays.walks.kind[world.pedestrians.walk]) == {Footway.STREET}
-    step(arrays, world, 900, DT)
+    step_alone(arrays, world, 900, DT)
     assert world.pedestrians.odometer.min() > 30.0

@@ -5,12 +5,12 @@ import pytest
 
 from dorothie_gym.maps import LightColour
 from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_pedestrian, add_prop, add_vehicle, populate
 from dorothie_gym.sim.state.codes import Footway, Kind, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import GOES_HOME
 from tests.sim.network.towns import find_town
 from tests.sim.state.states import DT
@@ -84,7 +84,7 @@ def test_pedestrian_walks_round_the_corner_at_the_end_of_a_pavement():
     walker.direction = 1.0
     been = []
     for _ in range(150):
-        step(arrays, world, 5, DT)
+        step_alone(arrays, world, 5, DT)
         if not been or been[-1] != walker.walk:
             been.append(int(walker.walk))
     assert been[0] == number and arrays.walks.kind[been[1]] == Footway.CORNER
@@ -100,7 +100,7 @@ def test_pedestrians_do_not_walk_through_each_other(name):
     populate(network, arrays, world, seed=4, vehicles=0, pedestrians=80)
     met = 0
     for _ in range(1200):
-        step(arrays, world, 3, DT)
+        step_alone(arrays, world, 3, DT)
         apart = distances(world)
         met += (apart < 1.2).sum()
         assert apart.min() > 0.48
@@ -116,7 +116,7 @@ def test_two_oncoming_pedestrians_pass_each_other():
     for station in (30.0, 44.0):
         add_pedestrian(arrays, world, number, station, pace=1.3)
     world.pedestrians.direction = (1.0, -1.0)
-    step(arrays, world, 300, DT)
+    step_alone(arrays, world, 300, DT)
     assert world.pedestrians[0].station > 40.0 and world.pedestrians[1].station < 34.0
 
 
@@ -128,7 +128,7 @@ def test_the_faster_one_overtakes_the_slower_one():
     for station, pace in ((30.0, 1.6), (34.0, 0.9)):
         add_pedestrian(arrays, world, number, station, pace=pace)
     world.pedestrians.direction = 1.0
-    step(arrays, world, 450, DT)
+    step_alone(arrays, world, 450, DT)
     assert world.pedestrians[0].station > world.pedestrians[1].station
 
 
@@ -144,7 +144,7 @@ def test_pedestrians_walk_round_a_prop():
     add_pedestrian(arrays, ahead, number, 34.0, pace=1.3)
     world.props[0].x, world.props[0].y = ahead.pedestrians[0].x, ahead.pedestrians[0].y
     for _ in range(60):
-        step(arrays, world, 5, DT)
+        step_alone(arrays, world, 5, DT)
         walker, prop = world.pedestrians[0], world.props[0]
         assert np.hypot(walker.x - prop.x, walker.y - prop.y) > 0.25 + 0.5 * prop.width
     assert walker.station > 38.0
@@ -170,7 +170,7 @@ def test_pedestrians_cross_while_the_lights_of_vehicles_are_red():
         world.clock[0].frame, world.clock[0].time = round(start / DT), float(start)
         lanes = arrays.neighbours[crossing.light : crossing.light + crossing.lights]
         for _ in range(300):
-            step(arrays, world, 5, DT)
+            step_alone(arrays, world, 5, DT)
             if world.pedestrians[0].state == Walk.CROSSING and world.pedestrians[0].crossing == number:
                 crossed += 1
                 assert {town.light(int(lane), float(world.clock[0].time)) for lane in lanes} == {LightColour.RED}
@@ -187,7 +187,7 @@ def test_pedestrians_walk_on_after_a_long_wait_at_a_crosswalk():
     for _ in range(1290):
         car.x, car.y = (crossing.x[0] + crossing.x[1]) / 2, (crossing.y[0] + crossing.y[1]) / 2
         car.speed, car.crash_age = 0.0, 0.0
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         seen.add(int(world.pedestrians[0].state))
     assert seen == {Walk.WAITING, Walk.WALKING}
 
@@ -199,9 +199,9 @@ def test_stuck_pedestrian_respawns_elsewhere():
     add_pedestrian(arrays, world, longest_pavement(arrays), 30.0, pace=0.0)
     walker = world.pedestrians[0]
     key, x, y = int(walker.key), float(walker.x), float(walker.y)
-    step(arrays, world, round((GOES_HOME - 1.0) / DT), DT)
+    step_alone(arrays, world, round((GOES_HOME - 1.0) / DT), DT)
     assert walker.key == key and np.hypot(walker.x - x, walker.y - y) < 0.1
-    step(arrays, world, round(2.0 / DT), DT)
+    step_alone(arrays, world, round(2.0 / DT), DT)
     assert walker.key != key and np.hypot(walker.x - x, walker.y - y) > 3.0
     assert arrays.walks.kind[walker.walk] == Footway.PAVEMENT
 
@@ -214,7 +214,7 @@ def test_touched_pedestrian_respawns_after_three_seconds_out_of_sight():
     add_pedestrian(arrays, world, longest_pavement(arrays), 30.0, pace=1.3)
     walker, car = world.pedestrians[0], world.vehicles[0]
     walker.x, walker.y = car.x + 1.0, car.y
-    step(arrays, world, 80, DT)
+    step_alone(arrays, world, 80, DT)
     assert walker.crashed and abs(walker.x - car.x - 1.0) < 0.1 and world.clock[0].run_over == 1
-    step(arrays, world, 15, DT)
+    step_alone(arrays, world, 15, DT)
     assert not walker.crashed and np.hypot(walker.x - car.x, walker.y - car.y) > 58.0

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle, populate
 from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import CYCLIST_FROM_EDGE, CYCLIST_SPEEDS
 from dorothie_gym.sim.traffic.respawn import tow
 from tests.sim.network.towns import find_town, straight_town
@@ -30,7 +30,7 @@ def test_cyclist_keeps_right_and_speeds_up_gently():
     fastest_gain = 0.0
     for _ in range(600):
         before = float(cyclist.speed)
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         fastest_gain = max(fastest_gain, (float(cyclist.speed) - before) / DT)
     assert fastest_gain == pytest.approx(1.0, abs=0.01)
     assert CYCLIST_SPEEDS[0] * 0.9 < cyclist.speed <= CYCLIST_SPEEDS[1] and cyclist.width < 1.0
@@ -45,7 +45,7 @@ def test_cyclist_moves_over_to_the_right_and_does_not_overtake():
     add_vehicle(arrays, add, 2 + 3, 20.0, kind=Kind.CYCLIST, desired=4.2)  # 100 m ahead on the rightmost lane
     lanes = set()
     for _ in range(200):
-        step(arrays, add, 9, DT)
+        step_alone(arrays, add, 9, DT)
         lanes.add(int(add.vehicles[0].lane) % 3)
         assert add.vehicles[1].lane % 3 == 2
     assert lanes == {0, 1, 2} and add.vehicles[0].lane % 3 == 2
@@ -57,7 +57,7 @@ def test_cyclist_stays_where_the_lane_to_the_right_is_taken():
     arrays, world = with_cyclist(network, 0, 30.0, cars=[(1, 30.0)])
     for _ in range(20):
         world.vehicles[1].x, world.vehicles[1].speed = world.vehicles[0].x, world.vehicles[0].speed
-        step(arrays, world, 9, DT)
+        step_alone(arrays, world, 9, DT)
         assert world.vehicles[0].lane % 2 == 0
 
 
@@ -66,7 +66,7 @@ def test_cars_overtake_a_cyclist_where_there_are_two_lanes():
     arrays, world = with_cyclist(network, 1, 60.0, cars=[(1, 25.0)])
     lanes = set()
     for _ in range(100):
-        step(arrays, world, 9, DT)
+        step_alone(arrays, world, 9, DT)
         lanes.add(int(world.vehicles[1].lane) % 2)
     assert lanes == {0, 1}
     assert world.vehicles[1].x > world.vehicles[0].x + 30.0 and not world.vehicles.crashed.any()
@@ -96,7 +96,7 @@ def test_cyclists_avoid_fast_roads_in_routes_and_after_a_respawn():
     assert (world.vehicles.kind == Kind.CYCLIST).all()
     been = set()
     for k in range(400):
-        step(arrays, world, 30, DT)
+        step_alone(arrays, world, 30, DT)
         been |= set(world.vehicles.lane.tolist())
         if k % 40 == 0:
             world.vehicles.crashed, world.vehicles.crash_age = True, 10.0

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from dorothie_gym.ontology import PropKind
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_pedestrian, add_prop, add_vehicle, populate, remove_prop
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import CURVE_ACCELERATION
 from tests.sim.network.towns import curve_town, find_town, straight_town
 from tests.sim.state.states import DT, Pose, kernel_world
@@ -19,7 +19,7 @@ def test_vehicle_takes_a_bend_no_faster_than_comfort_allows():
     arrays, world = kernel_world(TownNetwork(curve_town()), [Pose(0, 5.0, speed=5.0, desired=14.0)])
     fastest = 0.0
     for _ in range(120):
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         fastest = max(fastest, float(world.vehicles[0].speed))
     assert fastest == pytest.approx(np.sqrt(CURVE_ACCELERATION * 30.0), rel=0.05)
 
@@ -31,7 +31,7 @@ def test_car_stays_behind_a_cyclist_on_a_single_lane():
     add_vehicle(arrays, world, 0, 60.0, kind=Kind.CYCLIST, desired=4.5)
     add_vehicle(arrays, world, 0, 30.0, desired=12.0)
     for _ in range(60):
-        step(arrays, world, 15, DT)
+        step_alone(arrays, world, 15, DT)
         assert world.vehicles[1].x < world.vehicles[0].x - 4.0
     assert not world.vehicles.crashed.any()
 
@@ -40,10 +40,10 @@ def test_traffic_stops_before_a_prop_on_a_single_lane_until_it_is_gone():
     network = TownNetwork(straight_town(lanes=1))
     arrays, world = kernel_world(network, [Pose(0, 20.0, speed=8.0)])
     prop = add_prop(network, arrays, world, PropKind.STREET_BARRIER, 1, 20.0)
-    step(arrays, world, 600, DT)
+    step_alone(arrays, world, 600, DT)
     assert world.vehicles[0].speed < 0.1 and 105.0 < world.vehicles[0].x < 117.0
     remove_prop(arrays, world, prop)
-    step(arrays, world, 300, DT)
+    step_alone(arrays, world, 300, DT)
     assert world.vehicles[0].x > 130.0
 
 
@@ -51,7 +51,7 @@ def test_vehicle_before_a_roadblock_is_respawned():
     network = TownNetwork(straight_town(lanes=1))
     arrays, world = kernel_world(network, [Pose(0, 20.0, speed=8.0), Pose(0, 5.0, speed=8.0)])
     add_prop(network, arrays, world, PropKind.DUMPSTER, 1, 20.0)
-    step(arrays, world, 1800, DT)
+    step_alone(arrays, world, 1800, DT)
     assert world.clock[0].towed >= 2 and world.clock[0].collisions == 0
 
 
@@ -61,7 +61,7 @@ def test_traffic_passes_a_prop_by_the_lane_beside():
     add_prop(network, arrays, world, PropKind.TRAFFIC_CONE, 2, 80.0)
     sides = set()
     for _ in range(100):
-        step(arrays, world, 9, DT)
+        step_alone(arrays, world, 9, DT)
         sides.add(int(world.vehicles[0].lane) % 2)
     assert world.vehicles[0].x > 200.0 and 1 in sides and not world.vehicles[0].crashed
 
@@ -92,13 +92,13 @@ def test_vehicles_stop_for_a_pedestrian_on_a_crosswalk():
         walker.station, walker.mouth = max(float(passage.across) - 4.0, 0.0), 0
         nearest = np.inf
         while walker.state == Walk.CROSSING:
-            step(arrays, world, 1, DT)
+            step_alone(arrays, world, 1, DT)
             if abs(walker.station - passage.across) < 1.5:
                 assert world.vehicles[0].lane == number
                 nearest = min(nearest, float(length + passage.start - world.vehicles[0].own_station) - 2.5)
         assert 0.0 < nearest < 20.0
         assert world.clock[0].run_over == 0
-        step(arrays, world, 1800, DT)  # there may be lights
+        step_alone(arrays, world, 1800, DT)  # there may be lights
         assert world.vehicles[0].lane != number  # and then go on
         tested += 1
     assert tested >= 2
@@ -115,10 +115,10 @@ def test_no_pedestrian_steps_in_front_of_a_vehicle_that_cannot_stop_with_ease():
     add_pedestrian(arrays, world, int(crossing.walk[0]), float(crossing.station[0]), pace=1.2)
     walker = world.pedestrians[0]
     walker.state, walker.crossing, walker.direction = Walk.WAITING, passage.crossing, 1.0
-    step(arrays, world, 6, DT)
+    step_alone(arrays, world, 6, DT)
     assert walker.state == Walk.WAITING
     world.vehicles[0].kind = Kind.EMPTY
-    step(arrays, world, 6, DT)
+    step_alone(arrays, world, 6, DT)
     assert walker.state == Walk.CROSSING
 
 
@@ -130,7 +130,7 @@ def test_pedestrians_walk_on_pavements_and_cross_on_crosswalks_only(name):
     populate(network, arrays, world, seed=2, vehicles=0, pedestrians=20)
     crossed = 0
     for _ in range(200):
-        step(arrays, world, 15, DT)
+        step_alone(arrays, world, 15, DT)
         for walker in world.pedestrians:
             place = np.array([walker.x, walker.y])
             lane = network.get_lane(network.get_closest_lane_index(place, height=walker.height))

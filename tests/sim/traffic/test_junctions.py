@@ -9,12 +9,12 @@ from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
 from dorothie_gym.maps.traffic_lights import LightColour, LightPhase
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle, populate
 from dorothie_gym.sim.state.codes import Colour, Kind, Wait
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.junctions import light
 from tests.sim.crossings import ARMS, across, crossing, lit, lit_crossing, way_in, way_out
 from tests.sim.network.towns import find_town
@@ -41,7 +41,7 @@ def crossed(world: WorldArrays, i: int) -> bool:
 def run(arrays: TownArrays, world: WorldArrays, seconds: float, until: Callable[[], bool] = lambda: False) -> float:
     """Goes on until something holds; returns the time [s]."""
     for _ in range(round(seconds / DT)):
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         assert not world.vehicles.crashed.any()
         if until():
             break
@@ -89,7 +89,7 @@ def test_vehicle_does_not_slow_down_for_a_green_light():
     arrays, world = going(lit_crossing("ew", green=60.0), ("e", "w", 60.0))
     slowest = 8.0
     while not crossed(world, 0):
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         slowest = min(slowest, float(world.vehicles[0].speed))
     assert slowest > 7.0
 
@@ -149,7 +149,7 @@ def test_junction_admits_only_vehicles_with_room_behind_it():
     for _ in range(round(14.0 / DT)):
         world.vehicles[0].desired = world.vehicles[0].speed = 0.0
         world.vehicles.standing = 0.0  # no vehicle draws another route
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         entered.append({i for i in (1, 2, 3) if arrays.lanes[world.vehicles[i].plan[0]].junction >= 0})
         assert not world.vehicles.crashed.any()
     assert {i for inside in entered for i in inside} == {1}
@@ -188,7 +188,7 @@ def test_vehicle_without_room_behind_the_junction_waits_and_then_reroutes():
     waits, driven = [], set()
     for _ in range(900):
         other.desired = other.speed = 0.0  # it stands where the first one wants to go
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         waits.append(int(own.wait))
         driven.add(int(own.plan[0]))
     assert waits.count(Wait.NO_ROOM) * DT > 5.0
@@ -224,7 +224,7 @@ def test_traffic_never_runs_a_red_light(seed):
     before = np.zeros(len(vehicles), dtype=bool)
     passed = 0
     for _ in range(3 * 60 * 30):
-        step(arrays, world, 1, DT)
+        step_alone(arrays, world, 1, DT)
         over = lights[vehicles.lane] & (vehicles.own_station + 0.5 * vehicles.length > lengths[vehicles.lane])
         for i in np.flatnonzero(over & ~before & (vehicles.kind > 0)):
             assert town.light(int(vehicles.lane[i]), float(world.clock[0].time)) is not LightColour.RED

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.step import step, update_lane
+from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.vehicle_models import GIVING_UP
 from tests.sim.network.towns import straight_town
@@ -55,7 +56,7 @@ def test_vehicle_stops_behind_one_askew_on_the_lane_beside():
     for _ in range(600):
         askew = world.vehicles[1]
         askew.speed, askew.desired = 0.0, 0.0
-        step(town, world, 1, DT)
+        step_alone(town, world, 1, DT)
         assert not world.vehicles.crashed.any()
     assert world.vehicles[0].x < 87.0 and world.vehicles[0].speed < 0.3
 
@@ -65,7 +66,7 @@ def test_vehicle_that_stands_in_a_lane_change_gives_it_up():
     town, world = kernel_world(two_lanes(), [Pose(1, 50.0, target=0), Pose(1, 58.0)])
     for _ in range(round((GIVING_UP + 0.5) / DT)):
         world.vehicles[1].speed = world.vehicles[1].desired = 0.0
-        step(town, world, 1, DT)
+        step_alone(town, world, 1, DT)
     assert world.vehicles[0].plan[0] == 1
 
 
@@ -76,5 +77,5 @@ def test_vehicle_that_has_changed_lanes_stays_there_when_it_stands():
     assert vehicle.lane == 0
     for _ in range(round((GIVING_UP + 0.5) / DT)):
         world.vehicles[1].speed = world.vehicles[1].desired = 0.0
-        step(town, world, 1, DT)
+        step_alone(town, world, 1, DT)
     assert vehicle.plan[0] == 0 and np.isfinite(vehicle.x)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from dorothie_gym.maps import LightColour
+from dorothie_gym.sim.batch.worlds import step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle, populate
 from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import CLEAR_OF_CAR, OUT_OF_SIGHT, TOW_CRASHED, TOW_FACING, TOW_STUCK
 from dorothie_gym.sim.traffic.respawn import tow
@@ -137,7 +137,7 @@ def test_vehicle_without_room_is_removed():
     world.vehicles[1].crashed = True
     tow_for(arrays, world, TOW_CRASHED + 0.5)
     assert world.vehicles[1].kind == Kind.EMPTY
-    step(arrays, world, 30, DT)
+    step_alone(arrays, world, 30, DT)
 
 
 def test_no_body_is_added_close_to_the_ego():
