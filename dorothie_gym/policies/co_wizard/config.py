@@ -61,6 +61,7 @@ class CoWizardConfig:
         lost_variance: variance of the position above which the car does not know where it is [m^2].
         gps_variance: variance of the position that shows that it is not measured [m^2]; 0.02 to 0.15 while it is.
         found_variance: variance of the position below which it is measured again [m^2].
+        contradictions: instructions against the route to a destination after which it is checked.
         leaves_weather: probability that mentioning the weather is left to the participant.
         accepts: probability that an instruction is accepted ("will do") rather than only heard ("okay").
     """
@@ -109,6 +110,7 @@ class CoWizardConfig:
     lost_variance: float = 36.0
     gps_variance: float = 0.4
     found_variance: float = 0.08
+    contradictions: int = 2
     leaves_weather: float = 0.25
     accepts: float = 0.45
 

@@ -74,6 +74,7 @@ class DialogueState:
         weather_mentioned: whether the present bad weather has been mentioned.
         noticed: weather and crowds that have been noticed.
         lost_mentioned: whether the present loss of localization has been mentioned.
+        contradicted: destination against whose route instructions were given, and how often; it may be misheard.
     """
 
     heard_at: float = -math.inf
@@ -93,6 +94,7 @@ class DialogueState:
     weather_mentioned: bool = False
     noticed: Noticed = field(default_factory=Noticed)
     lost_mentioned: bool = False
+    contradicted: tuple[LandmarkName | None, int] = (None, 0)
 
     def after_hearing(self, now: float) -> DialogueState:
         """Records an utterance of the participant at `now` [s]."""
@@ -161,6 +163,10 @@ class DialogueState:
     def with_noticed(self, noticed: Noticed) -> DialogueState:
         """Sets what has been noticed of weather and crowds."""
         return self if noticed is self.noticed else replace(self, noticed=noticed)
+
+    def with_contradictions(self, goal: LandmarkName | None, count: int) -> DialogueState:
+        """Sets how often instructions went against the route to a destination."""
+        return replace(self, contradicted=(goal, count))
 
     def with_lost_mentioned(self, mentioned: bool) -> DialogueState:
         """Sets whether the present loss of localization has been mentioned."""

@@ -38,6 +38,7 @@ from dorothie_gym.policies.co_wizard.goals import (
 )
 from dorothie_gym.policies.co_wizard.judgement import believes
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
+from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, is_garbled, note_contradiction
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.story import remember
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -60,6 +61,7 @@ SPEED_RANGE = (10, 60)
 _STEERING = frozenset(
     {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.START}
 )
+_COMMANDS = _STEERING | {ActionValue.STOP}
 _STOP_AHEAD = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
 _QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
 _REPEATABLE = _QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
@@ -123,14 +125,18 @@ def _instruction(
             state.dialogue = state.dialogue.after_steering(view.time)
             if not state.beliefs.exact:  # the car is guided and need not search for the place
                 state.route = state.route.with_progress(None)
+        note_contradiction(state, view, actions[0], words)
         for action in actions:
             _OBEYED[action](state, view, act, words)
         acknowledge(state, view, actions[0], words, rng)
+        check_goal(state, view)
     elif streets:
         _instructed_street(state, view, streets[0])
     elif state.dialogue.detour_asked_at is not None:
         take_detour(state, view, rng)
-    elif not act.slots and state.beliefs.goal is None:
+    elif not act.slots and expects_stop(state, view, words):
+        _do_stop(state, view, act, words)
+    elif not act.slots and (state.beliefs.goal is None or is_garbled(words)):
         state.say(intend(Function.NEGATIVE_FEEDBACK))
 
 
@@ -291,7 +297,7 @@ def _explanation(
 ) -> None:
     landmarks, statuses = _landmarks(act), act.values(Slot.STATUS)
     name = landmarks[0] if landmarks else None
-    if _STEERING & set(act.values(Slot.ACTION)):
+    if _COMMANDS & set(act.values(Slot.ACTION)):
         _instruction(state, view, act, words, rng)  # "you should be turning left" counts as an instruction
     elif GoalStatus.COMPLETE in statuses:
         complete(state, name)
@@ -303,8 +309,13 @@ def _explanation(
             state.say(intend(Function.POSITIVE_FEEDBACK))
         else:
             _accept_change(state, contents.errand(name, GoalStatus.ABANDONED), rng)
+    elif name is not None and not statuses and (state.beliefs.goal is None or state.intentions.arrived):
+        # with nowhere to go, a place that is mentioned may be the next one
+        set_goal(state, view, name, _named(act.values(Slot.STREET)), rng, sure=False)
     elif act.values(Slot.STREET):
         hear_description(state, view, _named(act.values(Slot.STREET)), landmarks, rng)
+    elif not act.slots and is_garbled(words) and expects_stop(state, view, words):
+        _do_stop(state, view, act, words)
     elif "wrong" in words.text.lower():
         if not state.beliefs.exact:
             state.route = state.route.with_progress(None)
@@ -432,8 +443,11 @@ def _confusion(
 def _small_talk(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    if view.time - state.dialogue.asked_at < state.config.answer_time and state.beliefs.goal is None:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))  # an answer was expected
+    expected = view.time - state.dialogue.asked_at < state.config.answer_time and state.beliefs.goal is None
+    if is_garbled(words) and expects_stop(state, view, words):
+        _do_stop(state, view, act, words)
+    elif expected or is_garbled(words):
+        state.say(intend(Function.NEGATIVE_FEEDBACK))
     elif rng.random() < state.style.chats:
         state.say(intend(Function.OTHER if rng.random() < 0.6 else Function.POSITIVE_FEEDBACK))
 

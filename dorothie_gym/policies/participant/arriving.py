@@ -17,6 +17,12 @@ from dorothie_gym.policies.speech import Remark, remark
 STOP_REPEAT = 5.0
 """Time after which the stop instruction is repeated [s]."""
 
+REACTION = 1.2
+"""Time in which a car that has heard an instruction to stop begins to brake [s]."""
+
+BRAKING = 0.2
+"""Loss of speed within a decision that shows that the car brakes [m/s]."""
+
 GAIN_RANGE = (-2.0, 2.0)
 """Range of accelerations that are extrapolated [m/s^2]."""
 
@@ -57,13 +63,19 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
         shortest = min(*shouts, state.guidance.stop_text, key=speech_seconds)
         state.guidance = state.guidance.with_stop_text(shortest)
     if _is_time_to_stop(state, view, left):
-        if view.time - state.guidance.stopped_at > STOP_REPEAT and left > 0.0:
+        if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > 0.0:
             state.guidance = state.guidance.after_stopping(view.time)
             state.say(Remark(act=_STOP, text=state.guidance.stop_text, urgent=True))
         return True
     if close and not state.guidance.approach_announced and view.speed > config.slow_speed:
         _announce_place(state, view, left)
     return close
+
+
+def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
+    """Returns the time after which the stop instruction is repeated [s]: soon if the car does not brake."""
+    heeded = view.speed < state.motion.speed - BRAKING
+    return STOP_REPEAT if heeded else speech_seconds(state.guidance.stop_text) + REACTION
 
 
 def _announce_place(state: ParticipantState, view: ParticipantView, left: float) -> None:

@@ -65,7 +65,9 @@ def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None
     named = {value for value in act.values(Slot.LANDMARK) if value.label not in ("Unknown", "Queried")}
     said = {value for item in state.speech.said for value in item.act.slots}
     dropped = {item.wording.dropped for item in state.speech.said}
-    if not named or goal.name in named or named & (said | dropped):
+    if not named or goal.name in named:
+        return None
+    if named & (said | dropped) and not _revives(state, act, named):
         return None
     if act.move is DialogueMove.EXPLAIN and GoalStatus.UNKNOWN not in act.slots:
         return None  # a remark about something in sight
@@ -73,6 +75,14 @@ def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None
     if goal.street.label not in ("Unknown", "Queried"):
         values.append(goal.street)
     return remark(DialogueMove.CLARIFY, *values)
+
+
+def _revives(state: ParticipantState, act: DialogueAct, named: set[SlotValue]) -> bool:
+    """Returns whether the car takes up an errand that it was told to give up."""
+    if act.move not in (DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM) or act.values(Slot.STATUS):
+        return False
+    last = next((item for item in reversed(state.speech.said) if named & set(item.act.slots)), None)
+    return last is not None and last.wording.dropped is None and GoalStatus.ABANDONED in last.act.slots
 
 
 def _corrected_side(

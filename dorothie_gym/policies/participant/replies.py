@@ -46,6 +46,9 @@ _ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 """Moves that may follow an acknowledgement in the same breath."""
 
+_AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START, ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
+"""Actions that are wanted at once and are not steps of the way."""
+
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
 
@@ -400,12 +403,20 @@ def _confusion(
 ) -> None:
     """Clarifies the last step, the target, or the last remark."""
     last, goal = state.speech.last, state.task.goal
-    if state.guidance.guiding and state.guidance.step is not None:
+    lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
+    if last is not None and lately and _is_of_the_moment(last):
+        state.say_first(replace(last, text="", joined=False))
+    elif state.guidance.guiding and state.guidance.step is not None:
         _name_step(state, view, DialogueMove.CLARIFY, rng)
     elif goal is not None and state.task.announced:
         state.say_first(intend(Function.CORRECTION, contents.destination(goal.name)))
     elif last is not None:
         state.say_first(repeated(last, Function.CORRECTION))
+
+
+def _is_of_the_moment(said: Remark) -> bool:
+    """Returns whether a remark is repeated as it was: one beside the task, or an action that no step names."""
+    return said.act.move is DialogueMove.IRRELEVANT or bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)
 
 
 def _acknowledgement(

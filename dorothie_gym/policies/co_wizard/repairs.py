@@ -1,0 +1,56 @@
+"""Repairs of the dialogue: the Co-Wizard finds out that it may have misheard the participant."""
+
+from __future__ import annotations
+
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Direction, ParsedText
+from dorothie_gym.ontology import ActionValue
+from dorothie_gym.policies import contents
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.speech import intend
+
+FRAGMENT = 4
+"""Largest number of words that are taken for the rest of a misheard utterance if they make no sense."""
+
+
+def is_garbled(words: ParsedText) -> bool:
+    """Returns whether words that make no sense are so few that they have probably been misheard."""
+    return len(words.text.split()) <= FRAGMENT
+
+
+def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
+    """Returns whether words without sense probably ask to stop: the car is being guided to a place, and it is near."""
+    guided = state.beliefs.goal is not None and not state.beliefs.exact and state.route.progress is None
+    return guided and not view.standing and (state.intentions.creeping or "here" in words.text.lower().split())
+
+
+def note_contradiction(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> None:
+    """Counts instructions that lead away from the route to a destination on the map."""
+    if not _contradicts(state, view, action, words):
+        return
+    goal, count = state.dialogue.contradicted
+    count = count + 1 if goal is state.beliefs.goal else 1
+    state.dialogue = state.dialogue.with_contradictions(state.beliefs.goal, count)
+
+
+def check_goal(state: CoWizardState, view: CoWizardView) -> None:
+    """Checks a destination against whose route repeated instructions were given."""
+    goal, count = state.dialogue.contradicted
+    if goal is None or goal is not state.beliefs.goal or count < state.config.contradictions:
+        return
+    state.dialogue = state.dialogue.with_contradictions(goal, 0).after_asking(view.time)
+    state.say(intend(Function.CHECK_QUESTION, contents.destination(goal)))
+
+
+def _contradicts(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> bool:
+    progress = state.route.progress
+    if progress is None or not state.beliefs.exact:
+        return False
+    if action is ActionValue.U_TURN:
+        return not progress.turns_round_first(state.town, view.station)
+    crossing = progress.next_crossing(state.town, view.station)
+    if action is not ActionValue.J_TURN or crossing is None or words.direction is None or (words.ordinal or 1) > 1:
+        return False
+    sides = (Direction.LEFT, Direction.RIGHT)
+    return words.direction in sides and crossing.direction in sides and words.direction is not crossing.direction
