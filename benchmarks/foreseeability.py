@@ -1,11 +1,11 @@
 """Shares of moves and navigation actions that are foreseen without words, or from words and the last move alone.
 
-The models are scikit-learn's with its defaults, fitted to the fold `train` and scored on `val` and `test`; no setting is
-chosen:
+The models are scikit-learn's with its defaults, fitted to the fold `train` and scored on `val` and `test`; no setting
+is chosen:
 
-- `history`: `HistGradientBoostingClassifier` on the last moves with their speakers, the last physical actions with their
-  angles, and the ages of both; no words, slots or places.
-- `state`: the same classifier on the features of the row `trees` of `dorothie-gym train`, which add slots and the car.
+- `history`: `HistGradientBoostingClassifier` on the last moves with their speakers, the last physical actions with
+  their angles, and the ages of both; no words, slots or places.
+- `state`: the same classifier on the features of the row `trees` of `dorothie-gym train`, with slots and the car.
 - `words`: `LogisticRegression` on TF-IDF weights of the last utterances and on the last move.
 """
 

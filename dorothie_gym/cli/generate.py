@@ -33,7 +33,7 @@ def generate(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the corpus; equal seeds give equal corpora.")] = 0,
     workers: Players = None,
     max_seconds: MaxSeconds = None,
-    word_errors: WordErrors = 0.0,
+    word_errors: WordErrors = None,
     perception: Perception = PerceptionModel.SYMBOLIC,
     ray: Ray = None,
     as_json: AsJson = False,
@@ -78,15 +78,20 @@ def generate(
 
 
 def _exit_interrupted(
-    out: Path, sessions: int, seed: int, max_seconds: float | None, word_errors: float, perception: PerceptionModel
-) -> None:  # fmt: skip
+    out: Path,
+    sessions: int,
+    seed: int,
+    max_seconds: float | None,
+    word_errors: float | None,
+    perception: PerceptionModel,
+) -> None:
     from dorothie_gym.rollout import finished_sessions
 
     done = finished_sessions(out, sessions=sessions, seed=seed)
     command = f"dorothie-gym generate --sessions {sessions} --seed {seed} --out {out}"
     if max_seconds is not None:
         command += f" --max-seconds {max_seconds:g}"
-    if word_errors:
+    if word_errors is not None:
         command += f" --word-errors {word_errors:g}"
     if perception is not PerceptionModel.SYMBOLIC:
         command += f" --perception {perception}"

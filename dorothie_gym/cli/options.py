@@ -74,11 +74,12 @@ MaxSeconds = Annotated[
 ]
 
 WordErrors = Annotated[
-    float,
+    float | None,
     typer.Option(
         min=0.0,
         max=0.95,
-        help="Word error rate of the speech recogniser between participant and Co-Wizard.",
+        help="Word error rate of the speech recogniser between participant and Co-Wizard; 0 for an exact one, by "
+        "default 0.05.",
     ),
 ]
 
@@ -103,20 +104,23 @@ Ray = Annotated[
 
 
 def env_config(
-    max_seconds: float | None, word_errors: float, perception: PerceptionModel = PerceptionModel.SYMBOLIC
+    max_seconds: float | None, word_errors: float | None, perception: PerceptionModel = PerceptionModel.SYMBOLIC
 ) -> EnvConfig:  # fmt: skip
     """Returns the engine settings of a command line.
 
     Args:
         max_seconds: simulated time after which a session is truncated [s]; None keeps the default.
-        word_errors: word error rate of the speech recogniser.
+        word_errors: word error rate of the speech recogniser; None keeps the default.
         perception: what participant and Co-Wizard see.
     """
     from dorothie_gym.engine.config import EnvConfig
 
-    if max_seconds is None:
-        return EnvConfig(word_error_rate=word_errors, perception=perception)
-    return EnvConfig(max_seconds=max_seconds, word_error_rate=word_errors, perception=perception)
+    usual = EnvConfig()
+    return EnvConfig(
+        max_seconds=usual.max_seconds if max_seconds is None else max_seconds,
+        word_error_rate=usual.word_error_rate if word_errors is None else word_errors,
+        perception=perception,
+    )
 
 
 # --- Players ----------------------------------------------------------------------------------------------------------

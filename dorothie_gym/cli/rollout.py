@@ -61,7 +61,7 @@ def rollout(
         typer.Option(metavar="DIR", help="Folder for sessions and result; a started rollout is resumed."),
     ] = None,
     max_seconds: MaxSeconds = None,
-    word_errors: WordErrors = 0.0,
+    word_errors: WordErrors = None,
     perception: Perception = PerceptionModel.SYMBOLIC,
     ray: Ray = None,
     as_json: AsJson = False,

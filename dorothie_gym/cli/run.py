@@ -61,7 +61,7 @@ class _Plan:
     view: RenderView
     players: tuple[str, str, str]
     max_seconds: float | None
-    word_errors: float
+    word_errors: float | None
     perception: PerceptionModel
     speed: float | None
 
@@ -98,7 +98,7 @@ def run(
     max_seconds: Annotated[
         float | None, typer.Option(min=1.0, max=86400.0, help="Truncate the session after this simulated time [s].")
     ] = None,
-    word_errors: WordErrors = 0.0,
+    word_errors: WordErrors = None,
     perception: Perception = PerceptionModel.SYMBOLIC,
     speed: Annotated[
         float | None,

@@ -1,6 +1,6 @@
 """Dialogue: utterances and timing, exchange units, language generation (NLG) and understanding (NLU)."""
 
-from dorothie_gym.dialogue.asr_channel import AsrChannel, Recogniser, word_error_rate
+from dorothie_gym.dialogue.asr_channel import USUAL_WORD_ERROR_RATE, AsrChannel, Recogniser, word_error_rate
 from dorothie_gym.dialogue.conversation import (
     SHORTEST_SPAN,
     WORDS_PER_SECOND,
@@ -29,6 +29,7 @@ __all__ = [
     "EXPECTATIONS",
     "MAX_CHARACTERS",
     "SHORTEST_SPAN",
+    "USUAL_WORD_ERROR_RATE",
     "WORDS_PER_SECOND",
     "Annotator",
     "AsrChannel",

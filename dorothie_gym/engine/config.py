@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.copying import shared
-from dorothie_gym.dialogue import WORDS_PER_SECOND
+from dorothie_gym.dialogue import USUAL_WORD_ERROR_RATE, WORDS_PER_SECOND
 from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.ontology import Role
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
@@ -96,9 +96,9 @@ class EnvConfig:
         max_seconds: simulated time after which the session is truncated [s].
         words_per_second: speaking rate of all roles [words/s].
         observe_acts: whether utterances are observed with their acts (move and slots), or as text only.
-        word_error_rate: word error rate of the speech recognition between participant and Co-Wizard, in [0, 1). They
-            observe the transcript; a misrecognised span carries the act that the classifier reads from its transcript.
-            The Ad-Wizard observes the spoken words.
+        word_error_rate: word error rate of the speech recognition between participant and Co-Wizard, in [0, 1); 0 for
+            an exact channel. They observe the transcript; a misrecognised span carries the act that the classifier
+            reads from its transcript. The Ad-Wizard observes the spoken words.
         world: settings of traffic, pedestrians and sensing.
         rewards: weights of the reward terms.
         camera: first-person camera on the car, whose pictures the participant and the Co-Wizard observe; None for none.
@@ -112,7 +112,7 @@ class EnvConfig:
     max_seconds: float = 900.0
     words_per_second: float = WORDS_PER_SECOND
     observe_acts: bool = True
-    word_error_rate: float = 0.0
+    word_error_rate: float = USUAL_WORD_ERROR_RATE
     world: WorldConfig = field(default_factory=WorldConfig)
     rewards: RewardWeights = field(default_factory=RewardWeights)
     camera: CameraConfig | None = None

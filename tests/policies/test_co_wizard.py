@@ -25,7 +25,7 @@ class Talk:
     """Session of the scripted Co-Wizard with a participant controlled by the test."""
 
     def __init__(self, seed: int = 2, acts: bool = True) -> None:
-        self.env = DuoWizardEnv(town="brookside", config=EnvConfig(observe_acts=acts))
+        self.env = DuoWizardEnv(town="brookside", config=EnvConfig(observe_acts=acts, word_error_rate=0.0))
         self.observations, _ = self.env.reset(seed=seed)
         self.policy = ScriptedCoWizard(self.env.limits)
         self.state = self.policy.initial_state(seed, self.env.town)

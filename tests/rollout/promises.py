@@ -104,7 +104,7 @@ def main() -> None:
     parser.add_argument("--sessions", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--word-errors", type=float, default=0.0)
+    parser.add_argument("--word-errors", type=float, default=EnvConfig.word_error_rate)
     parser.add_argument("--text-only", action="store_true")
     parser.add_argument("--cut", action="store_true")
     asked = parser.parse_args()

@@ -134,10 +134,20 @@ def _instruction(
         _instructed_street(state, view, streets[0])
     elif state.dialogue.detour_asked_at is not None:
         take_detour(state, view, rng)
-    elif not act.slots and expects_stop(state, view, words):
+    elif not act.slots:
+        _senseless(state, view, act, words, asks=state.beliefs.goal is None or is_garbled(words))
+
+
+def _senseless(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, *, asks: bool
+) -> bool:  # fmt: skip
+    """Stops after words without sense where that is expected, or asks again; returns whether it did."""
+    if is_garbled(words) and expects_stop(state, view, words):
         _do_stop(state, view, act, words)
-    elif not act.slots and (state.beliefs.goal is None or is_garbled(words)):
+        return True
+    if asks:
         state.say(intend(Function.NEGATIVE_FEEDBACK))
+    return asks
 
 
 def _instructed_place(
@@ -314,9 +324,17 @@ def _explanation(
         set_goal(state, view, name, _named(act.values(Slot.STREET)), rng, sure=False)
     elif act.values(Slot.STREET):
         hear_description(state, view, _named(act.values(Slot.STREET)), landmarks, rng)
-    elif not act.slots and is_garbled(words) and expects_stop(state, view, words):
-        _do_stop(state, view, act, words)
-    elif "wrong" in words.text.lower():
+    elif act.slots or not _senseless(state, view, act, words, asks=False):
+        _statement(state, view, act, words, rng)
+
+
+def _statement(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Reacts to a statement that changes no destination."""
+    landmarks, statuses = _landmarks(act), act.values(Slot.STATUS)
+    name = landmarks[0] if landmarks else None
+    if "wrong" in words.text.lower():
         if not state.beliefs.exact:
             state.route = state.route.with_progress(None)
         state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
@@ -444,11 +462,9 @@ def _small_talk(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     expected = view.time - state.dialogue.asked_at < state.config.answer_time and state.beliefs.goal is None
-    if is_garbled(words) and expects_stop(state, view, words):
-        _do_stop(state, view, act, words)
-    elif expected or is_garbled(words):
-        state.say(intend(Function.NEGATIVE_FEEDBACK))
-    elif rng.random() < state.style.chats:
+    if _senseless(state, view, act, words, asks=expected or is_garbled(words)):
+        return
+    if rng.random() < state.style.chats:
         state.say(intend(Function.OTHER if rng.random() < 0.6 else Function.POSITIVE_FEEDBACK))
 
 

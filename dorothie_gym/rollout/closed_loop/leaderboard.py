@@ -71,7 +71,7 @@ class LeaderboardEntry:
             for role in (Role.PARTICIPANT, Role.AD_WIZARD)
             if settings[str(role)] != "scripted"
         ]
-        if rate := settings["config"]["word_error_rate"]:
+        if (rate := settings["config"]["word_error_rate"]) != EnvConfig.word_error_rate:
             others.append(f"word errors {100 * rate:g} %")
         if perception := settings["config"].get("perception"):
             others.append(f"perception {perception}")

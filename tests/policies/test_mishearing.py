@@ -1,0 +1,109 @@
+"""What is misheard is found out and repaired."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dorothie_gym.dialogue import AsrChannel, Wording, understand
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, PhysicalAction
+from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, note_contradiction
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.speech import remark
+from dorothie_gym.spaces import Speech
+from tests.policies.test_co_wizard import Talk
+from tests.policies.test_repairs import Human
+
+M = DialogueMove
+
+
+def says(talk: Talk, move: DialogueMove, text: str, *values, decisions: int = 8) -> None:
+    talk.step(Speech(act=DialogueAct.of(move, *values), text=text))
+    for _ in range(decisions):
+        talk.step()
+
+
+def test_words_without_sense_are_asked_for_again() -> None:
+    talk = Talk()
+    says(talk, M.IRRELEVANT, "slot to")
+    assert M.CONFUSE in talk.moves()
+
+
+def test_small_talk_is_no_reason_to_ask() -> None:
+    talk = Talk()
+    says(talk, M.IRRELEVANT, "we used to come here every summer when I was little")
+    assert M.CONFUSE not in talk.moves()
+
+
+@pytest.mark.parametrize(("hidden", "stops"), [(True, True), (False, False)])
+def test_only_a_guided_car_takes_a_shout_without_sense_for_a_stop(hidden: bool, stops: bool) -> None:
+    talk = Talk()
+    says(talk, M.INSTRUCT, "to that place", talk.landmarks(hidden=hidden)[0].name, decisions=6)
+    assert talk.state.beliefs.exact is not hidden
+    driving = replace(CoWizardView.read(talk.observations["co_wizard"], talk.env.town), speed=8.0)
+    assert expects_stop(talk.state, driving, understand("soup right here")) is stops
+    assert not expects_stop(talk.state, replace(driving, speed=0.0), understand("soup right here"))
+
+
+def test_destination_that_instructions_contradict_is_checked() -> None:
+    talk = Talk()
+    place = talk.landmarks(hidden=False)[0].name
+    says(talk, M.INSTRUCT, "to that place", place, decisions=6)
+    view, state = CoWizardView.read(talk.observations["co_wizard"], talk.env.town), talk.state
+    assert state.route.progress is not None and not state.route.progress.turns_round_first(state.town, view.station)
+    state.speech = state.speech.cleared()
+    checked = []
+    for _ in range(state.config.contradictions):
+        assert not checked
+        note_contradiction(state, view, ActionValue.U_TURN, understand("turn around"))
+        check_goal(state, view)
+        checked = [item.act for item in state.speech.queue]
+    assert checked == [DialogueAct.of(M.CHECK, place)]
+
+
+def test_errand_that_is_revived_is_corrected() -> None:
+    human = Human()
+    dropped = human.another_place()
+    given_up = remark(M.INSTRUCT, dropped, GoalStatus.ABANDONED)
+    human.state.speech = replace(human.state.speech, said=(given_up,))
+    human.hears(M.ACKNOWLEDGE, dropped)
+    clarified = [item.act for item in human.state.speech.queue if item.act.move is M.CLARIFY]
+    assert human.state.task.goal is not None
+    assert clarified and human.state.task.goal.name in clarified[0].slots
+
+
+def test_errand_that_is_given_up_in_turn_is_not_corrected() -> None:
+    human = Human()
+    dropped = human.another_place()
+    human.state.speech = replace(human.state.speech, said=(remark(M.INSTRUCT, dropped, GoalStatus.ABANDONED),))
+    human.hears(M.ACKNOWLEDGE, dropped, GoalStatus.ABANDONED)
+    assert M.CLARIFY not in human.moves()
+
+
+def test_stop_that_was_not_understood_is_repeated_as_it_was() -> None:
+    human = Human()
+    stop = remark(M.INSTRUCT, ActionValue.STOP)
+    human.state.speech = replace(human.state.speech, last=stop, said=(stop,), last_end=human.view.time)
+    human.hears(M.CONFUSE)
+    assert human.state.speech.queue[0].act == stop.act
+
+
+def test_place_that_is_mentioned_to_an_idle_car_is_checked() -> None:
+    talk = Talk()
+    place = next(mark.name for mark in talk.landmarks(hidden=False) if mark.name is not LandmarkName.UNKNOWN)
+    says(talk, M.EXPLAIN, "text is that place", place)
+    assert talk.state.beliefs.goal is place and M.CHECK in talk.moves()
+
+
+def test_car_stops_for_an_indirect_command() -> None:
+    talk = Talk()
+    for _ in range(4):
+        talk.step()
+    talk.say(M.EXPLAIN, ActionValue.STOP, wording=Wording(), decisions=4)
+    assert PhysicalAction.STOP in talk.physical()
+
+
+def test_rare_words_are_misheard_more_often() -> None:
+    channel, rng = AsrChannel(rate=0.1), np.random.default_rng(0)
+    lost = {word: sum(channel.transcribe(word, rng) != word for _ in range(600)) for word in ("Bonisteel", "please")}
+    assert lost["Bonisteel"] > 2 * lost["please"]
