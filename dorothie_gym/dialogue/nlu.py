@@ -122,6 +122,7 @@ class ParsedText:
         affirms: True for an initial yes, False for an initial no.
         question: whether the text contains a question mark.
         asked: proposition that a question is about, if the words tell; other questions are told by their slot values.
+        told: proposition about weather, crowds, sensors or the view that a statement makes, if the words tell.
     """
 
     text: str
@@ -148,6 +149,7 @@ class ParsedText:
     affirms: bool | None = None
     question: bool = False
     asked: Proposition | None = None
+    told: Proposition | None = None
 
     @property
     def direction(self) -> Direction | None:
@@ -207,7 +209,8 @@ def understand(text: str) -> ParsedText:
         further=_FURTHER.search(joined) is not None,
         affirms=_affirms(words, lists),
         question="?" in words,
-        asked=_asked(masked),
+        asked=_first("questions", "asks", masked),
+        told=None if "?" in words else _first("statements", "says", masked),
     )
 
 
@@ -316,22 +319,22 @@ def _question_patterns() -> tuple[tuple[SlotValue, re.Pattern[str]], ...]:
 
 
 @functools.cache
-def _questions() -> tuple[tuple[re.Pattern[str], Proposition], ...]:
-    """Returns the patterns of questions, with what they ask; the first that fits decides."""
+def _propositions(table: str, key: str) -> tuple[tuple[re.Pattern[str], Proposition], ...]:
+    """Returns the patterns of a table of cues.yaml, with their propositions; the first that fits decides."""
     found = []
-    for number, row in enumerate(read_data("cues.yaml").get("questions", [])):
-        where = f"cues.yaml: questions[{number}]"
+    for number, row in enumerate(read_data("cues.yaml").get(table, [])):
+        where = f"cues.yaml: {table}[{number}]"
         try:
             pattern = re.compile("|".join(strings(f"{where}.cues", row["cues"])))
-            found.append((pattern, Proposition.from_json(row["asks"], f"{where}.asks")))
+            found.append((pattern, Proposition.from_json(row[key], f"{where}.{key}")))
         except (re.error, ValueError) as error:
             raise PhraseFileError(f"{where}: {error}") from error
     return tuple(found)
 
 
-def _asked(masked: str) -> Proposition | None:
+def _first(table: str, key: str, masked: str) -> Proposition | None:
     sentence = masked.strip(" ,?")
-    return next((asked for pattern, asked in _questions() if pattern.search(sentence)), None)
+    return next((said for pattern, said in _propositions(table, key) if pattern.search(sentence)), None)
 
 
 _QUESTION_WORDS = frozenset({"what", "which", "where", "what's", "where's", "how", "wheres", "whats", "where'd"})

@@ -63,7 +63,7 @@ class Predicate(enum.StrEnum):
     WEATHER = "weather"
     """A parameter of the weather is high (or low)."""
     VISIBILITY = "visibility"
-    """The speaker sees far enough; negated: the view is poor."""
+    """The speaker sees far enough, or so far; negated: the view is poor."""
     BLOCKED = "blocked"
     """Something blocks the road ahead."""
     CROWDED = "crowded"
@@ -149,7 +149,7 @@ PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
         Predicate.NEAR: {**_PLACE, "landmark": LandmarkName, "object": ObjectClass},
         Predicate.LOOKS: {**_PLACE, "object": ObjectClass, "feature": str},
         Predicate.WEATHER: {"parameter": WeatherParameter, "high": bool, "object": ObjectClass},
-        Predicate.VISIBILITY: {},
+        Predicate.VISIBILITY: {"metres": int},
         Predicate.BLOCKED: {"object": ObjectClass, "prop": PropKind, "street": StreetName},
         Predicate.CROWDED: {"object": ObjectClass},
         Predicate.RED: {"object": ObjectClass},

@@ -13,9 +13,6 @@ FOG_LIMIT = 35.0
 RAIN_LIMIT = 55.0
 """Precipitation above which the agents call the rain heavy [%]."""
 
-BAD_WEATHER_SPEED = 25
-"""Cruise speed that the agents propose in fog or heavy rain [km/h]."""
-
 USUAL_SPEED = 40
 """Cruise speed on open road where nothing is said about it [km/h]; the speed that route costs assume."""
 

@@ -1,4 +1,4 @@
-"""Noticing of the scripted agents: the ten parameters of the weather, and crowds."""
+"""Noticing of the scripted agents: the ten parameters of the weather, crowds, and what limits the view."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.dialogue import CommunicativeFunction, ParsedText, Predicate, Proposition, Wording
+from dorothie_gym.ontology import ObjectClass, Sensor
 from dorothie_gym.ontology import WeatherParameter as W
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.observation_parser import SeenObject, scalar, weather
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.sight import DENSE, FAR_SIGHT, Limit
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.spaces import ObservationMapping
 
@@ -48,11 +49,35 @@ OVER: Final = 0.6
 CROWD_DISTANCE: Final = 50.0
 """Distance within which a crowd is noticed [m]."""
 
-CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTRIAN: 3, ObjectClass.VEHICLES: 4})
+CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTRIAN: 3, ObjectClass.VEHICLES: 3})
 """Least number of objects in a crowd."""
 
+MORE_THAN_USUAL: Final = 1.5
+"""Least number of objects by which a crowd exceeds what is usual."""
+
+USUAL_WEIGHT: Final = 1.0 / 60.0
+"""Weight of a new number of objects in what is usual: that of the last half minute, at two decisions per second."""
+
 CROWD_INTERVAL: Final = 60.0
-"""Time between remarks about crowds [s]."""
+"""Time between remarks about crowds of a kind [s]."""
+
+
+_TELLS_DISTANCE: Final = 0.2  # probability that the range of sight is named
+_NAMES_OBJECT: Final = 0.35  # probability that an object is named that is hidden or shown
+
+PARAMETER: Final[Mapping[Limit, W]] = MappingProxyType(
+    {Limit.FOG: W.FOG_DENSITY, Limit.RAIN: W.PRECIPITATION, Limit.NIGHT: W.SUN_ALTITUDE_ANGLE}
+)
+"""Parameter of the weather behind each limit of the view."""
+
+HIDDEN: Final[Mapping[Limit, tuple[ObjectClass, ...]]] = MappingProxyType(
+    {
+        Limit.FOG: (ObjectClass.ROAD_LINE, ObjectClass.ROAD),
+        Limit.RAIN: (ObjectClass.WATER, ObjectClass.GROUND, ObjectClass.ROAD),
+        Limit.NIGHT: (ObjectClass.SKY,),
+    }
+)
+"""Objects that each limit hides or shows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,15 +86,39 @@ class Noticed:
 
     Attributes:
         weather: parameters that have become conspicuous and are still so.
-        crowd_at: time at which a crowd was last noticed [s].
+        crowds: kinds of crowds, with the time at which each was last noticed [s].
+        usual: usual number of objects near, by the kinds of `CROWDS`.
     """
 
     weather: frozenset[W] = frozenset()
-    crowd_at: float = -math.inf
+    crowds: tuple[tuple[ObjectClass, float], ...] = ()
+    usual: tuple[float, ...] = (0.0,) * len(CROWDS)
 
     def with_change(self, parameter: W, *, high: bool) -> Noticed:
         """Records that a parameter has become conspicuous, or has ceased to be."""
         return replace(self, weather=self.weather | {parameter} if high else self.weather - {parameter})
+
+    def with_crowd(self, kind: ObjectClass, now: float) -> Noticed:
+        """Records that a crowd was noticed at a time [s]."""
+        return replace(self, crowds=(*(row for row in self.crowds if row[0] is not kind), (kind, now)))
+
+    def after_looking(self, near: Sequence[ObjectClass]) -> Noticed:
+        """Updates the usual numbers of objects by the kinds of those near."""
+        usual = tuple(
+            mean + USUAL_WEIGHT * (near.count(kind) - mean) for kind, mean in zip(CROWDS, self.usual, strict=True)
+        )
+        return self if max(usual) < 0.01 and not any(self.usual) else replace(self, usual=usual)
+
+    def after_hearing(self, words: ParsedText, now: float) -> Noticed:
+        """Records what the other speaker has just mentioned at a time [s], which then needs no mention."""
+        told = words.told
+        if told is None:
+            return self
+        parameter = told.get("parameter")
+        if isinstance(parameter, W):
+            return self.with_change(parameter, high=True)
+        kind = next((thing for thing in words.objects if thing in CROWDS), None)
+        return self.with_crowd(kind, now) if told.predicate is Predicate.CROWDED and kind is not None else self
 
 
 def notice(
@@ -98,10 +147,12 @@ def notice(
         noticed = noticed.with_change(parameter, high=high)
         if not (high and parameter in handled) and rng.random() < chance:
             return weather_change_remark(parameter, high=high), noticed
-    kind, now = crowd_ahead(objects), scalar(observation, "time")
-    if kind is None or now - noticed.crowd_at < CROWD_INTERVAL:
+    near, now = [thing.kind for thing in objects if thing.distance < CROWD_DISTANCE], scalar(observation, "time")
+    kind = crowd_among(near, noticed.usual)
+    noticed = noticed.after_looking(near)
+    if kind is None or now - dict(noticed.crowds).get(kind, -math.inf) < CROWD_INTERVAL:
         return None, noticed
-    noticed = replace(noticed, crowd_at=now)
+    noticed = noticed.with_crowd(kind, now)
     return crowd_remark(kind) if rng.random() < chance else None, noticed
 
 
@@ -116,10 +167,12 @@ def changes(observation: ObservationMapping, noted: frozenset[W]) -> Iterator[tu
             yield parameter, False
 
 
-def crowd_ahead(objects: Sequence[SeenObject]) -> ObjectClass | None:
-    """Returns pedestrians or vehicles if conspicuously many of them are near; None otherwise."""
-    near = [thing.kind for thing in objects if thing.distance < CROWD_DISTANCE]
-    return next((kind for kind, least in CROWDS.items() if near.count(kind) >= least), None)
+def crowd_among(near: Sequence[ObjectClass], usual: Sequence[float]) -> ObjectClass | None:
+    """Returns pedestrians or vehicles if conspicuously many of them are near, and more than usual; None otherwise."""
+    for (kind, least), mean in zip(CROWDS.items(), usual, strict=True):
+        if near.count(kind) >= max(least, mean + MORE_THAN_USUAL):
+            return kind
+    return None
 
 
 def crowd_remark(kind: ObjectClass) -> Remark:
@@ -132,3 +185,32 @@ def weather_change_remark(parameter: W, *, high: bool) -> Remark:
     said = Proposition.of(Predicate.WEATHER, parameter=parameter, high=high)
     topic = f"{'much' if high else 'less'}_{parameter}"
     return intend(CommunicativeFunction.INFORM, said, wording=Wording(topic=topic))
+
+
+def view_remark(limit: Limit, distance: float, rng: np.random.Generator) -> Remark:
+    """Returns a remark about what limits the view: the condition, an object that it hides, or how far one sees.
+
+    Args:
+        limit: what limits it.
+        distance: range of sight [m].
+        rng: random generator of the decision.
+    """
+    draw = rng.random()
+    if draw < _TELLS_DISTANCE and distance < FAR_SIGHT:
+        said = Proposition.of(Predicate.VISIBILITY, metres=10 * round(distance / 10.0))
+        return intend(CommunicativeFunction.INFORM, said, wording=Wording(topic="sight"))
+    if limit is Limit.CAMERA:
+        said = Proposition.of(Predicate.VISIBILITY, negated=True)
+        return intend(CommunicativeFunction.INFORM, said)
+    things = HIDDEN[limit]
+    thing = things[int(rng.integers(len(things)))] if draw > 1.0 - _NAMES_OBJECT else None
+    said = Proposition.of(Predicate.WEATHER, parameter=PARAMETER[limit], high=True, object=thing)
+    dense = limit is Limit.FOG and distance < DENSE
+    return intend(CommunicativeFunction.INFORM, said, wording=Wording(topic=f"{'dense_' * dense}{limit}"))
+
+
+def fault_remark(sensor: Sensor, *, over: bool = False, joined: bool = False) -> Remark:
+    """Returns a remark that a sensor fails, or works again."""
+    said = Proposition.of(Predicate.FAILED, sensor=sensor, negated=over)
+    wording = Wording(topic=f"{'not_' * over}failed_{sensor}")
+    return intend(CommunicativeFunction.INFORM, said, wording=wording, joined=joined)

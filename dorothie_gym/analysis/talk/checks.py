@@ -160,6 +160,8 @@ def _is_about(answer: Proposition, question: Proposition) -> bool:
     """Returns whether an answer's proposition is the one that was asked, filled in or denied."""
     if answer.predicate is Predicate.BECAUSE:
         effect = answer.get("effect")
+        if question.predicate is Predicate.BECAUSE:
+            return effect == question.get("effect")
         return isinstance(effect, Proposition) and effect.predicate is question.predicate
     same = all(answer.get(name) in (None, value) for name, value in question.arguments if not _is_open(value))
     return answer.predicate is question.predicate and same

@@ -29,6 +29,8 @@ from dorothie_gym.ontology import (
 from dorothie_gym.recording import FRAME_RATE, Event, EventType, Session
 from dorothie_gym.recording.header import LandmarkRow
 from dorothie_gym.recording.surroundings import ActorKind
+from dorothie_gym.sim.weather import Weather
+from dorothie_gym.sim.world import CLARITY, FAULT_SECONDS
 
 _NAMING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 _OVER: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE, GoalStatus.PENDING})
@@ -129,6 +131,20 @@ class SessionWorld:
             return parameter.clear_noon
         return float(table.rows[int(table.offsets[place])][parameter.value])
 
+    def sight(self, time: float, *, faulty: bool = True) -> float:
+        """Returns the range of sight at a time [s], by weather, light, head lights and the camera [m].
+
+        Args:
+            time: time [s].
+            faulty: whether the faults of the camera count.
+        """
+        weather = Weather()
+        for parameter in WeatherParameter:
+            weather.set(parameter, self.weather(time, parameter))
+        faults = [sensor for sensor in CLARITY if faulty and self.failed(time, sensor)]
+        clarity = min((CLARITY[sensor] for sensor in faults), default=1.0)
+        return weather.visibility(lights=self.lights_on(time), clarity=clarity).sight
+
     def distance_of(self, time: float, kinds: Sequence[ActorKind]) -> float:
         """Returns the distance of the nearest recorded actor of some kinds at a time [m]; infinity if there is none."""
         return float(self._distances(time, kinds).min(initial=math.inf))
@@ -169,13 +185,13 @@ class SessionWorld:
         return found + [(start, math.inf, reason) for reason, start in begun.items()]
 
     def failed(self, time: float, sensor: Sensor) -> bool:
-        """Returns whether a sensor is faulty at a time [s]."""
+        """Returns whether a sensor is faulty at a time [s]; a fault ends by itself."""
         switched = [
-            bool(event.data.get("on"))
+            (bool(event.data.get("on")), event.time)
             for event in self.session.of_type(EventType.EXCEPTION)
             if event.data.get("sensor") == sensor.value and event.time <= time
         ]
-        return bool(switched and switched[-1])
+        return bool(switched) and switched[-1][0] and time < switched[-1][1] + FAULT_SECONDS
 
     # --- tasks --------------------------------------------------------------------------------------------------------
 

@@ -35,7 +35,8 @@ TIME_FACTOR: Final = 1.5
 SHORT_TIME: Final = 15.0
 """Differences of times that nobody minds [s]."""
 
-_FOG, _RAIN, _SUN = (25.0, 40.0), (45.0, 60.0), (-3.0, 6.0)  # where the view may be called good or poor [%, degrees]
+_POOR, _GOOD = 50.0, 65.0  # ranges of sight that are poor and good [m]
+_SIGHT_ERROR: Final = 10.0  # error of a range of sight that agrees [m]
 _NEAR: Final = 130.0  # largest distance of two places near each other [m]
 _BESIDE: Final = 40.0  # largest distance of a light or sign from a place near it [m]
 _CORNER: Final = 80.0  # largest distance of a place near a corner from the middle of the junction [m]
@@ -188,16 +189,13 @@ def _knows(world: SessionWorld, said: Proposition, time: float, speaker: Role) -
 
 
 def _visibility(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    faulty = world.failed(time, Sensor.BLUR) or world.failed(time, Sensor.VIEW)
-    if faulty:
+    """Whether the range of sight, a moment ago or now, is long, or as long as said."""
+    metres, sights = said.get("metres"), [world.sight(time - shift) for shift in (0.0, 2.0, _NOW)]
+    if isinstance(metres, int):
+        return any(abs(metres - sight) <= max(_SIGHT_ERROR, 0.3 * sight) for sight in sights)
+    if min(sights) < _POOR < max(sights):
         return None
-    fog, rain = (
-        world.weather(time, parameter) for parameter in (WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION)
-    )
-    sun = world.weather(time, WeatherParameter.SUN_ALTITUDE_ANGLE)
-    if fog > _FOG[1] or rain > _RAIN[1] or sun < _SUN[0]:
-        return False
-    return True if fog < _FOG[0] and rain < _RAIN[0] and sun > _SUN[1] else None
+    return True if min(sights) > _GOOD else False if max(sights) < _POOR else None
 
 
 def _arrived(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
@@ -214,11 +212,10 @@ def _because(world: SessionWorld, said: Proposition, time: float, speaker: Role)
 
 
 def _failed(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Whether a sensor has failed, or had until a moment ago: the effect of a fault fades."""
+    """Whether a sensor, or any, has failed, or had until a moment ago: the effect of a fault fades."""
     sensor = said.get("sensor")
-    if not isinstance(sensor, Sensor):
-        return None
-    return any(world.failed(time - k, sensor) for k in range(0, _FADING, 2))
+    asked = [sensor] if isinstance(sensor, Sensor) else list(Sensor)
+    return any(world.failed(time - k, one) for one in asked for k in range(0, _FADING if not said.negated else 2, 2))
 
 
 def _weather(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:

@@ -23,18 +23,23 @@ from dorothie_gym.policies.co_wizard.judgement import (
     reason_to_stand,
     reason_to_turn_round,
     seconds_to_goal,
-    visibility_topic,
+    sees_far,
 )
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.noticing import fault_remark, view_remark
 from dorothie_gym.policies.observation_parser import street_of
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import direction_of
+from dorothie_gym.policies.sight import camera_fault, limit_of, sight
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.spaces import Motion
 
 _ABOUT_THE_GOAL = frozenset(
     {Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY, Predicate.ARRIVED, Predicate.KNOWS}
 )
+
+_ABOUT_THE_VIEW = frozenset({Predicate.VISIBILITY, Predicate.SAFE, Predicate.FAILED})
 
 RECENT_STOP = 45.0
 """Time after a standstill within which the reason for it can be asked for [s]."""
@@ -97,7 +102,8 @@ def _more(
     state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator
 ) -> tuple[Remark, ...]:  # fmt: skip
     """Returns what is added to an answer, by chance: why something is not seen, or the time to the goal."""
-    if asked.predicate is Predicate.SEES and not believes(state, view, asked):
+    unseen = asked.predicate is Predicate.SEES and not believes(state, view, asked)
+    if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):
         return _poor_view(view, rng)
     if asked.predicate in (Predicate.CLOSE, Predicate.RIGHT_WAY, Predicate.KNOWS, Predicate.HAS_ROUTE):
         return plan_remark(state, view, rng, joined=True)
@@ -105,12 +111,13 @@ def _more(
 
 
 def _poor_view(view: CoWizardView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark about the condition that limits the view, if there is one, by chance."""
-    topic = visibility_topic(view)
-    if topic is None or rng.random() < 0.3:
+    """Returns a remark about what limits the view, if anything does, by chance."""
+    limit, fault = limit_of(view.raw), camera_fault(view.raw)
+    if limit is None or rng.random() < 0.3:
         return ()
-    content = Proposition.of(Predicate.VISIBILITY, negated=True)
-    return (intend(Function.INFORM, content, wording=Wording(topic=topic), joined=True),)
+    if fault is not None:
+        return (fault_remark(fault, joined=True),)
+    return (replace(view_remark(limit, sight(view.raw), rng), joined=True),)
 
 
 # --- open questions ---------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.policies.guidance_config import BAD_WEATHER_SPEED, NUDGE_DISTANCE, USUAL_SPEED
+from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,6 @@ class CoWizardConfig:
         search_radius: distance to a guessed place at which the guess is given up [m].
         wish_time: time after which a manoeuvre that finds no room is given up [s].
         nudge_distance: distance driven for "a bit further" [m].
-        bad_weather_speed: speed proposed in fog or heavy rain [km/h].
         recent_stop: time after a stop instruction within which the goal must be near [s].
         open_road_speed: lower requested speeds are temporary [km/h].
         slow_time: duration of a temporary speed [s].
@@ -91,7 +90,6 @@ class CoWizardConfig:
     search_radius: float = 8.0
     wish_time: float = 30.0
     nudge_distance: float = NUDGE_DISTANCE
-    bad_weather_speed: int = BAD_WEATHER_SPEED
     recent_stop: float = 40.0
     open_road_speed: int = 20
     slow_time: float = 40.0

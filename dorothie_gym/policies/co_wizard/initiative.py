@@ -4,44 +4,46 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Proposition, Wording, WordingContext
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording, WordingContext
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology import (
     ActionValue,
-    DialogueMove,
     GoalStatus,
     LandmarkName,
     ObjectClass,
     PhysicalAction,
     Sensor,
-    SlotValue,
     StreetName,
     WeatherParameter,
 )
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
-from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, is_localised, reason_to_stand, visibility_topic
+from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, is_localised, reason_to_stand
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.story import arrival_reminder
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.noticing import notice
+from dorothie_gym.policies.noticing import PARAMETER, fault_remark, notice, view_remark
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import Choice, direction_of
-from dorothie_gym.policies.speech import intend, remark
+from dorothie_gym.policies.sight import Limit, camera_fault, limit_of, sight, suitable_speed
+from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.spaces import Motion, Physical
-
-_WEATHER_OBJECTS = {
-    "fog": (ObjectClass.ROAD_LINE, ObjectClass.ROAD),
-    "rain": (ObjectClass.WATER, ObjectClass.GROUND, ObjectClass.ROAD),
-    "night": (ObjectClass.SKY,),
-}
-"""Objects that become visible or invisible with each condition."""
-
 
 _HANDLED = frozenset(
     {WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION, WeatherParameter.SUN_ALTITUDE_ANGLE}
 )
 """Parameters of the weather that have a reaction of their own."""
+
+_CAUTION = 5  # by which a gentle driver is slower than the sight allows [km/h]
+
+_WISHED = {
+    Wish.U_TURN: ActionValue.U_TURN,
+    Wish.SWITCH_LEFT: ActionValue.LANE_SWITCH,
+    Wish.SWITCH_RIGHT: ActionValue.LANE_SWITCH,
+}
+"""Action of each manoeuvre that the participant may have asked for."""
 
 
 def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -54,6 +56,7 @@ def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
         _say_arrived,
         _ask_goal,
         _explain_hazard,
+        _mention_camera,
         _mention_weather,
         _look_around,
         _mention_localization,
@@ -76,9 +79,11 @@ def scene_of(state: CoWizardState, view: CoWizardView) -> WordingContext:
 
 
 def _give_up_wish(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    if state.intentions.wish is not None and view.time > state.intentions.wish_until:
+    wish = state.intentions.wish
+    if wish is not None and view.time > state.intentions.wish_until:
         state.intentions = state.intentions.without_wish()
-        state.say(remark(DialogueMove.EXPLAIN, wording=Wording(topic="refused")))
+        refused = Proposition.of(Predicate.POSSIBLE, negated=True, action=_WISHED.get(wish))
+        state.say(intend(Function.INFORM, refused, elided=("action",), wording=Wording(topic="refused")))
 
 
 def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -107,7 +112,8 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
     else:
         state.dialogue = state.dialogue.with_proposal(None)
         first = plan_remark(state, view, rng)
-        state.say(*first, remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=bool(first)))
+        asked_way = intend(Function.SET_QUESTION, contents.action(ActionValue.QUERIED), joined=bool(first))
+        state.say(*first, asked_way)
 
 
 def _waits_for_way(state: CoWizardState, view: CoWizardView) -> bool:
@@ -138,13 +144,12 @@ def _propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: 
     direction = direction_of(way)
     action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
     street = street_of(view.raw, state.town, way.lane)
-    values: list[SlotValue] = [action]
-    if action is ActionValue.J_TURN and street is not StreetName.UNKNOWN and rng.random() < 0.3:
-        values.append(street)
-    move = DialogueMove.QUERY_YN if rng.random() < 0.7 else DialogueMove.CHECK
+    named = action is ActionValue.J_TURN and rng.random() < 0.3
+    content = contents.action(action, direction=direction, street=street if named else None)
+    function = Function.PROPOSITIONAL_QUESTION if rng.random() < 0.7 else Function.CHECK_QUESTION
     state.dialogue = state.dialogue.with_proposal(Directive(direction=direction, junction=choice.junction))
     first = plan_remark(state, view, rng)
-    question = remark(move, *values, wording=Wording(direction=direction), joined=bool(first))
+    question = intend(function, content, wording=Wording(direction=direction), joined=bool(first))
     state.say(*first, question)
 
 
@@ -153,11 +158,11 @@ def _say_arrived(state: CoWizardState, view: CoWizardView, rng: np.random.Genera
     if not stays or goal is None or state.dialogue.asked_at > state.commands.stop_sent_at:
         return
     state.dialogue = state.dialogue.after_asking(view.time)
-    arrived = Wording(topic="arrived")
+    arrived = Proposition.of(Predicate.ARRIVED, place=goal)
     if state.beliefs.exact and rng.random() < state.style.echoes + 0.15:
-        state.say(remark(DialogueMove.EXPLAIN, goal, wording=arrived), *arrival_reminder(state, rng))
+        state.say(intend(Function.INFORM, arrived), *arrival_reminder(state, rng))
     elif not state.beliefs.exact:
-        state.say(remark(DialogueMove.QUERY_YN, wording=arrived))
+        state.say(intend(Function.PROPOSITIONAL_QUESTION, arrived, elided=("place",)))
 
 
 def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -181,11 +186,11 @@ def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator
     state.dialogue = dialogue.after_asking(view.time)
     draw = rng.random()
     if again and draw < 0.5:
-        state.say(remark(DialogueMove.ALIGN))
+        state.say(intend(Function.FEEDBACK_ELICITATION))
     elif state.beliefs.statuses and draw < 0.25:
-        state.say(remark(DialogueMove.QUERY_W, GoalStatus.QUERIED))
+        state.say(intend(Function.SET_QUESTION, contents.errand(None, GoalStatus.QUERIED)))
     else:
-        state.say(remark(DialogueMove.QUERY_W, LandmarkName.QUERIED))
+        state.say(intend(Function.SET_QUESTION, contents.destination(LandmarkName.QUERIED)))
 
 
 def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -208,36 +213,72 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
     because = Proposition.of(Predicate.BECAUSE, effect=stands, cause=reason)
     full = resting or rng.random() < 0.3
     wording = Wording(topic="because_standing" if full else "because")
-    explained = intend(CommunicativeFunction.INFORM, because, elided=() if full else ("effect",), wording=wording)
+    explained = intend(Function.INFORM, because, elided=() if full else ("effect",), wording=wording)
     state.say(explained, *plan_remark(state, view, rng, joined=True))
+
+
+def _mention_camera(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Reports that the camera fails, drives more slowly meanwhile, and asks for help; reports that it works again."""
+    fault, known = camera_fault(view.raw), state.dialogue.view_fault
+    if fault is known:
+        return
+    state.dialogue = state.dialogue.with_view_fault(fault)
+    if fault is None:
+        assert known is not None
+        state.intentions = state.intentions.with_speed(state.intentions.usual)
+        if rng.random() < state.style.notices:
+            state.say(fault_remark(known, over=True))
+        return
+    if known is not None:
+        return  # the picture changes, the fault stays
+    effect = (view_remark(Limit.CAMERA, sight(view.raw), rng),) if rng.random() < state.style.rambles else ()
+    failed = fault_remark(fault, joined=bool(effect))
+    state.say(*effect, failed, *_slower(state, view))
+    if state.beliefs.goal is not None and rng.random() < state.style.asks:
+        state.say(intend(Function.REQUEST, wording=Wording(topic="help"), joined=True))
+
+
+def _slower(state: CoWizardState, view: CoWizardView) -> tuple[Remark, ...]:
+    """Lowers the speed to one that suits the sight, if it is higher, and returns the announcement."""
+    speed = suitable_speed(sight(view.raw)) - _CAUTION * state.style.gentle
+    if state.intentions.speed <= speed or view.standing:
+        return ()
+    state.intentions = state.intentions.with_speed(speed)
+    wording = Wording(faster=False, speed=speed)
+    return (
+        intend(Function.INFORM, contents.action(ActionValue.SPEED_CHANGE, speed=speed), wording=wording, joined=True),
+    )
 
 
 def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Mentions fog, rain or darkness once; proposes to slow down, or switches on the lights."""
-    topic = visibility_topic(view)
-    bad = topic in ("fog", "rain")
+    limit = limit_of(view.raw)
     dark = is_dark(view.raw) and not view.lights
-    if not bad and not dark:
-        state.dialogue = state.dialogue.with_weather_mentioned(False)
+    bad = limit in (Limit.FOG, Limit.RAIN)
+    if limit is Limit.CAMERA or (not bad and not dark):
+        state.dialogue = state.dialogue.with_weather_mentioned(bad and state.dialogue.weather_mentioned)
         return
     if state.dialogue.weather_mentioned or view.standing:
         return
     state.dialogue = state.dialogue.with_weather_mentioned(True)
-    if rng.random() < state.config.leaves_weather:
+    condition = Limit.NIGHT if limit is None else limit
+    if PARAMETER[condition] in state.dialogue.noticed.weather or rng.random() < state.config.leaves_weather:
         return
-    things = _WEATHER_OBJECTS[topic or "night"]
-    draw = int(rng.random() * (len(things) + 1))
-    values = (things[draw],) if draw < len(things) else ()
-    state.say(remark(DialogueMove.EXPLAIN, *values, wording=Wording(topic=topic)))
-    speed = state.config.bad_weather_speed
+    noticed = state.dialogue.noticed.with_change(PARAMETER[condition], high=True)
+    state.dialogue = state.dialogue.with_noticed(noticed)
+    state.say(view_remark(condition, sight(view.raw), rng))
+    speed = suitable_speed(sight(view.raw)) - _CAUTION * state.style.gentle
     if bad and state.intentions.speed > speed:
-        state.dialogue = state.dialogue.with_slowing(True)
-        wording = Wording(faster=False, speed=speed)
-        state.say(remark(DialogueMove.QUERY_YN, ActionValue.SPEED_CHANGE, wording=wording, joined=True))
+        if rng.random() < state.style.checks + 0.3:
+            state.dialogue = state.dialogue.with_slower(speed)
+            content = contents.action(ActionValue.SPEED_CHANGE, speed=speed)
+            state.say(intend(Function.OFFER, content, wording=Wording(faster=False, speed=speed), joined=True))
+        else:
+            state.say(*_slower(state, view))
     elif dark:
         state.intentions = state.intentions.with_lights(True)
-        wording = Wording(lights=True)
-        state.say(remark(DialogueMove.EXPLAIN, ActionValue.LIGHT_CHANGE, wording=wording, joined=True))
+        content = contents.action(ActionValue.LIGHT_CHANGE)
+        state.say(intend(Function.INFORM, content, wording=Wording(lights=True), joined=True))
 
 
 def _look_around(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -257,8 +298,7 @@ def _mention_localization(state: CoWizardState, view: CoWizardView, rng: np.rand
         state.dialogue = state.dialogue.with_lost_mentioned(False)
     elif not mentioned and not is_localised(view, config.gps_variance):
         state.dialogue = state.dialogue.with_lost_mentioned(True)
-        outage = Proposition.of(Predicate.FAILED, sensor=Sensor.GPS)
-        state.say(intend(CommunicativeFunction.INFORM, outage))
+        state.say(fault_remark(Sensor.GPS))
 
 
 def announce_action(
@@ -271,14 +311,13 @@ def announce_action(
     action = NAMED_ACTIONS.get(physical.action)
     if action is None or state.intentions.wish is not None or rng.random() > state.style.announces:
         return
-    values: list[SlotValue] = [action]
+    street: StreetName | None = None
     direction = Direction.LEFT if physical.angle > 0 else Direction.RIGHT
     if action is ActionValue.J_TURN:
         way = wanted_exit(state, view)
         if way is None or direction_of(way) is Direction.STRAIGHT:
             return
         direction = direction_of(way)
-        street = street_of(view.raw, state.town, way.lane)
-        if street is not StreetName.UNKNOWN and rng.random() < 0.6:
-            values.append(street)
-    state.say(remark(DialogueMove.EXPLAIN, *values, wording=Wording(direction=direction)))
+        street = street_of(view.raw, state.town, way.lane) if rng.random() < 0.6 else None
+    content = contents.action(action, direction=direction, street=street)
+    state.say(intend(Function.INFORM, content, wording=Wording(direction=direction)))

@@ -8,11 +8,12 @@ from typing import Final
 
 from dorothie_gym.dialogue import Predicate, Proposition
 from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass, PhysicalAction, StreetName
+from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass, PhysicalAction, Sensor, StreetName
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.observation_parser import is_dark, is_foggy, is_rainy, street_of
+from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.route_progress import light_ahead
+from dorothie_gym.policies.sight import FAR_SIGHT, camera_fault, sight
 from dorothie_gym.policies.travel_time import travel_time
 from dorothie_gym.spaces import Motion
 
@@ -52,18 +53,9 @@ def is_localised(view: CoWizardView, most: float) -> bool:
     return float(covariance[0][0]) + float(covariance[1][1]) <= most
 
 
-def visibility_topic(view: CoWizardView) -> str | None:
-    """Returns the condition that limits the view: "fog", "rain" or "night"; None for clear weather by day."""
-    if is_foggy(view.raw):
-        return "fog"
-    if is_rainy(view.raw):
-        return "rain"
-    return "night" if is_dark(view.raw) else None
-
-
 def sees_far(view: CoWizardView) -> bool:
-    """Returns whether neither fog, heavy rain nor darkness limits the view."""
-    return visibility_topic(view) is None
+    """Returns whether neither weather, darkness nor the camera limits the view much."""
+    return sight(view.raw) >= FAR_SIGHT
 
 
 def is_red_ahead(state: CoWizardState, view: CoWizardView) -> bool:
@@ -145,6 +137,12 @@ def _is_arrived(state: CoWizardState, view: CoWizardView, said: Proposition) -> 
     return state.intentions.arrived and view.standing and _about_goal(state, said)
 
 
+def _has_failed(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+    found = {camera_fault(view.raw), None if is_localised(view, state.config.gps_variance) else Sensor.GPS} - {None}
+    asked = said.get("sensor")
+    return bool(found) if asked is None else asked in found
+
+
 def _about_goal(state: CoWizardState, said: Proposition) -> bool:
     return said.get("place") in (None, state.beliefs.goal)
 
@@ -164,6 +162,7 @@ _BELIEFS: Final[dict[Predicate, Belief]] = {
     Predicate.STANDS: lambda state, view, said: view.standing,
     Predicate.LOCALISED: lambda state, view, said: is_localised(view, state.config.lost_variance),
     Predicate.VISIBILITY: lambda state, view, said: sees_far(view),
+    Predicate.FAILED: _has_failed,
     Predicate.LIGHTS_ON: lambda state, view, said: view.lights,
     Predicate.GOAL: lambda state, view, said: state.beliefs.goal is not None and _about_goal(state, said),
     Predicate.HINDERS: lambda state, view, said: view.motion is Motion.HAZARD and view.hazard is said.get("object"),

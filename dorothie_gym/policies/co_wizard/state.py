@@ -17,6 +17,7 @@ from dorothie_gym.ontology import (
     LandmarkName,
     MentalAction,
     ObjectClass,
+    Sensor,
     StreetName,
 )
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
@@ -67,7 +68,7 @@ class DialogueState:
         u_turn_instructed_at: time of the last instruction to turn round [s].
         proposed: turn proposed to the participant and not answered yet.
         offer: place proposed as the first destination and not answered yet.
-        proposes_slowing: whether a proposal to slow down has not been answered yet.
+        slower: speed that was proposed and not answered yet [km/h].
         blocked_at: time at which an obstacle across the road was last found [s].
         detour_asked_at: time of the open question about a detour [s]; None where none is open.
         hazard_explained_at: time of the last explanation of a hazard [s].
@@ -75,6 +76,7 @@ class DialogueState:
         noticed: weather and crowds that have been noticed.
         lost_mentioned: whether the present loss of localization has been mentioned.
         contradicted: destination against whose route instructions were given, and how often; it may be misheard.
+        view_fault: fault of the camera that has been noticed and is not over.
     """
 
     heard_at: float = -math.inf
@@ -87,7 +89,7 @@ class DialogueState:
     u_turn_instructed_at: float = -math.inf
     proposed: Directive | None = None
     offer: LandmarkName | None = None
-    proposes_slowing: bool = False
+    slower: int | None = None
     blocked_at: float = -math.inf
     detour_asked_at: float | None = None
     hazard_explained_at: float = -math.inf
@@ -95,6 +97,7 @@ class DialogueState:
     noticed: Noticed = field(default_factory=Noticed)
     lost_mentioned: bool = False
     contradicted: tuple[LandmarkName | None, int] = (None, 0)
+    view_fault: Sensor | None = None
 
     def after_hearing(self, now: float) -> DialogueState:
         """Records an utterance of the participant at `now` [s]."""
@@ -136,13 +139,17 @@ class DialogueState:
         """Opens the proposal of a first destination; None withdraws it."""
         return replace(self, offer=place)
 
-    def with_slowing(self, proposed: bool) -> DialogueState:
-        """Opens or closes the proposal to slow down."""
-        return replace(self, proposes_slowing=proposed)
+    def with_slower(self, speed: int | None) -> DialogueState:
+        """Opens the proposal of a lower speed [km/h]; None closes it."""
+        return replace(self, slower=speed)
+
+    def with_view_fault(self, sensor: Sensor | None) -> DialogueState:
+        """Sets the fault of the camera that has been noticed; None for none."""
+        return replace(self, view_fault=sensor)
 
     def after_refusal(self) -> DialogueState:
         """Closes all proposals."""
-        return replace(self, proposed=None, offer=None, proposes_slowing=False)
+        return replace(self, proposed=None, offer=None, slower=None)
 
     def with_detour_question(self, asked_at: float | None) -> DialogueState:
         """Opens the question about a detour at a time [s]; None closes it."""

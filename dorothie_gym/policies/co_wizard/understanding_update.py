@@ -80,6 +80,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     if _mishears(state, heard, rng):
         state.say_first(intend(Function.NEGATIVE_FEEDBACK))
         return
+    state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
     for act in heard.acts:
         react = _REACTIONS.get(act.move)
         if react is not None:
@@ -390,9 +391,9 @@ def _yes(
         if dialogue.proposed.junction == view.junction and state.intentions.directive is None:
             state.intentions = state.intentions.directed(dialogue.proposed).resumed()
         state.dialogue = dialogue.with_proposal(None)
-    elif dialogue.proposes_slowing:
-        state.dialogue = dialogue.with_slowing(False)
-        speed = state.config.bad_weather_speed
+    elif dialogue.slower is not None:
+        speed = dialogue.slower
+        state.dialogue = dialogue.with_slower(None)
         state.intentions = state.intentions.with_speed(speed)
         wording = Wording(faster=False, speed=speed)
         state.say(intend(Function.INFORM, contents.action(ActionValue.SPEED_CHANGE, speed=speed), wording=wording))

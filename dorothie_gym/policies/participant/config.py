@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.policies.guidance_config import BAD_WEATHER_SPEED, USUAL_SPEED, GuidanceConfig
+from dorothie_gym.policies.guidance_config import USUAL_SPEED, GuidanceConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,6 @@ class ParticipantConfig(GuidanceConfig):
         unsure: probability that a yes is preceded by hesitation.
         checked_within: time within which a question refers to the last instruction [s].
         repeat_memory: time within which a repetition by the car refers to the last utterance [s].
-        bad_weather_speed: speed asked for in fog or heavy rain [km/h].
         usual_speed: speed asked for when the weather has cleared up [km/h].
         weather_notice: time that the car is given to mention the weather first [s].
         long_stop: standstill after which the reason may be asked for [s].
@@ -125,7 +124,6 @@ class ParticipantConfig(GuidanceConfig):
     unsure: float = 0.08
     checked_within: float = 8.0
     repeat_memory: float = 15.0
-    bad_weather_speed: float = float(BAD_WEATHER_SPEED)
     usual_speed: float = float(USUAL_SPEED)
     weather_notice: float = 3.0
     long_stop: float = 8.0

@@ -13,6 +13,7 @@ from dorothie_gym.ontology import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import SeenLandmark, street_of
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.sight import DENSE, sight
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.tasks.landmark_designs import features_of
 
@@ -135,7 +136,7 @@ def _feeling(state: ParticipantState, view: ParticipantView) -> Proposition | No
     goal, progress, motion = state.task.goal, state.route.progress, state.motion
     if motion.standstill(view.time) > state.style.patience and view.time >= motion.excused_until:
         felt = Proposition.of(Predicate.FEELS, feeling="impatient", cause=Proposition.of(Predicate.STANDS))
-    elif state.conversation.bad_weather_since < view.time:
+    elif sight(view.raw) < DENSE:
         poor = Proposition.of(Predicate.VISIBILITY, negated=True)
         felt = Proposition.of(Predicate.FEELS, feeling="nervous", cause=poor)
     elif goal is not None and progress is not None and progress.left(view.station) < _CLOSE and not progress.astray:

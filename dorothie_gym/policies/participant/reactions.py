@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import ASKED, CommunicativeFunction, Predicate, Proposition, Wording, WordingContext
+from dorothie_gym.dialogue import ASKED, Predicate, Proposition, Wording, WordingContext
+from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, PropKind, StreetName, WeatherParameter
+from dorothie_gym.ontology import ActionValue, ObjectClass, PropKind, StreetName, WeatherParameter
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
-from dorothie_gym.policies.noticing import notice
+from dorothie_gym.policies.noticing import PARAMETER, notice, view_remark
 from dorothie_gym.policies.observation_parser import (
     is_dark,
     is_foggy,
@@ -22,10 +24,15 @@ from dorothie_gym.policies.observation_parser import (
 )
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.speech import Remark, intend, remark
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.sight import FAR_SIGHT, Limit, camera_fault, limit_of, sight, suitable_speed
+from dorothie_gym.policies.speech import Remark, intend
 
 _HANDLED = frozenset({WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION})
 """Parameters of the weather that have a reaction of their own."""
+
+_HASTE, _HURRIED = 5, 0.75
+"""Speed that a hurried participant adds to what suits the sight [km/h], and the trait `hurries` of such a one."""
 
 LIGHTS_INTERVAL = 25.0
 """Time between remarks about the head lights [s]."""
@@ -35,13 +42,6 @@ WHY_INTERVAL = 40.0
 
 WHY_DISTANCE = 45.0
 """Distance to the place within which a standstill is not asked about [m]."""
-
-_WEATHER_OBJECTS = {
-    "fog": (ObjectClass.ROAD_LINE,),
-    "rain": (ObjectClass.WATER, ObjectClass.GROUND),
-    "night": (ObjectClass.SKY,),
-}
-"""Objects that become visible or invisible with each condition."""
 
 _ROADSIDE_OBJECTS = (
     ObjectClass.BRIDGE, ObjectClass.BUILDING, ObjectClass.DYNAMIC, ObjectClass.FENCE, ObjectClass.POLE,
@@ -65,9 +65,11 @@ def scene_of(state: ParticipantState, view: ParticipantView) -> WordingContext:
 def react(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Queues a remark about the surroundings, if no other is queued or being said."""
     note_blocked(state, view)
+    state.conversation = state.conversation.with_view(view.time, blind=camera_fault(view.raw) is not None)
     if not state.speech.idle or view.speaking > 0.0 or not state.task.announced:
         return
     for consider in (
+        _mention_view,
         _mention_weather,
         _mention_lights,
         _look_around,
@@ -103,7 +105,7 @@ def note_blocked(state: ParticipantState, view: ParticipantView, near: bool = Fa
     state.guidance = state.guidance.for_new_route(progress.left(view.station))
     if state.guidance.guiding and not near:
         obstacle = Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC, prop=prop)
-        state.say_only(intend(CommunicativeFunction.INFORM, obstacle, urgent=True))
+        state.say_only(intend(Function.INFORM, obstacle, urgent=True))
 
 
 def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> tuple[Place | None, PropKind | None]:
@@ -119,40 +121,54 @@ def _obstacle_on_route(state: ParticipantState, view: ParticipantView) -> tuple[
     return None, None
 
 
+def _mention_view(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Wonders, by chance, about a view that is poorer than the weather explains, if the car does not mention it."""
+    conversation, config = state.conversation, state.config
+    if conversation.asked_about_view or view.time - conversation.blind_since < config.weather_notice:
+        return
+    state.conversation = conversation.after_talking_about_view()
+    if rng.random() > state.style.notices:
+        return
+    question = Proposition.of(Predicate.VISIBILITY) if rng.random() < 0.5 else Proposition.of(Predicate.FAILED)
+    asked = intend(Function.PROPOSITIONAL_QUESTION, question, joined=True)
+    state.say(view_remark(Limit.CAMERA, sight(view.raw), rng), asked)
+
+
 def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Asks the car to slow down in bad weather, and to speed up afterwards."""
+    """Asks the car to slow down in bad weather, to what suits the sight, and to speed up afterwards."""
     fog = weather(view.raw, WeatherParameter.FOG_DENSITY)
     rain = weather(view.raw, WeatherParameter.PRECIPITATION)
-    config = state.config
+    config, limit = state.config, limit_of(view.raw)
     conversation = state.conversation = state.conversation.with_weather(
         view.time, bad=is_foggy(view.raw) or is_rainy(view.raw)
     )
     if not conversation.slowed and view.time - conversation.bad_weather_since > config.weather_notice:
         state.conversation = conversation.with_slowed(True)
-        mentioned = view.time - conversation.heard_at < config.weather_notice + 2.0
-        if mentioned:
+        condition = Limit.FOG if is_foggy(view.raw) else Limit.RAIN
+        parameter = PARAMETER[condition]
+        mentioned = parameter in conversation.noticed.weather or limit is Limit.CAMERA
+        if mentioned or rng.random() > state.style.notices:
             return
-        topic = "fog" if is_foggy(view.raw) else "rain"
-        if view.speed < config.bad_weather_speed / 3.6:  # the car is slow already
-            if rng.random() < state.style.notices:
-                state.say(weather_remark(topic, rng))
-            return
-        wording = Wording(faster=False, speed=config.bad_weather_speed)
-        slower = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording, joined=True)
-        state.say(weather_remark(topic, rng), slower)
+        state.conversation = state.conversation.with_noticed(conversation.noticed.with_change(parameter, high=True))
+        said = view_remark(condition, sight(view.raw), rng)
+        speed = suitable_speed(sight(view.raw)) + _HASTE * (state.style.hurries > _HURRIED)
+        if view.speed > (speed + _HASTE) / 3.6:
+            content, wording = (
+                contents.action(ActionValue.SPEED_CHANGE, speed=speed),
+                Wording(faster=False, speed=speed),
+            )
+            state.say(said, intend(Function.REQUEST, content, wording=wording, joined=True))
+        elif rng.random() < state.style.curious:
+            enough = Proposition.of(Predicate.VISIBILITY)
+            state.say(said, intend(Function.PROPOSITIONAL_QUESTION, enough, joined=True))
+        else:
+            state.say(said)
     elif conversation.slowed and fog < FOG_LIMIT / 2 and rain < RAIN_LIMIT / 2:
         state.conversation = conversation.with_slowed(False)
         if rng.random() < 0.5:
-            wording = Wording(faster=True, speed=config.usual_speed)
-            state.say(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
-
-
-def weather_remark(topic: str, rng: np.random.Generator) -> Remark:
-    """Returns a remark about fog, rain or night, by chance with an object that it hides or shows."""
-    things = _WEATHER_OBJECTS[topic]
-    draw = rng.random() * (len(things) + 1)
-    values = (things[int(draw)],) if draw < len(things) else ()
-    return remark(DialogueMove.EXPLAIN, *values, wording=Wording(topic=topic))
+            speed = round(config.usual_speed)
+            content, wording = contents.action(ActionValue.SPEED_CHANGE, speed=speed), Wording(faster=True, speed=speed)
+            state.say(intend(Function.REQUEST, content, wording=wording))
 
 
 def _look_around(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -170,13 +186,17 @@ def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.rand
     lit = bool(view.raw["lights"])
     if not is_dark(view.raw) or lit or view.time - state.conversation.lights_at < LIGHTS_INTERVAL:
         return
-    state.conversation = state.conversation.after_mentioning_lights(view.time)
+    conversation = state.conversation.after_mentioning_lights(view.time)
+    told = PARAMETER[Limit.NIGHT] in conversation.noticed.weather
+    state.conversation = conversation.with_noticed(conversation.noticed.with_change(PARAMETER[Limit.NIGHT], high=True))
     wording = Wording(lights=True)
-    if rng.random() < 0.5:
-        state.say(remark(DialogueMove.QUERY_YN, ActionValue.LIGHT_CHANGE, wording=wording))
+    if rng.random() < 0.4:
+        on = Proposition.of(Predicate.LIGHTS_ON, action=ActionValue.LIGHT_CHANGE)
+        state.say(intend(Function.PROPOSITIONAL_QUESTION, on, wording=replace(wording, topic="lights")))
         return
-    request = remark(DialogueMove.INSTRUCT, ActionValue.LIGHT_CHANGE, wording=wording, joined=True)
-    state.say(weather_remark("night", rng), request)
+    dark = () if told else (view_remark(Limit.NIGHT, sight(view.raw), rng),)
+    content = contents.action(ActionValue.LIGHT_CHANGE)
+    state.say(*dark, intend(Function.REQUEST, content, wording=wording, joined=bool(dark)))
 
 
 def _ask_why_standing(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -188,7 +208,12 @@ def _ask_why_standing(state: ParticipantState, view: ParticipantView, rng: np.ra
     asked_lately = view.time - state.conversation.asked_at <= WHY_INTERVAL
     if waited > state.style.patience and not near and not asked_lately:
         state.conversation = state.conversation.after_asking_why(view.time)
-        state.say(remark(DialogueMove.QUERY_W, ActionValue.STOP))
+        state.say(_why(Proposition.of(Predicate.STANDS, action=ActionValue.STOP)))
+
+
+def _why(effect: Proposition) -> Remark:
+    """Returns the question for the cause of an effect."""
+    return intend(Function.SET_QUESTION, Proposition.of(Predicate.BECAUSE, effect=effect, cause=ASKED))
 
 
 def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -203,8 +228,8 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
         return
     state.conversation = conversation.after_wondering(view.time)
     if rng.random() < state.style.curious:
-        action = ActionValue.U_TURN if view.turning else ActionValue.STOP
-        state.say(remark(DialogueMove.QUERY_W, action))
+        turning = Proposition.of(Predicate.DOES, action=ActionValue.U_TURN)
+        state.say(_why(turning if view.turning else Proposition.of(Predicate.STANDS, action=ActionValue.STOP)))
 
 
 def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -237,39 +262,40 @@ def _question(state: ParticipantState, view: ParticipantView, rng: np.random.Gen
         ]
         asked.append(Proposition.of(Predicate.HAS_ROUTE, place=place))
     chosen = asked[int(rng.integers(len(asked)))]
-    return intend(CommunicativeFunction.PROPOSITIONAL_QUESTION, chosen, elided=("place",))
+    return intend(Function.PROPOSITIONAL_QUESTION, chosen, elided=("place",))
 
 
 def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> list[tuple[Remark, ...]]:
     """Returns the remarks that are possible now; equal ones count several times."""
     goal = state.task.goal
     assert goal is not None
+    asks, asks_open = Function.PROPOSITIONAL_QUESTION, Function.SET_QUESTION
     found: list[tuple[Remark, ...]] = [
-        *((remark(DialogueMove.IRRELEVANT),),) * 2,
-        (remark(DialogueMove.IRRELEVANT), remark(DialogueMove.IRRELEVANT, joined=True)),
+        *((intend(Function.OTHER),),) * 2,
+        (intend(Function.OTHER), intend(Function.OTHER, joined=True)),
         (_question(state, view, rng),),
     ]
     if not state.guidance.guiding:
         arrival = Proposition.of(Predicate.ARRIVES_IN, place=goal.name, seconds=ASKED)
-        found.append((intend(CommunicativeFunction.SET_QUESTION, arrival, elided=("place",)),))
-        found.append((remark(DialogueMove.QUERY_W, ActionValue.QUERIED),))
-        found.append((remark(DialogueMove.CHECK, goal.name),))
-        found.append((remark(DialogueMove.QUERY_W, StreetName.QUERIED),))
-        found.append((remark(DialogueMove.QUERY_YN, goal.name),))
+        found.append((intend(asks_open, arrival, elided=("place",)),))
+        found.append((intend(asks_open, contents.action(ActionValue.QUERIED)),))
+        found.append((intend(Function.CHECK_QUESTION, contents.destination(goal.name)),))
+        found.append((intend(asks_open, Proposition.of(Predicate.ON_STREET, street=StreetName.QUERIED)),))
+        found.append((intend(asks, Proposition.of(Predicate.KNOWS, place=goal.name)),))
         may_hurry = not state.conversation.hurried and not state.conversation.slowed and view.speed > 5.0
-        if rng.random() < 0.15 and may_hurry:
-            speed = state.config.usual_speed + 5.0 if rng.random() < 0.5 else None
+        if rng.random() < 0.15 and may_hurry and sight(view.raw) >= FAR_SIGHT:
+            speed = round(state.config.usual_speed + 5.0) if rng.random() < 0.5 else None
             state.conversation = state.conversation.after_hurrying()
-            wording = Wording(faster=True, speed=speed)
-            return [(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording),)]
+            content = contents.action(ActionValue.SPEED_CHANGE, speed=speed)
+            return [(intend(Function.REQUEST, content, wording=Wording(faster=True, speed=speed)),)]
     if view.objects:
         near = view.objects[int(rng.integers(min(len(view.objects), 3)))].kind
         random_object = rng.random() < state.config.asks_unseen
         thing = _ROADSIDE_OBJECTS[int(rng.integers(len(_ROADSIDE_OBJECTS)))] if random_object else near
-        found += [(remark(DialogueMove.QUERY_YN, thing),)] * 2
-        found.append((remark(DialogueMove.QUERY_W, ObjectClass.QUERIED),))
-        found.append((remark(DialogueMove.EXPLAIN, near),))
+        found += [(intend(asks, Proposition.of(Predicate.SEES, object=thing)),)] * 2
+        found.append((intend(asks_open, Proposition.of(Predicate.SEES, object=ObjectClass.QUERIED)),))
+        found.append((intend(Function.INFORM, Proposition.of(Predicate.SEES, object=near)),))
     street = street_of(view.raw, state.town, view.lane)
     if street is not StreetName.UNKNOWN:
-        found.append((remark(DialogueMove.CHECK, street),))
+        found.append((intend(Function.CHECK_QUESTION, Proposition.of(Predicate.ON_STREET, street=street)),))
     return found

@@ -43,6 +43,9 @@ _WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLL
 
 _ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 
+_POOR_VIEW = frozenset({Predicate.FAILED, Predicate.VISIBILITY})
+"""What a car says that cannot see well."""
+
 _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 """Moves that may follow an acknowledgement in the same breath."""
 
@@ -66,6 +69,10 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
         made_clear = any(act.move is DialogueMove.CLARIFY for act in heard.acts)
         heard = puzzled_by if made_clear else heard
         state.conversation = state.conversation.with_puzzle(None)
+    noticed = state.conversation.noticed.after_hearing(heard.words, view.time)
+    state.conversation = state.conversation.with_noticed(noticed)
+    if heard.words.told is not None and heard.words.told.predicate in _POOR_VIEW:
+        state.conversation = state.conversation.after_talking_about_view()
     asked = any(act.move is DialogueMove.QUERY_W for act in heard.acts)
     before = state.speech
     for act in heard.acts:
@@ -444,6 +451,9 @@ def _request(
     elif state.task.goal is not None and not act.values(Slot.ACTION):
         state.set_guiding(True)
         _name_step(state, view, DialogueMove.INSTRUCT, rng)
+        if words.told is not None and words.told.predicate in _POOR_VIEW:
+            known = Proposition.of(Predicate.KNOWS, place=state.task.goal.name)
+            state.say_first(intend(Function.INFORM, known, elided=("place",), wording=Wording(topic="guides")))
 
 
 _ANSWERS: dict[

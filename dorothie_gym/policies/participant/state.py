@@ -37,6 +37,8 @@ class ConversationState:
         bad_weather_since: start of the present bad weather [s]; infinite in good weather.
         hurried: whether the car has been asked to go faster.
         noticed: weather and crowds that have been noticed.
+        blind_since: time since which the camera shows less than the weather explains [s]; infinite while it does not.
+        asked_about_view: whether that has been talked about.
     """
 
     heard_at: float = 0.0
@@ -49,6 +51,8 @@ class ConversationState:
     bad_weather_since: float = math.inf
     hurried: bool = False
     noticed: Noticed = field(default_factory=Noticed)
+    blind_since: float = math.inf
+    asked_about_view: bool = False
 
     def after_hearing(self, now: float) -> ConversationState:
         """Records an utterance of the car at `now` [s]."""
@@ -78,6 +82,16 @@ class ConversationState:
         """Updates the start of the present bad weather."""
         since = min(self.bad_weather_since, now) if bad else math.inf
         return self if since == self.bad_weather_since else replace(self, bad_weather_since=since)
+
+    def with_view(self, now: float, *, blind: bool) -> ConversationState:
+        """Updates the time since which the camera shows too little."""
+        since = min(self.blind_since, now) if blind else math.inf
+        same = since == self.blind_since and (blind or not self.asked_about_view)
+        return self if same else replace(self, blind_since=since, asked_about_view=self.asked_about_view and blind)
+
+    def after_talking_about_view(self) -> ConversationState:
+        """Records that the failing camera has been talked about."""
+        return replace(self, asked_about_view=True)
 
     def with_slowed(self, slowed: bool) -> ConversationState:
         """Sets whether a lower speed for the weather has been requested or was not needed."""
