@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import Predicate, word_act
+from dorothie_gym.dialogue import Predicate, understand, word_act
 from dorothie_gym.ontology import ObjectClass, PropKind, Role, WeatherParameter
 from dorothie_gym.policies.noticing import (
     CROWDS,
     Noticed,
     changes,
-    crowd_ahead,
-    crowd_remark,
+    crowd_among,
+    notice,
     weather_change_remark,
 )
 from dorothie_gym.policies.observation_parser import SeenObject
@@ -79,17 +79,49 @@ def test_every_change_has_words_and_says_which_it_is(parameter, high):
         )
 
 
-def people(count: int, distance: float, kind: ObjectClass = ObjectClass.PEDESTRIAN) -> list[SeenObject]:
-    return [SeenObject(kind=kind, x=distance, y=float(k), distance=distance) for k in range(count)]
+PEOPLE, CARS = ObjectClass.PEDESTRIAN, ObjectClass.VEHICLES
+
+
+def looking(noticed: Noticed, count: int, distance: float, kind: ObjectClass = PEOPLE, time: float = 100.0):
+    """What an agent says and notices that sees some objects of a kind at a distance [m]."""
+    objects = [SeenObject(kind=kind, x=distance, y=float(k), distance=distance) for k in range(count)]
+    seen = observed() | {"time": np.array([time])}
+    return notice(noticed, seen, objects, np.random.default_rng(0), chance=1.0, handled=())
 
 
 def test_crowds_are_many_and_near():
-    least = CROWDS[ObjectClass.PEDESTRIAN]
-    assert crowd_ahead(people(least, 20.0)) is ObjectClass.PEDESTRIAN
-    assert crowd_ahead(people(least - 1, 20.0)) is None
-    assert crowd_ahead(people(3 * least, 90.0)) is None
-    assert crowd_ahead(people(10, 20.0, ObjectClass.VEHICLES)) is ObjectClass.VEHICLES
-    assert crowd_remark(ObjectClass.PEDESTRIAN).act.slots == {ObjectClass.PEDESTRIAN}
+    least = CROWDS[PEOPLE]
+    said, noticed = looking(Noticed(), least, 20.0)
+    assert said is not None and said.act.slots == {PEOPLE}
+    assert looking(noticed, least, 20.0, time=110.0)[0] is None  # it has been mentioned
+    assert looking(Noticed(), least - 1, 20.0)[0] is None
+    assert looking(Noticed(), 3 * least, 90.0)[0] is None
+    assert looking(Noticed(), 10, 20.0, CARS)[0].act.slots == {CARS}
+
+
+def test_usual_traffic_is_no_crowd():
+    noticed = Noticed()
+    for _ in range(400):
+        noticed = noticed.after_looking([CARS] * 5)
+    assert crowd_among([CARS] * 5, noticed.usual) is None
+    assert crowd_among([CARS] * 8, noticed.usual) is CARS
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [("there are so many people here", PEOPLE), ("lots of pedestrians here", PEOPLE), ("look at that traffic", None)],
+)
+def test_crowd_that_the_other_mentions_is_not_mentioned_again(text, kind):
+    noticed = Noticed().after_hearing(understand(text), 95.0)
+    assert (looking(noticed, 5, 20.0)[0] is None) is (kind is PEOPLE)
+
+
+@pytest.mark.parametrize("parameter", [W.FOG_DENSITY, W.PRECIPITATION, W.WIND_INTENSITY])
+def test_weather_is_understood_from_what_is_said_of_it(parameter):
+    item = weather_change_remark(parameter, high=True)
+    texts = {word_act(item.act, Role.PARTICIPANT, np.random.default_rng(seed), item.wording) for seed in range(12)}
+    understood = [parameter in Noticed().after_hearing(understand(text), 1.0).weather for text in texts]
+    assert np.mean(understood) > 0.6
 
 
 @pytest.mark.parametrize("kind", PropKind)
