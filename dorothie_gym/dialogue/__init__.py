@@ -11,6 +11,7 @@ from dorothie_gym.dialogue.conversation import (
 )
 from dorothie_gym.dialogue.dialogue_act_classifier import act_of, guess_act, guess_spans
 from dorothie_gym.dialogue.directions import RouteTurn
+from dorothie_gym.dialogue.disfluency import fluent
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT, EXPECTATIONS, Exchange, ExchangeState, ExchangeTracker
 from dorothie_gym.dialogue.intentions import CommunicativeFunction, Intention
 from dorothie_gym.dialogue.lexicon import Lexicon, load_lexicon
@@ -57,6 +58,7 @@ __all__ = [
     "draw_style",
     "encode_meaning",
     "find_meaning",
+    "fluent",
     "guess_act",
     "guess_spans",
     "load_lexicon",

@@ -88,6 +88,15 @@ class Utterance:
         return tuple(span.act for span in self.spans)
 
 
+def _ended(utterance: Utterance) -> Utterance:
+    """Returns the utterance with a full stop for the comma of a speaker who meant to go on."""
+    last = utterance.spans[-1]
+    if not last.text.endswith(",") or not last.text.strip(","):
+        return utterance
+    text = last.text.rstrip(",") + ("." if utterance.text[0].isupper() else "")
+    return replace(utterance, spans=(*utterance.spans[:-1], replace(last, text=text)))
+
+
 _END_TOLERANCE = 1e-9
 """Tolerance for the rounding of summed decision periods [s]."""
 
@@ -152,7 +161,7 @@ class Conversation:
         heard = [utterance for utterance in self._air.values() if utterance.end <= now + _END_TOLERANCE]
         for utterance in heard:
             del self._air[utterance.speaker]
-        return sorted(heard, key=lambda utterance: (utterance.start, _ORDER[utterance.speaker]))
+        return sorted(map(_ended, heard), key=lambda utterance: (utterance.start, _ORDER[utterance.speaker]))
 
     def speaking(self, speaker: Role, now: float) -> float:
         """Returns the remaining speaking time of `speaker` at `now` [s]; 0 when silent."""

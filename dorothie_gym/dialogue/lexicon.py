@@ -42,6 +42,7 @@ class Lexicon:
         names: recognised names: words of a phrase without article -> value.
         deixis: deictic expressions for landmarks in view.
         repairs: words that correct the preceding name.
+        plurals: noun phrases in the plural.
         ignored: phrases that resemble names but are none.
     """
 
@@ -50,6 +51,7 @@ class Lexicon:
     names: Mapping[tuple[str, ...], SlotValue]
     deixis: tuple[str, ...]
     repairs: tuple[str, ...]
+    plurals: frozenset[str] = frozenset()
     ignored: tuple[tuple[str, ...], ...] = ()
 
     def forms(self, value: SlotValue, form: str) -> tuple[str, ...]:
@@ -143,6 +145,7 @@ def parse_lexicon(data: YamlMapping) -> Lexicon:
         _names(phrases),
         strings("lexicon.yaml: deixis", data.get("deixis")),
         strings("lexicon.yaml: repairs", data.get("repairs")),
+        frozenset(strings("lexicon.yaml: plurals", data.get("plurals", []))),
         tuple(tuple(split_words(phrase)) for phrase in strings("lexicon.yaml: ignore", data.get("ignore"))),
     )
 

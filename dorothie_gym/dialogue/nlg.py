@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from dorothie_gym.dialogue.conversation import Span
+from dorothie_gym.dialogue.disfluency import hesitating
 from dorothie_gym.dialogue.grammar import SPOKEN_SLOTS, Template, load_grammar
 from dorothie_gym.dialogue.phrases import Register, open_to
 from dorothie_gym.dialogue.realization_context import Wording, WordingContext
@@ -25,11 +26,19 @@ MAX_CHARACTERS = 160
 """Longest text [characters]."""
 
 _AN = re.compile(r"\ba(?= [aei]| o(?!ne\b|nce\b))")
+_ASKS = re.compile(
+    r"(?:(?:so|and|then|now|well|okay|ok|oh|hey|yo|next|also|but|after that|(?:and )?afterwards|um|uh|er|hmm),? )*"
+    r"(?:(?:can|could|would|will|did|have|are|shall|should|am|do) (?:you|we|I|they|ya)\b"
+    r"|(?:would|is|was|does|did) (?:it|that|this|there)\b|how about\b)(?!.*[.?])",
+    re.IGNORECASE,
+)
+"""Questions and requests in the form of a question."""
+_PLAIN = re.compile(r"[^a-z' ]+")
 _PLAIN_WORDING = Wording()
 _NO_CONTEXT = WordingContext()
 
 _TRIES = 8
-"""Number of bare sentences generated under a tight length limit; the shortest is used."""
+"""Number of terse sentences generated under a tight length limit; the shortest is used."""
 
 # Enum members are bound once: each look-up through the class costs as much as a random draw.
 _HUMAN, _CAR = Role.PARTICIPANT, Role.CO_WIZARD
@@ -52,7 +61,7 @@ def word_act(
     """Generates the text of one act.
 
     Every act gets a text. Acts with many slot values are realized in part: at most three names per slot, and
-    afterthoughts up to `MAX_CHARACTERS`.
+    afterthoughts up to `MAX_CHARACTERS`. A text that is too long is worded again without optional words.
 
     Args:
         act: move and slot values.
@@ -89,7 +98,8 @@ def word_acts(
         scene: as in `word_act`, for the first act.
 
     Returns:
-        One span per act; the texts joined by spaces have at most `MAX_CHARACTERS` characters.
+        One span per act, each with at most `MAX_CHARACTERS` characters. Optional words are left out where all of them
+        together would be longer.
 
     Raises:
         ValueError: if the numbers of contexts and acts differ.
@@ -114,7 +124,7 @@ def word_acts(
 
 def _linked(before: str, text: str) -> str:
     """Returns the text of an act with the comma before the next act, unless it ends with punctuation."""
-    goes_on = text[0].islower() and before[-1] == "."
+    goes_on = text[0].islower() and before[-1] in ".?"
     stem = before[:-1] if goes_on else before
     return stem if stem[-1] in "?.," else f"{stem},"
 
@@ -138,12 +148,11 @@ def _word(
         if len(text) <= limit:
             return text
         own = replace(own, chattiness=0.0, disfluency=0.0, repairs=0.0, addressing=0.0)
-    # The template does not fit: a bare sentence without details.
-    bare = DialogueAct(act.move)
+    # Optional words do not make the difference: the tersest of several sentences that say the same.
     own = replace(own, register=Register.BLUNT, indirectness=0.0, habit=0.0)
-    tries = (_Sentence(bare, voice, draw, _PLAIN_WORDING, own, scene, 1, limit).text() for _ in range(_TRIES))
+    tries = (_Sentence(act, voice, draw, wording, own, scene, 1, MAX_CHARACTERS).text() for _ in range(_TRIES))
     shortest = min(tries, key=len)
-    return shortest if len(shortest) <= limit else shortest[:limit].rsplit(" ", 1)[0].rstrip(",")
+    return shortest if len(shortest) <= MAX_CHARACTERS else shortest[:MAX_CHARACTERS].rsplit(" ", 1)[0].rstrip(",")
 
 
 class _Sentence:
@@ -195,7 +204,7 @@ class _Sentence:
         realizer, style, scene = self._realizer, self._style, self._scene
         markers, move = load_grammar().markers, self._act.move
         if style.disfluency and realizer.random() < style.disfluency:
-            body = _hesitating(body, realizer)
+            body = hesitating(body, load_grammar().fillers.say(realizer), realizer.random)
         front = None
         if scene.joined is not None:
             joint = load_grammar().joints.get((scene.joined, move))
@@ -205,19 +214,22 @@ class _Sentence:
             marker = markers.get((kind, self._voice, move)) or markers.get(("opener", self._voice, move))
             if marker is not None and realizer.random() < marker.rate * style.chattiness:
                 front = marker.phrase.say(realizer)
+        if front and _repeats(front, body):
+            front = None
         realizer.fronted = bool(front)
         if front:
             body = f"{front} {body}"
         closer = markers.get(("closer", self._voice, move))
         # Fixed phrases get no closing marker; questions and sentences with content may.
         if closer is not None and template.covers and realizer.random() < closer.rate * style.chattiness:
-            body = f"{body} {closer.phrase.say(realizer)}"
+            end = closer.phrase.say(realizer)
+            body = body if _words(end)[0] in _words(body) else f"{body}{'' if end[0] == ',' else ' '}{end}"
         if style.address and realizer.random() < style.addressing:
             body = f"{body}, {style.address}"
         return body
 
     def _finished(self, body: str, close: str) -> str:
-        text = " ".join(f"{body}{close}".split())
+        text = self._realizer.agreed(" ".join(f"{body}{close}".split()))
         if " ," in text or " ?" in text:
             text = text.replace(" ,", ",").replace(",,", ",").replace(" ?", "?").replace(",?", "?")
         text = text.strip(", ")
@@ -227,19 +239,19 @@ class _Sentence:
             return text
         joined_on = self._scene.joined is not None and text[0].islower() and self._realizer.fronted
         start = text if joined_on else text[0].upper() + text[1:]
-        return start if text[-1] in "?." else start + "."
+        if text[-1] in "?.":
+            return start
+        return start + ("?" if _ASKS.match(text) else ".")
 
 
-def _hesitating(body: str, realizer: SlotRealizer) -> str:
-    """Returns the sentence with a filled pause or a restart."""
-    words = body.split()
-    filler = load_grammar().fillers.say(realizer)
-    if len(words) < 3:
-        return f"{filler}, {body}"
-    place = 1 + int(realizer.random() * (len(words) - 2))
-    if place <= 2 and realizer.random() < 0.5:
-        return " ".join([*words[:place], filler + ",", *words])
-    return " ".join([*words[:place], filler + ",", *words[place:]])
+def _words(text: str) -> list[str]:
+    return _PLAIN.sub("", text.lower()).split()
+
+
+def _repeats(front: str, body: str) -> bool:
+    """Returns whether the body begins with a word of the discourse marker: "so so", "okay, okay"."""
+    start = _words(body)
+    return not start or start[0] in _words(front)
 
 
 @functools.lru_cache(maxsize=8192)

@@ -70,6 +70,7 @@ class SlotRealizer:
 
     __slots__ = (
         "_names",
+        "_plurals",
         "_scene",
         "_style",
         "_without",
@@ -114,6 +115,7 @@ class SlotRealizer:
         self._scene = scene
         self._names = names
         self._without: LandmarkName | None = None
+        self._plurals: list[str] = []
 
     def exclude_dropped(self, dropping: bool) -> None:
         """Sets whether the sentence names the abandoned landmark, which is then excluded from the landmark gap."""
@@ -140,20 +142,31 @@ class SlotRealizer:
             spoken.append((phrases.get((form, key)) or phrases["do", key]).say(self))
         return _listed(spoken)
 
-    def landmark(self) -> str:
-        """Returns the names of the landmarks, or anaphoric references."""
+    def landmark(self, named: bool = False) -> str:
+        """Returns the names of the landmarks, or anaphoric references unless they have to be `named`."""
         values = self.values[_LANDMARK]
         kept = tuple(value for value in values if value is not self._without) if self._without else values
-        return self._named(kept or values)
+        return self._named(kept or values, named)
 
-    def street(self) -> str:
-        """Returns the names of the streets, or anaphoric references."""
-        return self._named(self.values[_STREET])
+    def street(self, named: bool = False) -> str:
+        """Returns the names of the streets, or anaphoric references unless they have to be `named`."""
+        return self._named(self.values[_STREET], named)
 
     def spoken(self, slot: Slot, form: str) -> str:
         """Returns the words of the values of a slot in a form of the lexicon."""
         lexicon = load_lexicon()
-        return _listed([self.pick(lexicon.forms(value, form)) for value in self.values[slot][: self._names]])
+        phrases = [self.pick(lexicon.forms(value, form)) for value in self.values[slot][: self._names]]
+        listed = _listed(phrases)
+        if slot is Slot.OBJECT and (len(phrases) > 1 or listed in lexicon.plurals):
+            self._plurals.append(listed)
+        return listed
+
+    def agreed(self, text: str) -> str:
+        """Returns the text with verbs that agree in number with the plural noun phrases spoken in it."""
+        for phrase in self._plurals:
+            for pattern, plural in _agreements(phrase):
+                text = pattern.sub(plural, text)
+        return text
 
     def copula(self) -> str:
         """Returns "is", or "are" for several landmarks."""
@@ -180,7 +193,7 @@ class SlotRealizer:
 
     def _length(self, metres: float) -> str:
         words = cardinal(max(10, 10 * round(metres / 10)))
-        return f"{words} {'metres' if self.idiolect % 3 == 1 else 'meters'}"
+        return f"{words} meters"
 
     def direction(self) -> str:
         """Returns the direction."""
@@ -229,19 +242,22 @@ class SlotRealizer:
         """Returns the name of the abandoned landmark."""
         return self.place(self._wording.dropped)
 
-    def _named(self, values: Sequence[SlotValue]) -> str:
-        return _listed([self._name(value) for value in values[: self._names]])
+    def _named(self, values: Sequence[SlotValue], named: bool) -> str:
+        listed = _listed([self._name(value, named) for value in values[: self._names]])
+        if len(values[: self._names]) > 1:
+            self._plurals.append(listed)
+        return listed
 
-    def _name(self, value: SlotValue) -> str:
+    def _name(self, value: SlotValue, named: bool) -> str:
         lexicon, style, scene = load_lexicon(), self._style, self._scene
-        if scene.mentioned and value in scene.mentioned and self.random() < style.anaphora:
+        if not named and scene.mentioned and value in scene.mentioned and self.random() < style.anaphora:
             return self.pick(lexicon.forms(value, "again"))
-        if value is scene.street and self.random() < style.anaphora:
+        if not named and value is scene.street and self.random() < style.anaphora:
             return self.pick(lexicon.forms(value, "here"))
         forms = lexicon.phrases[value]
         paraphrased = _COLLOQUIAL * (2 if style.register is _SLANGY else 1)
         name = self.pick(forms["also" if "also" in forms and self.random() < paraphrased else "say"])
-        if value is scene.landmark and self.random() < style.chattiness * _DEIXIS:
+        if not named and value is scene.landmark and self.random() < style.chattiness * _DEIXIS:
             name = f"{name} {self.pick(lexicon.deixis)}"
         if style.repairs and value.label not in _NAMELESS and self.random() < style.repairs:
             wrong = self.pick(SLOT_VALUES[value.slot][1:-2])
@@ -254,13 +270,36 @@ _INDEFINITE = re.compile(r"^(an?|some|another|the) ")
 _POSSESSED = re.compile(r"^(my|your|our|his|her|their|\w+'s) ")
 _NAMELESS = frozenset({"Unknown", "Queried"})
 
+
+@functools.lru_cache(maxsize=1024)
+def _agreements(phrase: str) -> tuple[tuple[re.Pattern[str], str], ...]:
+    """Returns patterns of singular verbs beside a plural noun phrase, with what they become."""
+    noun = re.escape(phrase)
+    forms = (
+        (rf"\bthere's(?= {noun}\b)", "there are"),
+        (rf"\bthere was(?= {noun}\b)", "there were"),
+        (rf"\bthat's(?= {noun}\b)", "those are"),
+        (rf"\bis there(?= {noun}\b)", "are there"),
+        (rf"\bis that(?= {noun}\b)", "are those"),
+        (rf"\bis(?= {noun}\b)", "are"),
+        (rf"(?<=\b{noun} )is\b", "are"),
+        (rf"(?<=\b{noun} )isn't\b", "aren't"),
+        (rf"(?<=\b{noun} )was\b", "were"),
+        (rf"(?<=\b{noun} )has\b", "have"),
+        (rf"(?<=\b{noun} )blocks\b", "block"),
+    )
+    return tuple((re.compile(pattern), plural) for pattern, plural in forms)
+
+
 _GAPS: Mapping[str, Callable[[SlotRealizer], str]] = MappingProxyType(
     {
         "do": lambda realizer: realizer.action("do"),
         "doing": lambda realizer: realizer.action("doing"),
         "cmd": lambda realizer: realizer.action("cmd"),
         "landmark": SlotRealizer.landmark,
+        "named_landmark": lambda realizer: realizer.landmark(named=True),
         "street": SlotRealizer.street,
+        "named_street": lambda realizer: realizer.street(named=True),
         "object": lambda realizer: realizer.spoken(Slot.OBJECT, "say"),
         "the_object": lambda realizer: realizer.spoken(Slot.OBJECT, "the"),
         "state": lambda realizer: realizer.spoken(Slot.STATUS, "say"),

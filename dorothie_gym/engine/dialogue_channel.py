@@ -17,6 +17,7 @@ from dorothie_gym.dialogue import (
     SpeakerStyle,
     Utterance,
     draw_style,
+    fluent,
     guess_spans,
     word_act,
 )
@@ -163,6 +164,7 @@ class DialogueChannel:
                 "text": utterance.text,
                 **transcript,
                 "span": span.text,
+                **({"fluent": plain} if (plain := fluent(span.text)) != span.text else {}),
                 "move": span.act.move.label,
                 "slots": {label: list(values) for label, values in span.act.slot_labels().items()},
                 **({"meaning": [said.to_json() for said in span.meaning]} if span.meaning else {}),

@@ -220,6 +220,7 @@ class SpeechState:
         if not first.text:
             queue = self._worded(queue, rng, scene or WordingContext(), continues)
             first = queue[0]
+        first = replace(first, text=self._punctuated(queue, continues))
         end = now + speaking + speech_seconds(first.text)
         pause = ANSWER_TIME if first.act.move in _WANTS_ANSWER else PAUSE
         return Speech(act=first.act, text=first.text, meaning=first.meaning), replace(
@@ -230,6 +231,15 @@ class SpeechState:
             last_end=end,
             said=(*self.said[1 - MEMORY :], first),
         )
+
+    def _punctuated(self, queue: Sequence[Remark], continues: bool) -> str:
+        """Returns the words of the next remark with the capital and the comma that its neighbours want."""
+        text = queue[0].text
+        begins = not continues or (self.last is not None and self.last.text.endswith((".", "?")))
+        if begins and self.style is not None and self.style.proper:
+            text = text[0].upper() + text[1:]
+        goes_on = len(queue) > 1 and queue[1].joined
+        return f"{text}," if goes_on and text[-1].isalnum() else text
 
     def _worded(
         self, queue: tuple[Remark, ...], rng: np.random.Generator, scene: WordingContext, continues: bool

@@ -21,8 +21,9 @@ class EventType(enum.StrEnum):
     DIALOGUE_MOVE = "DialogueMove"
     """One dialogue act: utterance (number), text (of the whole utterance), span (words of this act), move, slots
     ({slot label: [value labels]}), exchange (number or null), start and end [s]; if known, transaction
-    (number), recognised (words that a speech recogniser returned for the whole utterance) and meaning (the
-    propositions of the span, see `dialogue.propositions`)."""
+    (number), recognised (words that a speech recogniser returned for the whole utterance), fluent (words of this act
+    without hesitations, restarts and withdrawn names, where it has any) and meaning (the propositions of the span, see
+    `dialogue.propositions`)."""
     PHYSICAL_ACTION = "PhysicalAction"
     """Effective action of the Co-Wizard: action (label), angle (degrees, positive left, or null), up (or
     null)."""
@@ -122,6 +123,7 @@ class MoveRecord:
         transaction: number of the transaction; None if unknown.
         recognised: words that a speech recogniser returned for the whole utterance; None without a recogniser.
         meaning: propositions that the speaker states, asks or asks for; empty if they are not known.
+        fluent: words of this move without hesitations, restarts and withdrawn names; None if it has none.
     """
 
     index: int
@@ -138,6 +140,7 @@ class MoveRecord:
     transaction: int | None = None
     recognised: str | None = None
     meaning: tuple[Proposition, ...] = ()
+    fluent: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,6 +229,7 @@ def move_record(event: Event, index: int, where: str = "event") -> MoveRecord:
         transaction=data.if_given("transaction", data.integer),
         recognised=data.if_given("recognised", data.text),
         meaning=_meaning(data),
+        fluent=data.if_given("fluent", data.text),
     )
 
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from dorothie_gym.dialogue import (
     MAX_CHARACTERS,
     Direction,
+    Register,
     SpeakerStyle,
     Wording,
     WordingContext,
@@ -27,6 +28,7 @@ from dorothie_gym.ontology import (
     DialogueMove,
     GoalStatus,
     LandmarkName,
+    ObjectClass,
     Role,
     StreetName,
 )
@@ -202,7 +204,7 @@ def test_any_acts_fit_into_an_utterance(said, speaker, seed):
     rng = np.random.default_rng(seed)
     spans = word_acts(said, speaker, rng, style=draw_style(speaker, rng), scene=WordingContext(exception=True))
     assert [span.act for span in spans] == said
-    assert len(" ".join(span.text for span in spans)) <= MAX_CHARACTERS
+    assert all(len(span.text) <= MAX_CHARACTERS for span in spans)
 
 
 def test_number_of_contexts_must_equal_number_of_acts():
@@ -232,3 +234,32 @@ def test_wording_is_fast():
     for act in acts:
         word_act(act, Role.PARTICIPANT, rng, style=style)
     assert (time.process_time() - start) / len(acts) < 100e-6
+
+
+@pytest.mark.parametrize("move", [DialogueMove.EXPLAIN, DialogueMove.QUERY_YN, DialogueMove.CONFIRM])
+def test_verbs_agree_with_plural_objects(move):
+    texts = []
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        act = DialogueAct.of(move, ObjectClass.STATIC)
+        texts.append(word_act(act, Role.CO_WIZARD, rng, Wording(topic="blocked" if seed % 2 else None)))
+    about_cones = [text for text in texts if "cones" in text]
+    assert len(about_cones) > 10
+    assert not any(re.search(r"cones (is|was|has|blocks)\b|\bthere's some\b|\bis some\b", text) for text in about_cones)
+
+
+def test_long_spans_keep_what_they_say():
+    acts = [DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.J_TURN, StreetName.BONISTEEL)] * 4
+    wordings = [Wording(direction="left", ordinal=2)] * 4
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        spans = word_acts(acts, Role.PARTICIPANT, rng, wordings, style=draw_style(Role.PARTICIPANT, rng))
+        assert all("left" in span.text and "Bonisteel" in span.text for span in spans), spans
+
+
+def test_requests_in_the_form_of_questions_end_with_a_question_mark():
+    style = SpeakerStyle(register=Register.POLITE, indirectness=1.0)
+    act = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.U_TURN)
+    texts = {word_act(act, Role.PARTICIPANT, np.random.default_rng(seed), style=style) for seed in range(200)}
+    asked = [text for text in texts if text.startswith(("Could you", "Would you"))]
+    assert asked and all(text.endswith("?") for text in asked)
