@@ -1,19 +1,20 @@
 """Attribution of exchanges to the exceptions that they handle, by a rule over events and references.
 
-An exchange handles an exception if it begins within `HANDLING_WINDOW` after it, and one of its acts refers to it:
+An exchange handles an exception if it begins within `HANDLING_WINDOW` after it, and one of its acts refers to it. In
+sessions with recorded meanings, the propositions decide (`exception_mentions`). In others, slots and words do:
 
-- weather: to the object classes it covers (sky, ground, water), or in words to fog, rain, night, ...; within
-  `PROMPT_WINDOW` also to speed or lights;
-- appearing vehicles or pedestrians: to their object class;
-- an object on the road: to an obstacle, or in words to a blocked or cleared way; the window starts again when the car
-  comes near, and within `PROMPT_WINDOW` from then on, references to a U-turn or another lane count as well;
-- a sensor fault: in words to a sensor or its picture; or the car begins the exchange within `MAX_FAULT_DURATION` with
-  a question for an action;
-- a task exception: to the landmark of the task, or to an abandoned or postponed goal.
+- weather: the object classes it covers (sky, ground, water), or words for fog, rain, night, ...; within
+  `PROMPT_WINDOW` also speed or lights;
+- appearing vehicles or pedestrians: their object class;
+- an object on the road: an obstacle, or words for a blocked or cleared way; within `PROMPT_WINDOW` after the car has
+  come near, a U-turn or another lane as well;
+- a sensor fault: words for a sensor or its picture; or the car begins the exchange within `MAX_FAULT_DURATION` with a
+  question for an action;
+- a task exception: the landmark of the task, or an abandoned or postponed goal.
 
-A question within `ANSWER_TIMEOUT` after an exchange that handles an object on the road belongs to it if it names no
-landmark; after an exchange that handles a task exception, a question for status or destination does. If several
-exceptions fit, the latest counts.
+For an object on the road, the window starts again when the car comes near. A question within `ANSWER_TIMEOUT` after an
+exchange that handles an object on the road belongs to it if it names no landmark; after an exchange that handles a task
+exception, a question for status or destination does. If several exceptions fit, the latest counts.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from __future__ import annotations
 import bisect
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, partial
@@ -30,7 +31,9 @@ from typing import Final
 
 import numpy as np
 
+from dorothie_gym.analysis.exception_mentions import mentions
 from dorothie_gym.analysis.units import SaidUnit, Units
+from dorothie_gym.dialogue import Proposition
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.ontology import (
     ActionValue,
@@ -130,6 +133,26 @@ def kind_of(event: Event) -> ExceptionKind | None:
     return ExceptionKind[name] if name in ExceptionKind.__members__ else None
 
 
+def place_of(event: Event) -> tuple[float, float] | None:
+    """Returns the place of an exception (x, y) [m]: of its object, or the middle of its area; None if it has none."""
+    data = event.data
+    x, y = data.get("x"), data.get("y")
+    if isinstance(x, int | float) and isinstance(y, int | float):
+        return float(x), float(y)
+    corners = [data.get(name) for name in ("x0", "x1", "y0", "y1")]
+    known = [float(value) for value in corners if isinstance(value, int | float)]
+    return ((known[0] + known[1]) / 2.0, (known[2] + known[3]) / 2.0) if len(known) == 4 else None
+
+
+def is_near(session: Session, event: Event, time: float) -> bool:
+    """Returns whether the car is near the place of an exception at a time [s]; True if it has none."""
+    place, rows = place_of(event), session.trajectory
+    if place is None or not len(rows):
+        return True
+    row = rows[min(int(np.searchsorted(rows["frame"], round(time * FRAME_RATE))), len(rows) - 1)]
+    return math.hypot(row["x"] - place[0], row["y"] - place[1]) <= MEETING_DISTANCE
+
+
 def time_met(session: Session, event: Event) -> float:
     """Returns the time at which the car first came near an exception's object on the road [s]; infinity if never."""
     x, y = event.data.get("x"), event.data.get("y")
@@ -152,13 +175,18 @@ def handled_by(units: Units) -> dict[int, Event]:
     met = [k for k, each in enumerate(happened) if math.isfinite(each.met)]
     found: dict[int, Event] = {}
     last: tuple[float, _Happened] | None = None
+    meant = any(move.meaning for move in session.moves())
     for exchange in sorted(units.exchanges, key=lambda unit: unit.start):
         fresh = range(
             bisect.bisect_left(times, exchange.start - HANDLING_WINDOW), bisect.bisect_right(times, exchange.start)
         )
-        mentioned = cache(partial(_mentions, exchange))  # each kind once, however many exceptions there are
         latest = (happened[k] for k in sorted({*fresh, *met}, reverse=True))
-        cause = next((each for each in latest if each.is_handled_in(exchange, mentioned)), None)
+        if meant:
+            said = [proposition for move in exchange.moves for proposition in move.meaning]
+            cause = next((each for each in latest if each.is_meant_in(session, exchange, said)), None)
+        else:
+            mentioned = cache(partial(_mentions, exchange))  # each kind once, however many exceptions there are
+            cause = next((each for each in latest if each.is_handled_in(exchange, mentioned)), None)
         if (
             cause is None
             and last is not None
@@ -217,6 +245,13 @@ class _Happened:
     event: Event
     kind: ExceptionKind
     met: float
+
+    def is_meant_in(self, session: Session, exchange: SaidUnit, said: Sequence[Proposition]) -> bool:
+        """Returns whether an exchange is within the window and a proposition in it is about the exception."""
+        was_met = 0.0 <= exchange.start - self.met <= HANDLING_WINDOW
+        if not was_met and not 0.0 <= exchange.start - self.event.time <= HANDLING_WINDOW:
+            return False
+        return mentions(said, self.kind, self.event, near=is_near(session, self.event, exchange.start))
 
     def is_handled_in(self, exchange: SaidUnit, mentioned: Callable[[ExceptionKind], bool]) -> bool:
         """Returns whether an exchange is within the window and one of its acts refers to the exception."""

@@ -86,17 +86,25 @@ class Noticed:
 
     Attributes:
         weather: parameters that have become conspicuous and are still so.
+        mentioned: those of them that either speaker has mentioned.
         crowds: kinds of crowds, with the time at which each was last noticed [s].
         usual: usual number of objects near, by the kinds of `CROWDS`.
     """
 
     weather: frozenset[W] = frozenset()
+    mentioned: frozenset[W] = frozenset()
     crowds: tuple[tuple[ObjectClass, float], ...] = ()
     usual: tuple[float, ...] = (0.0,) * len(CROWDS)
 
     def with_change(self, parameter: W, *, high: bool) -> Noticed:
         """Records that a parameter has become conspicuous, or has ceased to be."""
-        return replace(self, weather=self.weather | {parameter} if high else self.weather - {parameter})
+        if high:
+            return replace(self, weather=self.weather | {parameter})
+        return replace(self, weather=self.weather - {parameter}, mentioned=self.mentioned - {parameter})
+
+    def with_mention(self, parameter: W) -> Noticed:
+        """Records that a parameter that has become conspicuous was mentioned."""
+        return replace(self, weather=self.weather | {parameter}, mentioned=self.mentioned | {parameter})
 
     def with_crowd(self, kind: ObjectClass, now: float) -> Noticed:
         """Records that a crowd was noticed at a time [s]."""
@@ -116,7 +124,7 @@ class Noticed:
             return self
         parameter = told.get("parameter")
         if isinstance(parameter, W):
-            return self.with_change(parameter, high=True)
+            return self.with_mention(parameter)
         kind = next((thing for thing in words.objects if thing in CROWDS), None)
         return self.with_crowd(kind, now) if told.predicate is Predicate.CROWDED and kind is not None else self
 

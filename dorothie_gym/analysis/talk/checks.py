@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -11,6 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from dorothie_gym.analysis.exception_attribution import handled_by, kind_of
+from dorothie_gym.analysis.talk.perceivable import perceived_at
 from dorothie_gym.analysis.talk.session_world import SessionWorld
 from dorothie_gym.analysis.talk.truth import agrees, is_true
 from dorothie_gym.analysis.units import Units
@@ -62,10 +62,12 @@ class TalkChecks:
     Attributes:
         right: number of cases that are right, by figure; exceptions as "exceptions/KIND".
         cases: number of cases that can be decided.
+        unperceived: number of exceptions that nobody could perceive, by kind.
     """
 
     right: Counter[str] = field(default_factory=Counter)
     cases: Counter[str] = field(default_factory=Counter)
+    unperceived: Counter[str] = field(default_factory=Counter)
 
     def add(self, figure: str, right: bool | None) -> None:
         """Counts a case; None for one that the records cannot decide."""
@@ -93,6 +95,7 @@ class TalkChecks:
         kinds = sorted(name.removeprefix(_EXCEPTIONS) for name in self.cases if name.startswith(_EXCEPTIONS))
         rows["exceptions"] = {kind: self.share(_EXCEPTIONS + kind) for kind in kinds}
         rows["exceptions_n"] = {kind: self.cases[_EXCEPTIONS + kind] for kind in kinds}
+        rows["exceptions_unperceived_n"] = dict(sorted(self.unperceived.items()))
         return rows
 
 
@@ -114,10 +117,11 @@ def talk_checks_of(corpus: Corpus, on_session: Callable[[int, int], None] | None
 
 def check_session(checks: TalkChecks, session: Session, town: Town | None) -> None:
     """Adds the cases of a session; of one in an unknown town (None), those that need no map."""
-    if town is not None and len(session.trajectory):
-        _check_claims(checks, SessionWorld(session, town))
+    world = SessionWorld(session, town) if town is not None and len(session.trajectory) else None
+    if world is not None:
+        _check_claims(checks, world)
     _check_answers(checks, session)
-    _check_exceptions(checks, session)
+    _check_exceptions(checks, session, world)
     checks.add("story", mentions_story(session))
     checks.add("loops", not has_loop(session))
 
@@ -171,19 +175,26 @@ def _is_open(value: object) -> bool:
     return value is ASKED or getattr(value, "label", "") == "Queried"
 
 
-def _check_exceptions(checks: TalkChecks, session: Session) -> None:
-    """Checks which exceptions are talked about in time."""
+def _check_exceptions(checks: TalkChecks, session: Session, world: SessionWorld | None) -> None:
+    """Checks which exceptions that could be perceived are talked about in time; without a map, all count."""
     units = Units(session)
     starts = {unit.id: unit.start for unit in units.exchanges}
-    talked: dict[int, float] = {}  # start of the first exchange about each event
+    talked: dict[int, list[float]] = {}  # starts of the exchanges about each event
     for number, event in handled_by(units).items():
-        talked[id(event)] = min(starts[number], talked.get(id(event), math.inf))
+        talked.setdefault(id(event), []).append(starts[number])
     for event in session.of_type(EventType.EXCEPTION):
         kind = kind_of(event)
         if kind is None or kind.name.startswith("DELETE") or event.data.get("on") is False:
             continue
+        perceived = event.time if world is None else perceived_at(world, event)
         name = str(event.data.get("sensor") or event.data.get("weather") or kind.name.lower())
-        checks.add(_EXCEPTIONS + name, talked.get(id(event), math.inf) - event.time <= TALKED_ABOUT_WITHIN)
+        in_time = perceived is not None and any(
+            start - perceived <= TALKED_ABOUT_WITHIN for start in talked.get(id(event), ())
+        )
+        if perceived is None:
+            checks.unperceived[name] += 1
+        else:
+            checks.add(_EXCEPTIONS + name, in_time)
 
 
 def mentions_story(session: Session) -> bool | None:

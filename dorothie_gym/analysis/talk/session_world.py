@@ -57,6 +57,11 @@ class SessionWorld:
         place = int(np.searchsorted(self._rows["frame"], round(time * FRAME_RATE)))
         return self._rows[min(place, len(self._rows) - 1)]  # type: ignore[no-any-return]
 
+    @property
+    def end(self) -> float:
+        """Time of the last row of the trajectory [s]."""
+        return float(self._rows["frame"][-1]) / FRAME_RATE
+
     def position(self, time: float) -> tuple[float, float]:
         """Returns where the car is at a time [s] (x, y) [m]."""
         row = self.row(time)

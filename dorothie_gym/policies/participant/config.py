@@ -83,7 +83,7 @@ class ParticipantConfig(GuidanceConfig):
     report_delay: tuple[float, float] = (0.5, 2.5)
     next_task_delay: float = 9.0
     goes_first: float = 0.6
-    announces_ahead: float = 0.8
+    announces_ahead: float = 0.95
     leaves_route: float = 0.06
     unanswered_after: float = 8.0
     guides_at_once: float = 0.12

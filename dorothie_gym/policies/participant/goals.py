@@ -163,12 +163,17 @@ def _report_changed(
     task = state.task
     if new.index != task.target:
         busy = task.goal is not None and task.goal.name in (former.name, landmark.name)
-        if former.name is not landmark.name and not busy and rng.random() < state.config.announces_ahead:
+        if busy or rng.random() >= state.config.announces_ahead:
+            return  # the change is announced when the subgoal becomes the target
+        if former.name is landmark.name:
+            later = contents.errand(landmark.name, GoalStatus.PENDING, landmark.street)
+            state.say(intend(Function.REQUEST, later))
+        else:
             wording = Wording(topic="changed_later", dropped=former.name)
             dropped = contents.errand(former.name, GoalStatus.ABANDONED)
             instead = contents.errand(landmark.name, GoalStatus.PENDING)
             state.say(intend(Function.REQUEST, instead, dropped, wording=wording))
-        return  # the change is announced when the subgoal becomes the target
+        return
     was_announced = task.announced
     state.forget_target()
     state.speech = state.speech.cleared()

@@ -146,10 +146,10 @@ def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.ran
         state.conversation = conversation.with_slowed(True)
         condition = Limit.FOG if is_foggy(view.raw) else Limit.RAIN
         parameter = PARAMETER[condition]
-        mentioned = parameter in conversation.noticed.weather or limit is Limit.CAMERA
+        mentioned = parameter in conversation.noticed.mentioned or limit is Limit.CAMERA
         if mentioned or rng.random() > state.style.notices:
             return
-        state.conversation = state.conversation.with_noticed(conversation.noticed.with_change(parameter, high=True))
+        state.conversation = state.conversation.with_noticed(conversation.noticed.with_mention(parameter))
         said = view_remark(condition, sight(view.raw), rng)
         speed = suitable_speed(sight(view.raw)) + _HASTE * (state.style.hurries > _HURRIED)
         if view.speed > (speed + _HASTE) / 3.6:
@@ -187,8 +187,8 @@ def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.rand
     if not is_dark(view.raw) or lit or view.time - state.conversation.lights_at < LIGHTS_INTERVAL:
         return
     conversation = state.conversation.after_mentioning_lights(view.time)
-    told = PARAMETER[Limit.NIGHT] in conversation.noticed.weather
-    state.conversation = conversation.with_noticed(conversation.noticed.with_change(PARAMETER[Limit.NIGHT], high=True))
+    told = PARAMETER[Limit.NIGHT] in conversation.noticed.mentioned
+    state.conversation = conversation.with_noticed(conversation.noticed.with_mention(PARAMETER[Limit.NIGHT]))
     wording = Wording(lights=True)
     if rng.random() < 0.4:
         on = Proposition.of(Predicate.LIGHTS_ON, action=ActionValue.LIGHT_CHANGE)
