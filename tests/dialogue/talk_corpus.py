@@ -108,7 +108,9 @@ class Sampler:
         if move in (M.IRRELEVANT, M.ALIGN, M.CONFUSE) or rng.random() < bare:
             if move is M.EXPLAIN and human and rng.random() < 0.25:
                 return DialogueAct.of(move), self.one_of(errands())
-            topic = {M.ACKNOWLEDGE: ["sorry", "align", None], M.EXPLAIN: [None, *TOPICS]}.get(move, [None])
+            topic = {M.ACKNOWLEDGE: ["sorry", "align", None], M.CONFIRM: ["taken"], M.EXPLAIN: [None, *TOPICS]}.get(
+                move, [None]
+            )
             return DialogueAct.of(move), Wording(topic=self.one_of(topic) if rng.random() < 0.5 else None)
         drawn = rng.random()
         action = self.weighted(ACTIONS)
