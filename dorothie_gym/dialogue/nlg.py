@@ -175,7 +175,7 @@ class _Sentence:
         self._style = style
         self._scene = scene
         self._limit = limit
-        self._realizer = SlotRealizer(act, draw, wording, style, scene, names)
+        self._realizer = SlotRealizer(act, draw, wording, style, scene, names, of_rider=voice is _HUMAN)
 
     def text(self) -> str:
         realizer, act = self._realizer, self._act

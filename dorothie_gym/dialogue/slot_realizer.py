@@ -70,6 +70,7 @@ class SlotRealizer:
 
     __slots__ = (
         "_names",
+        "_of_rider",
         "_plurals",
         "_scene",
         "_style",
@@ -92,6 +93,7 @@ class SlotRealizer:
         style: SpeakerStyle,
         scene: WordingContext,
         names: int,
+        of_rider: bool = True,
     ) -> None:
         """Prepares the realization of an act.
 
@@ -102,6 +104,7 @@ class SlotRealizer:
             style: style of the speaker.
             scene: dialogue history and objects in view.
             names: largest number of names per slot.
+            of_rider: whether the speaker is the one whose friends and home are spoken of.
         """
         self.random = draw
         self.values = values_by_slot(act.slots)
@@ -114,6 +117,7 @@ class SlotRealizer:
         self._style = style
         self._scene = scene
         self._names = names
+        self._of_rider = of_rider
         self._without: LandmarkName | None = None
         self._plurals: list[str] = []
 
@@ -257,6 +261,8 @@ class SlotRealizer:
         forms = lexicon.phrases[value]
         paraphrased = _COLLOQUIAL * (2 if style.register is _SLANGY else 1)
         name = self.pick(forms["also" if "also" in forms and self.random() < paraphrased else "say"])
+        if not self._of_rider and name.startswith("my "):
+            name = f"your {name[3:]}"
         if not named and value is scene.landmark and self.random() < style.chattiness * _DEIXIS:
             name = f"{name} {self.pick(lexicon.deixis)}"
         if style.repairs and value.label not in _NAMELESS and self.random() < style.repairs:

@@ -18,7 +18,7 @@ from dorothie_gym.dialogue import (
     word_act,
     word_acts,
 )
-from dorothie_gym.dialogue.grammar import parse_grammar
+from dorothie_gym.dialogue.grammar import VOICES, parse_grammar
 from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology import (
@@ -263,3 +263,13 @@ def test_requests_in_the_form_of_questions_end_with_a_question_mark():
     texts = {word_act(act, Role.PARTICIPANT, np.random.default_rng(seed), style=style) for seed in range(200)}
     asked = [text for text in texts if text.startswith(("Could you", "Would you"))]
     assert asked and all(text.endswith("?") for text in asked)
+
+
+def test_car_does_not_call_the_friends_of_its_rider_its_own():
+    act = DialogueAct.of(DialogueMove.ACKNOWLEDGE, LandmarkName.PERSON)
+    said = {
+        role: " ".join(word_act(act, role, np.random.default_rng(seed)).lower() for seed in range(80))
+        for role in VOICES
+    }
+    assert "my friend" in said[Role.PARTICIPANT] and "your friend" not in said[Role.PARTICIPANT]
+    assert "your friend" in said[Role.CO_WIZARD] and "my friend" not in said[Role.CO_WIZARD]
