@@ -68,7 +68,8 @@ _CONTRACTED = {
     "isnt": ("isn't",), "doesnt": ("doesn't",), "whats": ("what's",), "wheres": ("where's",), "theres": ("there's",),
     "youre": ("you're",), "theyre": ("they're",), "ive": ("i've",), "youve": ("you've",), "weve": ("we've",),
     "couldnt": ("couldn't",), "wouldnt": ("wouldn't",), "shouldnt": ("shouldn't",), "arent": ("aren't",),
-    "wasnt": ("wasn't",), "havent": ("haven't",), "hasnt": ("hasn't",), "lets": ("let's",), "hes": ("he's",), "shes": ("she's",),
+    "wasnt": ("wasn't",), "havent": ("haven't",), "hasnt": ("hasn't",), "lets": ("let's",), "hes": ("he's",),
+    "shes": ("she's",),
 }  # fmt: skip
 """Contractions and words without apostrophe, as typed by people and emitted by speech recognisers."""
 _STOP = re.compile(r"[.;:!\u2014\u2026]+(?=\s|$)")
