@@ -200,6 +200,28 @@ def handled_by(units: Units) -> dict[int, Event]:
     return found
 
 
+def times_mentioned(units: Units) -> dict[int, list[float]]:
+    """Returns when each exception is talked about [s], by `id` of its event.
+
+    Where meanings are recorded, these are the starts of the acts that are about it; otherwise those of exchanges.
+    """
+    session, found = units.session, dict[int, list[float]]()
+    moves = [move for move in session.moves() if move.meaning]
+    if not moves:
+        starts = {unit.id: unit.start for unit in units.exchanges}
+        for number, event in handled_by(units).items():
+            found.setdefault(id(event), []).append(starts[number])
+        return found
+    for event in session.of_type(EventType.EXCEPTION):
+        kind = kind_of(event)
+        for move in moves if kind is not None else ():
+            assert kind is not None
+            near = is_near(session, event, move.start)
+            if move.start >= event.time and mentions(move.meaning, kind, event, near=near):
+                found.setdefault(id(event), []).append(move.start)
+    return found
+
+
 def handling(units: Units) -> dict[int, Handled]:
     """Returns the kind of exception that each exchange handles, by number of the exchange."""
     events = handled_by(units)

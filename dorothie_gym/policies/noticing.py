@@ -86,25 +86,28 @@ class Noticed:
 
     Attributes:
         weather: parameters that have become conspicuous and are still so.
-        mentioned: those of them that either speaker has mentioned.
+        mentioned: changes (parameter, whether it is high) that either speaker has mentioned.
         crowds: kinds of crowds, with the time at which each was last noticed [s].
         usual: usual number of objects near, by the kinds of `CROWDS`.
     """
 
     weather: frozenset[W] = frozenset()
-    mentioned: frozenset[W] = frozenset()
+    mentioned: frozenset[tuple[W, bool]] = frozenset()
     crowds: tuple[tuple[ObjectClass, float], ...] = ()
     usual: tuple[float, ...] = (0.0,) * len(CROWDS)
 
     def with_change(self, parameter: W, *, high: bool) -> Noticed:
         """Records that a parameter has become conspicuous, or has ceased to be."""
-        if high:
-            return replace(self, weather=self.weather | {parameter})
-        return replace(self, weather=self.weather - {parameter}, mentioned=self.mentioned - {parameter})
+        weather = self.weather | {parameter} if high else self.weather - {parameter}
+        return replace(self, weather=weather, mentioned=self.mentioned - {(parameter, not high)})
 
-    def with_mention(self, parameter: W) -> Noticed:
-        """Records that a parameter that has become conspicuous was mentioned."""
-        return replace(self, weather=self.weather | {parameter}, mentioned=self.mentioned | {parameter})
+    def with_mention(self, parameter: W, *, high: bool) -> Noticed:
+        """Records that a speaker has mentioned that a parameter is conspicuous, or has ceased to be."""
+        return replace(self, mentioned=self.mentioned | {(parameter, high)})
+
+    def has_mentioned(self, parameter: W) -> bool:
+        """Returns whether a speaker has mentioned that a parameter is conspicuous."""
+        return (parameter, True) in self.mentioned
 
     def with_crowd(self, kind: ObjectClass, now: float) -> Noticed:
         """Records that a crowd was noticed at a time [s]."""
@@ -124,7 +127,7 @@ class Noticed:
             return self
         parameter = told.get("parameter")
         if isinstance(parameter, W):
-            return self.with_mention(parameter)
+            return self.with_mention(parameter, high=told.get("high") is True)
         kind = next((thing for thing in words.objects if thing in CROWDS), None)
         return self.with_crowd(kind, now) if told.predicate is Predicate.CROWDED and kind is not None else self
 
@@ -152,8 +155,9 @@ def notice(
         The remark, or None, and what has been noticed now.
     """
     for parameter, high in changes(observation, noticed.weather):
+        told = (parameter, high) in noticed.mentioned
         noticed = noticed.with_change(parameter, high=high)
-        if not (high and parameter in handled) and rng.random() < chance:
+        if not told and not (high and parameter in handled) and rng.random() < chance:
             return weather_change_remark(parameter, high=high), noticed
     near, now = [thing.kind for thing in objects if thing.distance < CROWD_DISTANCE], scalar(observation, "time")
     kind = crowd_among(near, noticed.usual)

@@ -120,8 +120,21 @@ def test_crowd_that_the_other_mentions_is_not_mentioned_again(text, kind):
 def test_weather_is_understood_from_what_is_said_of_it(parameter):
     item = weather_change_remark(parameter, high=True)
     texts = {word_act(item.act, Role.PARTICIPANT, np.random.default_rng(seed), item.wording) for seed in range(12)}
-    understood = [parameter in Noticed().after_hearing(understand(text), 1.0).weather for text in texts]
+    understood = [Noticed().after_hearing(understand(text), 1.0).has_mentioned(parameter) for text in texts]
     assert np.mean(understood) > 0.6
+
+
+@pytest.mark.parametrize("text", ["The rain has stopped.", "It isn't raining that hard any more."])
+def test_end_that_the_other_mentions_is_not_mentioned_again(text):
+    clear = observed() | {"time": np.array([50.0])}
+    rainy = Noticed().with_change(W.PRECIPITATION, high=True)
+    alone, _ = notice(rainy, clear, [], np.random.default_rng(0), chance=1.0, handled=())
+    assert alone is not None
+    told = rainy.after_hearing(understand(text), 49.0)
+    for _ in range(3):
+        said, told = notice(told, clear, [], np.random.default_rng(0), chance=1.0, handled=())
+        assert said is None
+        told = told.after_hearing(understand(text), 50.0)
 
 
 @pytest.mark.parametrize("kind", PropKind)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.analysis.exception_attribution import handled_by, kind_of
+from dorothie_gym.analysis.exception_attribution import kind_of, times_mentioned
 from dorothie_gym.analysis.talk.perceivable import perceived_at
 from dorothie_gym.analysis.talk.session_world import SessionWorld
 from dorothie_gym.analysis.talk.truth import agrees, is_true
@@ -177,11 +177,7 @@ def _is_open(value: object) -> bool:
 
 def _check_exceptions(checks: TalkChecks, session: Session, world: SessionWorld | None) -> None:
     """Checks which exceptions that could be perceived are talked about in time; without a map, all count."""
-    units = Units(session)
-    starts = {unit.id: unit.start for unit in units.exchanges}
-    talked: dict[int, list[float]] = {}  # starts of the exchanges about each event
-    for number, event in handled_by(units).items():
-        talked.setdefault(id(event), []).append(starts[number])
+    talked = times_mentioned(Units(session))
     for event in session.of_type(EventType.EXCEPTION):
         kind = kind_of(event)
         if kind is None or kind.name.startswith("DELETE") or event.data.get("on") is False:

@@ -262,9 +262,9 @@ def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
         return
     state.dialogue = state.dialogue.with_weather_mentioned(True)
     condition = Limit.NIGHT if limit is None else limit
-    if PARAMETER[condition] in state.dialogue.noticed.mentioned or rng.random() < state.config.leaves_weather:
+    if state.dialogue.noticed.has_mentioned(PARAMETER[condition]) or rng.random() < state.config.leaves_weather:
         return
-    noticed = state.dialogue.noticed.with_mention(PARAMETER[condition])
+    noticed = state.dialogue.noticed.with_mention(PARAMETER[condition], high=True)
     state.dialogue = state.dialogue.with_noticed(noticed)
     state.say(view_remark(condition, sight(view.raw), rng))
     speed = suitable_speed(sight(view.raw)) - _CAUTION * state.style.gentle

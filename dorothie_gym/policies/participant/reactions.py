@@ -146,10 +146,10 @@ def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.ran
         state.conversation = conversation.with_slowed(True)
         condition = Limit.FOG if is_foggy(view.raw) else Limit.RAIN
         parameter = PARAMETER[condition]
-        mentioned = parameter in conversation.noticed.mentioned or limit is Limit.CAMERA
+        mentioned = conversation.noticed.has_mentioned(parameter) or limit is Limit.CAMERA
         if mentioned or rng.random() > state.style.notices:
             return
-        state.conversation = state.conversation.with_noticed(conversation.noticed.with_mention(parameter))
+        state.conversation = state.conversation.with_noticed(conversation.noticed.with_mention(parameter, high=True))
         said = view_remark(condition, sight(view.raw), rng)
         speed = suitable_speed(sight(view.raw)) + _HASTE * (state.style.hurries > _HURRIED)
         if view.speed > (speed + _HASTE) / 3.6:
@@ -187,8 +187,8 @@ def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.rand
     if not is_dark(view.raw) or lit or view.time - state.conversation.lights_at < LIGHTS_INTERVAL:
         return
     conversation = state.conversation.after_mentioning_lights(view.time)
-    told = PARAMETER[Limit.NIGHT] in conversation.noticed.mentioned
-    state.conversation = conversation.with_noticed(conversation.noticed.with_mention(PARAMETER[Limit.NIGHT]))
+    told = conversation.noticed.has_mentioned(PARAMETER[Limit.NIGHT])
+    state.conversation = conversation.with_noticed(conversation.noticed.with_mention(PARAMETER[Limit.NIGHT], high=True))
     wording = Wording(lights=True)
     if rng.random() < 0.4:
         on = Proposition.of(Predicate.LIGHTS_ON, action=ActionValue.LIGHT_CHANGE)
