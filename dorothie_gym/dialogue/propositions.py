@@ -109,6 +109,10 @@ class Predicate(enum.StrEnum):
     """Nothing endangers the drive: no hazard, poor view or failed sensor."""
     BEHIND = "behind"
     """A landmark lies behind the car."""
+    PASSED = "passed"
+    """The car has driven past a landmark, a number of times."""
+    TRIED = "tried"
+    """An action, or all that was done to get to the place, has been tried a number of times in vain."""
     NEARER = "nearer"
     """The way to a landmark is shorter than that to another one."""
     # the tasks
@@ -172,6 +176,8 @@ PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
         Predicate.POSSIBLE: _ACTION,
         Predicate.SAFE: {},
         Predicate.BEHIND: _PLACE,
+        Predicate.PASSED: {**_PLACE, "times": int},
+        Predicate.TRIED: {"action": ActionValue, "times": int},
         Predicate.NEARER: {**_PLACE, "landmark": LandmarkName},
         Predicate.TASK: {**_PLACE, "street": StreetName, "status": GoalStatus},
         Predicate.ORDER: {"place": LandmarkName, "then": LandmarkName},

@@ -186,7 +186,7 @@ class SlotRealizer:
         return cardinal(round(self._wording.speed or 0))
 
     def distance(self) -> str:
-        """Returns the distance in tens of metres, in words."""
+        """Returns the distance in words: in tens of metres, or in metres below ten."""
         return self._length(self._wording.distance or 0)
 
     def metres(self) -> str:
@@ -196,7 +196,7 @@ class SlotRealizer:
         return self._length(metres)
 
     def _length(self, metres: float) -> str:
-        words = cardinal(max(10, 10 * round(metres / 10)))
+        words = cardinal(10 * round(metres / 10) if metres >= 9.5 else max(round(metres), 2))
         return f"{words} meters"
 
     def direction(self) -> str:

@@ -16,7 +16,7 @@ RAIN_LIMIT = 55.0
 USUAL_SPEED = 40
 """Cruise speed on open road where nothing is said about it [km/h]; the speed that route costs assume."""
 
-NUDGE_DISTANCE = 3.0
+NUDGE_DISTANCE = 2.0
 """Distance meant by "a bit further" [m]; shorter than the stretch around a goal that counts as arrived."""
 
 

@@ -10,6 +10,7 @@ from functools import lru_cache
 
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import LaneEntry
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, RouteProgress, lanes_beside
 from dorothie_gym.policies.route_tables import default_successor, is_choice
 from dorothie_gym.sim.network.lane_exits import side_by_side, ways_part
@@ -60,9 +61,9 @@ def next_turn(progress: RouteProgress, town: Town, station: float) -> RouteJunct
     crossing, legs, distance = progress.next_crossing(town, station), progress.legs, 0.0
     for k, leg in enumerate(legs[:-1]):
         following = legs[k + 1]
-        if crossing is not None and leg.lane == crossing.lane and following.lane == crossing.exit.connector:
-            break
         begin = leg.start if k else station
+        if crossing is not None and leg.lane == crossing.lane and following.lane == crossing.exit.connector:
+            return replace(crossing, distance=max(distance + leg.end - begin, crossing.distance))
         if following.entry in (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT):
             distance += max(following.start - begin, 0.0)  # the stations of lanes side by side are much the same
             continue

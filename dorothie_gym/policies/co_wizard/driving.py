@@ -35,6 +35,9 @@ CRUISE_TOLERANCE = 2.6
 STOP_MARGIN = 0.2
 """Distance by which Stop is commanded early rather than late [m]."""
 
+STARTING = 3.0
+"""Acceleration of a car that has just started [m/s^2]."""
+
 CREEP_LEAD, CREEP_RENEW = 16.0, 6.0
 """The guessed place of a close goal is put so far ahead, and renewed when it is nearer than the second value [m]."""
 
@@ -78,11 +81,19 @@ def _stop_at_place(state: CoWizardState, view: CoWizardView) -> Physical | None:
     if distance is None or passed:
         return None
     left = distance - stopping_distance(view.speed)
-    if left > view.speed * state.clock.interval / 2 + STOP_MARGIN:
+    later = left - _way_to_next_decision(state, view) if nudge is not None else left - view.speed * state.clock.interval
+    if left + later > 2.0 * STOP_MARGIN:
         return None
     state.intentions = state.intentions.stopped_at_place(arrived=state.beliefs.goal is not None)
     state.commands = state.commands.after_stop(view.time)
     return Physical(action=PhysicalAction.STOP)
+
+
+def _way_to_next_decision(state: CoWizardState, view: CoWizardView) -> float:
+    """Returns by how much farther a car that is starting would stop if it were stopped one decision later [m]."""
+    interval = state.clock.interval
+    then = view.speed + STARTING * interval
+    return (view.speed + then) / 2 * interval + stopping_distance(then) - stopping_distance(view.speed)
 
 
 def distance_ahead(state: CoWizardState, view: CoWizardView, place: Place) -> float | None:

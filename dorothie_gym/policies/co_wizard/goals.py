@@ -48,6 +48,7 @@ def aim(state: CoWizardState, view: CoWizardView, mark: SeenLandmark) -> None:
     goal = Mental(action=MentalAction.GOAL_UPDATE, goals=(mark.name,))
     beliefs = state.beliefs.with_known_goal(mark.name, mark.place).with_update(goal)
     state.beliefs = beliefs.with_status(mark.name, GoalStatus.ONGOING)
+    state.dialogue = state.dialogue.with_orders_settled()
     state.intentions = state.intentions.for_new_goal()
     state.route = state.route.for_new_goal()
     plan_route(state, view)

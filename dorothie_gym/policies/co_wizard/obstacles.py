@@ -7,13 +7,14 @@ import math
 import numpy as np
 
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, SlotValue
+from dorothie_gym.ontology import ActionValue, ObjectClass
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.goals import plan_route
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenObject, place_on_lanes
 from dorothie_gym.policies.route_progress import first_new_street, lanes_ahead
-from dorothie_gym.policies.speech import intend, remark
+from dorothie_gym.policies.speech import intend
 from dorothie_gym.spaces import Motion
 
 
@@ -38,22 +39,24 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
     state.speech = state.speech.cleared().plan(blocked)
     if state.route.progress is not None:
         state.dialogue = state.dialogue.with_detour_question(view.time)
-        values = _proposed_detour(state, view, rng)
-        state.say(remark(DialogueMove.QUERY_YN, *values, wording=Wording(topic="detour"), joined=True))
+        detour = _proposed_detour(state, view, rng)
+        state.say(intend(CommunicativeFunction.OFFER, detour, wording=Wording(topic="detour"), joined=True))
     else:
         state.dialogue = state.dialogue.after_asking(view.time)
-        state.say(remark(DialogueMove.QUERY_W, ActionValue.QUERIED, joined=True))
+        way = contents.action(ActionValue.QUERIED)
+        state.say(intend(CommunicativeFunction.SET_QUESTION, way, joined=True))
     state.intentions = state.intentions.blocked()
 
 
-def _proposed_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> tuple[SlotValue, ...]:
-    """Returns the slots of a proposed detour: a street, a U-turn, or nothing in particular."""
+def _proposed_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> Proposition:
+    """Returns a proposed detour: over a street, by a U-turn, or in no particular way."""
     assert state.route.progress is not None
     route = state.route.progress.replanned(state.town, view.here, state.route.blocked)
     street = first_new_street(view.raw, state.town, view.lane, route)
     if street is not None and rng.random() < state.config.detour_by_street:
-        return (street,)
-    return (ActionValue.U_TURN,) if route.turns_round_first(state.town, view.station) and rng.random() < 0.5 else ()
+        return contents.action(None, street=street)
+    turns_round = route.turns_round_first(state.town, view.station) and rng.random() < 0.5
+    return contents.action(ActionValue.U_TURN if turns_round else None)
 
 
 def _obstacle_on_path(state: CoWizardState, view: CoWizardView) -> SeenObject | None:
@@ -88,6 +91,8 @@ def take_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generat
         return
     street = first_new_street(view.raw, state.town, view.lane, progress)
     if street is not None:
-        state.say(remark(DialogueMove.CONFIRM, street, wording=Wording(topic="detour")))
+        over = contents.action(None, street=street)
+        state.say(intend(CommunicativeFunction.CONFIRM, over, wording=Wording(topic="detour")))
     if progress.turns_round_first(state.town, view.station) and rng.random() < 0.6:
-        state.say(remark(DialogueMove.EXPLAIN, ActionValue.U_TURN, joined=street is not None))
+        turn = contents.action(ActionValue.U_TURN)
+        state.say(intend(CommunicativeFunction.INFORM, turn, joined=street is not None))

@@ -119,6 +119,8 @@ def _update_route(state: CoWizardState, view: CoWizardView) -> None:
     if view.motion is Motion.HAZARD and view.hazard is ObjectClass.TRAFFIC_LIGHT:
         # the manoeuvre cannot begin before the light is green
         state.intentions = state.intentions.wishing_until(view.time + state.config.red_light_extension)
+    if view.standing:
+        state.intentions = state.intentions.slow_longer(state.clock.interval)
     _pass_junction(state, view)
     if state.route.progress is None or view.manoeuvring:
         return

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Direction, ParsedText
+from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies import contents
+from dorothie_gym.policies.co_wizard.goals import doubt
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import intend
@@ -25,22 +26,32 @@ def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) ->
     return guided and not view.standing and (state.intentions.creeping or "here" in words.text.lower().split())
 
 
-def note_contradiction(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> None:
-    """Counts instructions that lead away from the route to a destination on the map."""
+def note_contradiction(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> bool:
+    """Counts an instruction that leads away from the route to a destination on the map; returns whether it does."""
     if not _contradicts(state, view, action, words):
-        return
+        return False
     goal, count = state.dialogue.contradicted
     count = count + 1 if goal is state.beliefs.goal else 1
     state.dialogue = state.dialogue.with_contradictions(state.beliefs.goal, count)
+    return True
 
 
 def check_goal(state: CoWizardState, view: CoWizardView) -> None:
-    """Checks a destination against whose route repeated instructions were given."""
+    """Checks a destination against whose route instructions were given; if they go on, gives up its place.
+
+    The name may be right and the place wrong: there are several houses.
+    """
     goal, count = state.dialogue.contradicted
     if goal is None or goal is not state.beliefs.goal or count < state.config.contradictions:
         return
-    state.dialogue = state.dialogue.with_contradictions(goal, 0).after_asking(view.time)
-    state.say(intend(Function.CHECK_QUESTION, contents.destination(goal)))
+    if count == state.config.contradictions:
+        state.dialogue = state.dialogue.after_asking(view.time)
+        state.say(intend(Function.CHECK_QUESTION, contents.destination(goal)))
+    elif count >= 2 * state.config.contradictions:
+        state.dialogue = state.dialogue.with_contradictions(goal, 0)
+        doubt(state)
+        unknown = Proposition.of(Predicate.KNOWS, negated=True, place=goal)
+        state.say(intend(Function.INFORM, unknown, elided=("place",)))
 
 
 def _contradicts(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> bool:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from dorothie_gym.dialogue import Direction, Proposition
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import (
+    ActionValue,
     GoalStatus,
     LandmarkName,
     MentalAction,
@@ -66,6 +67,7 @@ class DialogueState:
         steered_at: time of the last navigation instruction [s].
         stop_instructed_at: time of the last instruction to stop [s].
         u_turn_instructed_at: time of the last instruction to turn round [s].
+        orders: latest U-turns and lane changes that the participant asked for, with their times [s].
         proposed: turn proposed to the participant and not answered yet.
         offer: place proposed as the first destination and not answered yet.
         slower: speed that was proposed and not answered yet [km/h].
@@ -87,6 +89,7 @@ class DialogueState:
     steered_at: float = -math.inf
     stop_instructed_at: float = -math.inf
     u_turn_instructed_at: float = -math.inf
+    orders: tuple[tuple[ActionValue, float], ...] = ()
     proposed: Directive | None = None
     offer: LandmarkName | None = None
     slower: int | None = None
@@ -126,6 +129,15 @@ class DialogueState:
     def after_u_turn_instruction(self, now: float) -> DialogueState:
         """Records an instruction to turn round at `now` [s]."""
         return replace(self, u_turn_instructed_at=now)
+
+    def after_order(self, action: ActionValue, now: float, since: float) -> DialogueState:
+        """Records an order at `now`, and forgets those before `since` [s]."""
+        recent = tuple(pair for pair in self.orders if pair[1] >= since)
+        return replace(self, orders=(*recent, (action, now)))
+
+    def with_orders_settled(self) -> DialogueState:
+        """Forgets the latest orders: a new goal, or another way is tried."""
+        return replace(self, orders=())
 
     def busy(self, now: float) -> DialogueState:
         """Restarts the period without a task at `now` [s]."""
@@ -399,6 +411,10 @@ class Intentions:
     def with_speed(self, speed: int) -> Intentions:
         """Sets the target cruise speed [km/h]; the usual one stays."""
         return replace(self, speed=speed)
+
+    def slow_longer(self, seconds: float) -> Intentions:
+        """Extends a temporary speed, by the time that the car stands [s]."""
+        return replace(self, slow_until=self.slow_until + seconds)
 
     def with_asked_speed(self, speed: int, open_road: int, until: float) -> Intentions:
         """Sets the cruise speed that was asked for [km/h].

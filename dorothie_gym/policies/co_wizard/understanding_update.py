@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from dorothie_gym.policies.co_wizard.goals import (
 from dorothie_gym.policies.co_wizard.judgement import believes
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, is_garbled, note_contradiction
+from dorothie_gym.policies.co_wizard.repetition import note_order
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.story import remember
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -119,23 +120,13 @@ def _instruction(
         if state.speech.idle and rng.random() > state.style.silent:
             state.say(intend(Function.POSITIVE_FEEDBACK))
     elif actions:
-        if state.intentions.arrived and _STEERING & set(actions) and not words.further:
-            doubt(state)
-        state.dialogue = state.dialogue.with_proposal(None)
-        if _STEERING & set(actions):
-            state.dialogue = state.dialogue.after_steering(view.time)
-            if not state.beliefs.exact:  # the car is guided and need not search for the place
-                state.route = state.route.with_progress(None)
-        note_contradiction(state, view, actions[0], words)
-        for action in actions:
-            _OBEYED[action](state, view, act, words)
-        acknowledge(state, view, actions[0], words, rng)
-        check_goal(state, view)
+        _obey(state, view, act, actions, words, rng)
     elif streets:
         _instructed_street(state, view, streets[0])
     elif state.dialogue.detour_asked_at is not None:
         take_detour(state, view, rng)
     elif not act.slots:
+        state.dialogue = state.dialogue.with_orders_settled()  # perhaps another way is going to be tried
         _senseless(state, view, act, words, asks=state.beliefs.goal is None or is_garbled(words))
 
 
@@ -149,6 +140,31 @@ def _senseless(
     if asks:
         state.say(intend(Function.NEGATIVE_FEEDBACK))
     return asks
+
+
+def _obey(
+    state: CoWizardState,
+    view: CoWizardView,
+    act: DialogueAct,
+    actions: Sequence[ActionValue],
+    words: ParsedText,
+    rng: np.random.Generator,
+) -> None:
+    """Carries out actions that were asked for, and acknowledges them."""
+    if state.intentions.arrived and _STEERING & set(actions) and not words.further:
+        doubt(state)
+    state.dialogue = state.dialogue.with_proposal(None)
+    if _STEERING & set(actions):
+        state.dialogue = state.dialogue.after_steering(view.time)
+        if not state.beliefs.exact:  # the car is guided and need not search for the place
+            state.route = state.route.with_progress(None)
+    contradicts = note_contradiction(state, view, actions[0], words)
+    for action in actions:
+        _OBEYED[action](state, view, act, words)
+    acknowledge(state, view, actions[0], words, rng)
+    note_order(state, view, actions[0])
+    if contradicts:
+        check_goal(state, view)
 
 
 def _instructed_place(

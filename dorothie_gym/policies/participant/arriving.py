@@ -9,10 +9,12 @@ import numpy as np
 from dorothie_gym.dialogue import SpeakerStyle, Wording, speech_seconds, word_act
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
+from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import stopping_distance
-from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.speech import Remark
 
 STOP_REPEAT = 5.0
 """Time after which the stop instruction is repeated [s]."""
@@ -26,8 +28,17 @@ BRAKING = 0.2
 GAIN_RANGE = (-2.0, 2.0)
 """Range of accelerations that are extrapolated [m/s^2]."""
 
+FURTHER = 5.0
+"""Distance to the place up to which "a bit further" is said, and above which metres [m]."""
+
+SHORT_RESERVE = 1.0
+"""Distance by which short spoken distances are shortened [m]."""
+
 SHOUTS = 3
 """Number of short wordings that are compared when there is only time for a shout."""
+
+BEHIND_CORNER = 5.0
+"""Distance from the beginning of a lane within which a car has just turned and is about to speed up [m]."""
 
 STANDING_RANGE = 45.0
 """Distance to the place within which a standing car gets its next instruction [m]."""
@@ -65,7 +76,8 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     if _is_time_to_stop(state, view, left):
         if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > 0.0:
             state.guidance = state.guidance.after_stopping(view.time)
-            state.say(Remark(act=_STOP, text=state.guidance.stop_text, urgent=True))
+            stop = order(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
+            state.say(replace(stop, text=state.guidance.stop_text))
         return True
     if close and not state.guidance.approach_announced and view.speed > config.slow_speed:
         _announce_place(state, view, left)
@@ -85,9 +97,9 @@ def _announce_place(state: ParticipantState, view: ParticipantView, left: float)
         return
     if left > 3.5 * speed + 20.0:
         wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
-        words = remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, goal.name, wording=wording, urgent=True)
+        words = order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording, place=goal.name, urgent=True)
     elif left > 3.0 * speed + 12.0:
-        words = remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=Wording(faster=False), urgent=True)
+        words = order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, Wording(faster=False), urgent=True)
     else:
         return
     state.guidance = state.guidance.with_approach_announced(True)
@@ -104,8 +116,9 @@ def about_to_arrive(state: ParticipantState, view: ParticipantView) -> bool:
 
 def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> bool:
     """Returns whether a stop instruction given now stops the car closer to the place than one at the next decision."""
-    if state.guidance.approach_announced and left > state.config.slow_distance:
-        return False  # the car is about to slow down
+    slow = view.speed < max(state.motion.speed, state.config.slow_speed)
+    if state.guidance.approach_announced and left > state.config.slow_distance and slow:
+        return False  # the car is slowing down
     room, after = _room_to_stop(state, view, left)
     return room <= (state.config.short_stop if state.route.misses else 0.0) or room < -after
 
@@ -119,7 +132,9 @@ def _room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -
     interval, config = state.clock.interval, state.config
     delay = math.ceil(speech_seconds(state.guidance.stop_text) / interval - 1e-6) * interval
     gain = min(max((view.speed - state.motion.speed) / interval, GAIN_RANGE[0]), GAIN_RANGE[1])
-    if gain > config.start_pull:
+    corner = state.town.lanes[view.lane].in_junction or view.station < BEHIND_CORNER
+    speeds_up = corner and not state.guidance.slowed_early and view.speed < config.soon_speed
+    if gain > config.start_pull or speeds_up:
         gain = config.pull
     now, top = view.speed, max(config.top_speed, view.speed)
     soon = min(max(now + gain * interval, 0.0), top)
@@ -149,6 +164,6 @@ def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
     left = state.route.progress.left(view.station)
     if left > 30.0:
         state.guidance = state.guidance.with_approach_announced(False)
-    shortened = max(left - state.config.distance_reserve, 10.0)
-    wording = Wording(distance=shortened) if left > 9.0 else Wording(topic="further")
-    return remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording=wording)
+    reserve = state.config.distance_reserve if left > 18.0 else SHORT_RESERVE
+    wording = Wording(distance=left - reserve) if left > FURTHER else Wording(topic="further")
+    return order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording)

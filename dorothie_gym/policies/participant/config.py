@@ -41,7 +41,7 @@ class ParticipantConfig(GuidanceConfig):
         run_up: least distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
-        most_u_turns: number of U-turns for one goal after which another route is used.
+        way_round_cost: extra cost of each lane change and U-turn after failures [m].
         off_route: number of decisions off the route after which a new one is planned.
         missed_within: distance to the goal below which leaving the route counts as a miss [m].
         wrong_turn_detour: increase of the distance after which a wrong turn is pointed out [m].
@@ -99,7 +99,7 @@ class ParticipantConfig(GuidanceConfig):
     run_up: float = 45.0
     run_up_per_lane: float = 50.0
     lane_return_time: float = 30.0
-    most_u_turns: int = 3
+    way_round_cost: float = 150.0
     off_route: int = 3
     missed_within: float = 15.0
     wrong_turn_detour: float = 60.0

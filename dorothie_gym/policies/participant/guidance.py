@@ -6,19 +6,35 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Wording, speech_seconds, word_act
+from dorothie_gym.dialogue import (
+    CommunicativeFunction,
+    Direction,
+    Predicate,
+    Proposition,
+    Wording,
+    speech_seconds,
+    word_act,
+)
 from dorothie_gym.maps.routing import LaneEntry
-from dorothie_gym.ontology import ActionValue, DialogueMove, Role, Slot, SlotValue, StreetName
+from dorothie_gym.ontology import ActionValue, DialogueMove, Role, Slot, StreetName
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, approach
 from dorothie_gym.policies.participant.hints import hint
+from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.retrying import (
+    IN_VAIN,
+    ask_why_standing,
+    remark_on_miss,
+    remark_on_wrong_turn,
+    stop_circling,
+)
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_legs import END_ROOM
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, find_exit, next_choice
-from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import leads_beside, next_turn, turn_lanes
 
 ANNOUNCING_TIME = 1.5
@@ -47,10 +63,12 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
         state.set_guiding(True)
     if former.astray >= config.off_route or passed:
         state.route = state.route.replanned(state.town, view.place)
-        missed = before < config.missed_within or state.route.has_missed(before, view.station)
+        drove_past = before < config.missed_within and former.next_manoeuvre(view.station) is None
+        missed = drove_past or state.route.has_missed(before, view.station)
         if state.guidance.guiding and missed:
             state.guidance = state.guidance.after_miss()
             state.route = state.route.after_miss(state.town, view.place, former)
+            remark_on_miss(state, view, passed=drove_past)
         state.guidance = state.guidance.for_another_approach()
         _point_out_wrong_turn(state, view, before)
     assert state.route.progress is not None
@@ -71,9 +89,17 @@ def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before
     assert progress is not None
     turn_given = guidance.guiding and guidance.step is not None and guidance.step[0] == "turn"
     farther = progress.left(view.station) > before + state.config.wrong_turn_detour and math.isfinite(before)
-    if turn_given and farther:
+    if turn_given and farther and not remark_on_wrong_turn(state, view):
         expires = view.time + WRONG_WAY_EXPIRES
-        state.say_only(remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way"), expires=expires))
+        state.say_only(_wrong_way(state, expires))
+
+
+def _wrong_way(state: ParticipantState, expires: float = math.inf) -> Remark:
+    """Returns the remark that the car has left the way to the place."""
+    place = None if state.task.goal is None else state.task.goal.name
+    wrong = Proposition.of(Predicate.RIGHT_WAY, negated=True, place=place)
+    wording = Wording(topic="wrong_way")
+    return intend(CommunicativeFunction.INFORM, wrong, elided=("place",), wording=wording, expires=expires)
 
 
 def watch(state: ParticipantState, view: ParticipantView) -> None:
@@ -87,7 +113,7 @@ def watch(state: ParticipantState, view: ParticipantView) -> None:
         return
     lost = left > state.guidance.best + config.lost_detour
     if lost:
-        state.say(remark(DialogueMove.EXPLAIN, wording=Wording(topic="wrong_way")))
+        state.say(_wrong_way(state))
     stuck = state.motion.standstill(view.time) > config.lost_standstill and view.time > state.motion.excused_until
     if lost or stuck:
         state.set_guiding(True)
@@ -98,7 +124,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     progress, config = state.route.progress, state.config
     if progress is None or not state.task.announced or view.turning or progress.astray:
         return
-    _stop_circling(state, view)
+    stop_circling(state, view)
     if not _may_speak(state, view) or approach(state, view, rng) or not state.guidance.guiding:
         return
     step = next_step(state, view, DialogueMove.INSTRUCT, rng)
@@ -118,8 +144,12 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         near = True
     stuck = view.standing and waited > config.repeat_after and view.time > state.motion.excused_until
     if not near and stuck:
-        key, words = ("on", view.lane, 0), remark(DialogueMove.INSTRUCT, ActionValue.START)
+        key, words = ("on", view.lane, 0), order(DialogueMove.INSTRUCT, ActionValue.START)
         near = True
+    if stuck and state.guidance.step == key and state.guidance.repeats + 1 >= IN_VAIN:
+        note_step(state, view, ("why", view.lane, 0))
+        ask_why_standing(state, view)
+        return
     overdue = stuck or (key[0] != "turn" and waited > config.repeat_after)
     changing = state.guidance.step is not None and state.guidance.step[0] == "lane"
     switching = changing and view.time - state.guidance.step_at < config.switch_time
@@ -131,19 +161,6 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
             words = replace(words, wording=replace(words.wording, topic="indirect"))
         note_step(state, view, key)
         state.say(*_with_addition(state, view, words, again, rng))
-
-
-def _stop_circling(state: ParticipantState, view: ParticipantView) -> None:
-    """Chooses another route after repeated U-turns for the target, or repeated lane changes on a lane."""
-    progress, guidance = state.route.progress, state.guidance
-    assert progress is not None
-    in_vain = sum(lane == view.lane for lane, _ in guidance.lane_changes) > 1
-    if guidance.u_turns < state.config.most_u_turns and not in_vain:
-        return
-    way_in = (view.lane, state.town.lanes[view.lane].length / 2) if in_vain else progress.way_in()
-    state.guidance = guidance.without_circling(view.lane)
-    if way_in is not None:
-        state.route = state.route.avoiding(state.town, view.place, way_in)
 
 
 def _may_speak(state: ParticipantState, view: ParticipantView) -> bool:
@@ -163,9 +180,9 @@ def _with_addition(
         drawn = [word_act(words.act, Role.PARTICIPANT, rng, words.wording, style=state.speech.style) for _ in range(2)]
         return (replace(words, text=min(drawn, key=speech_seconds)),)
     if again and rng.random() < 0.25:
-        return words, remark(DialogueMove.ALIGN, joined=True)
+        return words, intend(CommunicativeFunction.FEEDBACK_ELICITATION, joined=True)
     if draw < state.style.aligns:
-        return words, remark(DialogueMove.ALIGN, joined=True)
+        return words, intend(CommunicativeFunction.FEEDBACK_ELICITATION, joined=True)
     if draw < state.style.aligns + 0.7 * state.style.reasons:
         return words, *hint(state, view, rng)
     return (words,)
@@ -204,7 +221,7 @@ def _slow_down_early(state: ParticipantState, view: ParticipantView) -> bool:
         return False
     state.guidance = state.guidance.after_slowing_early()
     wording = Wording(faster=False, speed=config.careful_speed)
-    state.say(remark(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording=wording))
+    state.say(order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording))
     return True
 
 
@@ -263,7 +280,7 @@ def _send_on(state: ParticipantState, view: ParticipantView) -> None:
     waited = view.time - max(state.guidance.step_at, state.conversation.heard_at, state.speech.last_end)
     if view.standing and waited > state.config.ready_time and view.time > state.motion.excused_until:
         note_step(state, view, ("on", view.lane, 0))
-        state.say(remark(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW))
+        state.say(order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW))
 
 
 def note_step(state: ParticipantState, view: ParticipantView, key: StepKey) -> None:
@@ -289,7 +306,7 @@ def next_step(
     manoeuvre = progress.next_manoeuvre(view.station)
     u_turn = manoeuvre is not None and manoeuvre[0] is LaneEntry.U_TURN
     if manoeuvre is not None and u_turn and (crossing is None or manoeuvre[1] < crossing.distance):
-        return ("round", 0, 0), manoeuvre[1], remark(move, ActionValue.U_TURN)
+        return ("round", 0, 0), manoeuvre[1], order(move, ActionValue.U_TURN)
     switch = manoeuvre is not None and (
         crossing is None or (manoeuvre[1] < crossing.distance and _needs_switch(state, view, crossing))
     )
@@ -299,8 +316,8 @@ def next_step(
     if manoeuvre is not None:
         left = manoeuvre[0] is LaneEntry.CHANGE_LEFT
         wording = Wording(direction=Direction.LEFT if left else Direction.RIGHT)
-        return ("lane", view.lane, int(left)), manoeuvre[1], remark(move, ActionValue.LANE_SWITCH, wording=wording)
-    return ("on", view.lane, 0), progress.left(view.station), remark(move, ActionValue.LANE_FOLLOW)
+        return ("lane", view.lane, int(left)), manoeuvre[1], order(move, ActionValue.LANE_SWITCH, wording)
+    return ("on", view.lane, 0), progress.left(view.station), order(move, ActionValue.LANE_FOLLOW)
 
 
 def _needs_switch(state: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:
@@ -323,14 +340,14 @@ def _turn_remark(
     action = ActionValue.J_TURN
     if direction is Direction.STRAIGHT and (move is not DialogueMove.INSTRUCT or rng.random() < 0.6):
         action = ActionValue.LANE_FOLLOW
-    values: list[SlotValue] = [action]
+    onto: StreetName | None = None
     street = street_of(view.raw, state.town, crossing.exit.lane)
     helps = street is not StreetName.UNKNOWN and direction is not Direction.STRAIGHT
     if helps and (_is_ambiguous(state, view, crossing) or rng.random() < state.style.names_street * 0.6):
-        values.append(street)
+        onto = street
     first = crossing.distance < 60.0 or rng.random() < 0.5
-    ordinal = 1 if first and len(values) == 1 and action is ActionValue.J_TURN and rng.random() < 0.5 else None
-    return remark(move, *values, wording=Wording(direction=direction, ordinal=ordinal))
+    ordinal = 1 if first and onto is None and action is ActionValue.J_TURN and rng.random() < 0.5 else None
+    return order(move, action, Wording(direction=direction, ordinal=ordinal), street=onto)
 
 
 def _is_ambiguous(state: ParticipantState, view: ParticipantView, crossing: RouteJunction) -> bool:

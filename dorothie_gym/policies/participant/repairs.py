@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import ParsedText, speech_seconds
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Slot, SlotValue
+from dorothie_gym.dialogue import CommunicativeFunction, ParsedText, speech_seconds
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Slot
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.speech import Remark, remark
+from dorothie_gym.policies.speech import Remark, intend, repeated
 
 _WORTH_REPEATING = frozenset({DialogueMove.EXPLAIN, DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueMove.QUERY_W})
 """Moves that the participant asks to have repeated."""
@@ -36,7 +37,7 @@ def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtter
     if not (spoke_meanwhile and matters and state.speech.idle and rng.random() < state.style.puzzled):
         return False
     state.conversation = state.conversation.with_puzzle(heard)
-    state.say_first(remark(DialogueMove.CONFUSE))
+    state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
     return True
 
 
@@ -71,10 +72,8 @@ def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None
         return None
     if act.move is DialogueMove.EXPLAIN and GoalStatus.UNKNOWN not in act.slots:
         return None  # a remark about something in sight
-    values: list[SlotValue] = [goal.name]
-    if goal.street.label not in ("Unknown", "Queried"):
-        values.append(goal.street)
-    return remark(DialogueMove.CLARIFY, *values)
+    street = goal.street if goal.street.label not in ("Unknown", "Queried") else None
+    return intend(CommunicativeFunction.CORRECTION, contents.destination(goal.name, street))
 
 
 def _revives(state: ParticipantState, act: DialogueAct, named: set[SlotValue]) -> bool:
@@ -98,5 +97,5 @@ def _corrected_side(
         same = set(item.act.values(Slot.ACTION)) & set(act.values(Slot.ACTION)) & set(_SIDEWAYS)
         if wanted is not None and same:
             right = wanted is words.direction
-            return None if right else remark(DialogueMove.CLARIFY, *item.act.slots, wording=item.wording)
+            return None if right else repeated(item, CommunicativeFunction.CORRECTION)
     return None

@@ -196,6 +196,8 @@ class GuidanceState:
         step_at: time at which it was announced [s].
         repeats: number of repetitions of that step.
         u_turns: number of U-turns announced on the way to the target.
+        passes: number of times that the car has driven past the place.
+        wrong_turns: turns that were announced and not taken.
         lane_changes: lanes that the car was instructed to leave, and the times of the instructions [s].
         approach_announced: whether the car has been informed that the place is near.
         slowed_early: whether it has been asked to slow down because the place is easily missed.
@@ -212,6 +214,8 @@ class GuidanceState:
     step_at: float = -math.inf
     repeats: int = 0
     u_turns: int = 0
+    passes: int = 0
+    wrong_turns: tuple[StepKey, ...] = ()
     lane_changes: tuple[tuple[int, float], ...] = ()
     approach_announced: bool = False
     slowed_early: bool = False
@@ -261,6 +265,10 @@ class GuidanceState:
     def after_reminding(self) -> GuidanceState:
         """Counts a repetition."""
         return replace(self, repeats=self.repeats + 1)
+
+    def after_wrong_turn(self, step: StepKey) -> GuidanceState:
+        """Records a turn that was not taken."""
+        return replace(self, wrong_turns=(*self.wrong_turns, step))
 
     def without_circling(self, lane: int) -> GuidanceState:
         """Restarts the counts of U-turns, and of lane changes on a lane."""

@@ -1,0 +1,41 @@
+"""Orders that the participant repeats in vain: the Co-Wizard remarks on it, and asks for another way."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
+from dorothie_gym.ontology import ActionValue
+from dorothie_gym.policies import contents
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.speech import intend
+
+REPEATED: Final = 3
+"""Number of the equal order that is remarked on."""
+
+MEMORY: Final = 120.0
+"""Time within which orders count as repeated [s]."""
+
+_COUNTED: Final = frozenset({ActionValue.U_TURN, ActionValue.LANE_SWITCH})
+
+
+def note_order(state: CoWizardState, view: CoWizardView, action: ActionValue) -> None:
+    """Records an order that is obeyed; remarks on the third equal one, and asks for another way.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        action: the action asked for.
+    """
+    if action not in _COUNTED:
+        return
+    state.dialogue = state.dialogue.after_order(action, view.time, view.time - MEMORY)
+    if sum(known is action for known, _ in state.dialogue.orders) < REPEATED:
+        return
+    state.dialogue = state.dialogue.with_orders_settled()
+    tried = Proposition.of(Predicate.TRIED, action=action, times=REPEATED - 1)
+    remark = intend(CommunicativeFunction.INFORM, tried, elided=("action", "times"), wording=Wording(topic="tried"))
+    way = contents.action(ActionValue.QUERIED)
+    question = intend(CommunicativeFunction.SET_QUESTION, way, wording=Wording(topic="another_way"), joined=True)
+    state.say(remark, question)

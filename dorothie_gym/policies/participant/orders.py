@@ -1,0 +1,53 @@
+"""Orders of the participant: what the car is to do, asked for, answered, or said again."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Final
+
+from dorothie_gym.dialogue import CommunicativeFunction, Wording
+from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, StreetName
+from dorothie_gym.policies import contents
+from dorothie_gym.policies.speech import Remark, intend
+
+_FUNCTIONS: Final = MappingProxyType(
+    {
+        DialogueMove.INSTRUCT: CommunicativeFunction.REQUEST,
+        DialogueMove.REPLY_W: CommunicativeFunction.ANSWER,
+        DialogueMove.CLARIFY: CommunicativeFunction.CORRECTION,
+    }
+)
+"""What is done with an order, by the move."""
+
+
+def order(
+    move: DialogueMove,
+    action: ActionValue,
+    wording: Wording | None = None,
+    *,
+    street: StreetName | None = None,
+    place: LandmarkName | None = None,
+    urgent: bool = False,
+) -> Remark:
+    """Returns the remark that the car is to carry out an action.
+
+    Args:
+        move: an instruction, an answer to an open question, or a clarification.
+        action: the action.
+        wording: further particulars; direction and speed are part of the content.
+        street: street on which, or onto which.
+        place: place at which.
+        urgent: whether it may be said without leaving the car time to answer.
+
+    Raises:
+        KeyError: the move is none of the three.
+    """
+    particulars = Wording() if wording is None else wording
+    wanted = contents.action(
+        action,
+        direction=particulars.direction,
+        street=street,
+        place=place,
+        speed=None if particulars.speed is None else round(particulars.speed),
+    )
+    return intend(_FUNCTIONS[move], wanted, wording=particulars, urgent=urgent)

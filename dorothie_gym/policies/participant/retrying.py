@@ -1,0 +1,108 @@
+"""Another attempt, and a remark about it, where the guidance of the participant has failed twice in the same way."""
+
+from __future__ import annotations
+
+from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
+from dorothie_gym.maps.routing import LaneEntry
+from dorothie_gym.ontology import ActionValue
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.route_progress import RouteProgress
+from dorothie_gym.policies.speech import Remark, intend
+
+IN_VAIN = 2
+"""Number of failures after which something else is tried."""
+
+REMARK_EXPIRES = 8.0
+"""Time after which a remark about a failure is no longer said [s]."""
+
+
+def remark_on_miss(state: ParticipantState, view: ParticipantView, *, passed: bool) -> None:
+    """Remarks that the place was missed again, and goes round the block instead of turning round.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        passed: whether the car has driven past the place; otherwise it has left the way shortly before it.
+    """
+    state.guidance = replace(state.guidance, passes=state.guidance.passes + passed)
+    passes, goal = state.guidance.passes, state.task.goal
+    if state.route.misses < IN_VAIN or goal is None:
+        return
+    if passed and passes >= IN_VAIN:
+        missed = Proposition.of(Predicate.PASSED, place=goal.name, times=passes)
+        elided, wording = ("place", "times"), Wording(topic="passed_again")
+        reason = intend(CommunicativeFunction.INFORM, missed, elided=elided, wording=wording, expires=_soon(view))
+    else:
+        reason = _in_vain(view, None, "tried")
+    _try_another_way(state, view, reason)
+
+
+def remark_on_wrong_turn(state: ParticipantState, view: ParticipantView) -> bool:
+    """Counts a turn that was announced and not taken; returns whether another way is tried because of it."""
+    step = state.guidance.step
+    assert step is not None
+    state.guidance = state.guidance.after_wrong_turn(step)
+    if state.guidance.wrong_turns.count(step) < IN_VAIN:
+        return False
+    state.guidance = replace(state.guidance, wrong_turns=())
+    connector = step[2]
+    closed = (connector, state.town.lanes[connector].length / 2)
+    state.route = state.route.avoiding(state.town, view.place, closed)
+    _try_another_way(state, view, _in_vain(view, ActionValue.J_TURN, "tried_turn"))
+    return True
+
+
+def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
+    """Chooses another way after U-turns or lane changes that did not bring the car on its way."""
+    progress, guidance = state.route.progress, state.guidance
+    assert progress is not None
+    manoeuvre = progress.next_manoeuvre(view.station)
+    if manoeuvre is None or (guidance.step is None and not guidance.u_turns):
+        return
+    turns_again = manoeuvre[0] is LaneEntry.U_TURN and guidance.u_turns >= IN_VAIN
+    asked = sum(lane == view.lane for lane, _ in guidance.lane_changes)
+    if guidance.step is not None and guidance.step[:2] == ("lane", view.lane):
+        asked = max(asked, guidance.repeats + 1)
+    changes_again = manoeuvre[0] is not LaneEntry.U_TURN and asked >= IN_VAIN
+    if not turns_again and not changes_again:
+        return
+    state.guidance = guidance.without_circling(view.lane)
+    if changes_again:
+        closed = (view.lane, state.town.lanes[view.lane].length / 2)
+        state.route = state.route.avoiding(state.town, view.place, closed)
+        tried = _in_vain(view, ActionValue.LANE_SWITCH, "tried_lane")
+    else:
+        tried = _in_vain(view, ActionValue.U_TURN, "tried_u_turn")
+    _try_another_way(state, view, tried)
+
+
+def ask_why_standing(state: ParticipantState, view: ParticipantView) -> None:
+    """Asks why the car stands although it was told to drive on, instead of telling it a third time."""
+    stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
+    state.conversation = state.conversation.after_asking_why(view.time)
+    state.say(intend(CommunicativeFunction.SET_QUESTION, stands))
+
+
+def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> Remark:
+    tried = Proposition.of(Predicate.TRIED, action=action, times=IN_VAIN)
+    wording = Wording(topic=topic)
+    return intend(CommunicativeFunction.INFORM, tried, elided=("action", "times"), wording=wording, expires=_soon(view))
+
+
+def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Remark) -> None:
+    """Plans a way that avoids manoeuvres, and says why."""
+    progress = state.route.progress
+    assert progress is not None
+    cost = state.config.way_round_cost
+    progress = RouteProgress.plan(state.town, view.place, progress.goal, state.route.closed, cost)
+    state.route = state.route.with_progress(progress)
+    state.guidance = replace(state.guidance, u_turns=0, step=None, best=progress.left(view.station))
+    another = Proposition.of(Predicate.WILL)
+    way = intend(CommunicativeFunction.REQUEST, another, wording=Wording(topic="another_way"), joined=True)
+    state.say_only(reason, way)
+
+
+def _soon(view: ParticipantView) -> float:
+    return view.time + REMARK_EXPIRES
