@@ -104,7 +104,7 @@ def test_u_turn_leaves_enough_road_to_stop() -> None:
             if run_up / 2 < rest[0] < run_up + 5.0 or not journey.turns_round_on(lane.id):
                 continue
             human.state.speech = human.state.speech.cleared()
-            human.state.guidance = replace(human.state.guidance, step=None)
+            human.state.guidance = replace(human.state.guidance, step=None, u_turns=0)
             announced[rest[0] > run_up].append(ActionValue.U_TURN in human.says())
     assert announced[True] and all(announced[True])
     assert announced[False] and not any(announced[False])

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from dorothie_gym.analysis.exception_attribution import kind_of, times_mentioned
+from dorothie_gym.analysis.talk.loops import has_loop
 from dorothie_gym.analysis.talk.perceivable import perceived_at
 from dorothie_gym.analysis.talk.session_world import SessionWorld
 from dorothie_gym.analysis.talk.truth import agrees, is_true
@@ -17,7 +18,7 @@ from dorothie_gym.analysis.units import Units
 from dorothie_gym.dialogue import ASKED, Predicate, Proposition
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role, Slot
+from dorothie_gym.ontology import DialogueMove, LandmarkName
 from dorothie_gym.recording import Corpus, EventType, MoveRecord, Session
 from dorothie_gym.tasks.purposes import find_items, read_people
 
@@ -26,9 +27,6 @@ TALKED_ABOUT_WITHIN: Final = 45.0
 
 ANSWERED_WITHIN: Final = 10.0
 """Time within which an answer belongs to a question [s]."""
-
-SAME_ORDERS: Final = 3
-"""Number of equal orders in a row that make a loop."""
 
 _FACTUAL: Final = frozenset(
     {
@@ -47,7 +45,7 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
         "yes_no_answers": "yes and no that are right",
         "relevance": "answers to what was asked",
         "story": "sessions that mention somebody or something of the story",
-        "loops": "sessions without an order given three times in a row",
+        "loops": "sessions without an order given three times at one place, unremarked",
     }
 )
 """Titles of the figures besides those of the exceptions."""
@@ -202,19 +200,3 @@ def mentions_story(session: Session) -> bool | None:
         return None
     said = " ".join(move.span for move in session.moves()).casefold()
     return any(re.search(rf"\b{re.escape(words)}\b", said) for words in wanted)
-
-
-def has_loop(session: Session) -> bool:
-    """Returns whether a speaker gave the same order `SAME_ORDERS` times in a row, with nothing else in between."""
-    last: Mapping[Role, tuple[DialogueAct, int]] = {}
-    for move in session.moves():
-        act = move.act
-        if act.move is not DialogueMove.INSTRUCT:
-            continue
-        turns = ActionValue.LANE_FOLLOW not in act.values(Slot.ACTION) and act.values(Slot.ACTION)
-        before, count = last.get(move.speaker, (None, 0))
-        count = count + 1 if turns and before == act else 1
-        last = {**last, move.speaker: (act, count)}
-        if count >= SAME_ORDERS:
-            return True
-    return False

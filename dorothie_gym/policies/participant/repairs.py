@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dorothie_gym.dialogue import CommunicativeFunction, ParsedText, speech_seconds
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Slot
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Slot, SlotValue
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.participant.state import ParticipantState

@@ -1,0 +1,87 @@
+"""What the participant and the Co-Wizard do where the same thing has failed twice."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from dorothie_gym.dialogue import Predicate
+from dorothie_gym.maps.routing import LaneEntry
+from dorothie_gym.ontology import ActionValue, DialogueMove, Slot
+from dorothie_gym.policies.participant.guidance import guide
+from dorothie_gym.policies.participant.retrying import remark_on_miss, remark_on_wrong_turn
+from dorothie_gym.policies.participant.state import StepKey
+from tests.policies.test_arriving import Guide
+
+
+def predicates(human: Guide) -> list[Predicate]:
+    return [said.predicate for item in human.state.speech.queue for said in item.meaning]
+
+
+def before_u_turn(human: Guide) -> None:
+    """Puts the car where its way to the goal begins with a U-turn."""
+    for lane in human.env.town.lanes:
+        for station in np.arange(5.0, lane.length - 30.0, 5.0):
+            human.put(lane.id, float(station), 6.0)
+            progress = human.state.route.progress
+            assert progress is not None
+            manoeuvre = progress.next_manoeuvre(float(station))
+            if manoeuvre is not None and manoeuvre[0] is LaneEntry.U_TURN and progress.turns_round_on(lane.id):
+                return
+    raise AssertionError("no place from which the car would turn round")
+
+
+def test_third_u_turn_is_replaced_by_a_remark_and_another_way():
+    human = Guide(1.0)
+    before_u_turn(human)
+    human.state.guidance = replace(human.state.guidance, u_turns=2)
+    guide(human.state, human.view, human.rng)
+    assert predicates(human) == [Predicate.TRIED, Predicate.WILL]
+    assert human.moves() == [DialogueMove.EXPLAIN, DialogueMove.INSTRUCT]
+    said = [value for item in human.state.speech.queue for value in item.act.values(Slot.ACTION)]
+    assert ActionValue.U_TURN not in said
+    assert human.state.route.progress is not None
+    assert human.state.route.progress.manoeuvre_cost == human.state.config.way_round_cost
+
+
+def test_second_u_turn_is_given_without_a_remark():
+    human = Guide(1.0)
+    before_u_turn(human)
+    human.state.guidance = replace(human.state.guidance, u_turns=1)
+    guide(human.state, human.view, human.rng)
+    assert Predicate.TRIED not in predicates(human)
+
+
+def test_place_that_was_passed_twice_is_remarked_on():
+    human = Guide(20.0, speed=6.0)
+    assert human.state.task.goal is not None
+    for misses, expected in ((1, []), (2, [Predicate.PASSED, Predicate.WILL])):
+        human.state.route = replace(human.state.route, misses=misses)
+        remark_on_miss(human.state, human.view, passed=True)
+        assert predicates(human) == expected
+    passed = human.state.speech.queue[0].meaning[0]
+    assert passed.get("place") is human.state.task.goal.name and passed.get("times") == 2
+
+
+def test_turn_that_was_not_taken_twice_is_avoided():
+    human = Guide(20.0, speed=6.0)
+    lane = next(lane.id for lane in human.env.town.lanes if len(human.env.town.exits(lane.id)) > 1)
+    connector = human.env.town.exits(lane)[0].connector
+    step: StepKey = ("turn", lane, connector)
+    human.state.guidance = replace(human.state.guidance, step=step)
+    assert not remark_on_wrong_turn(human.state, human.view)
+    assert remark_on_wrong_turn(human.state, human.view)
+    assert predicates(human) == [Predicate.TRIED, Predicate.WILL]
+    assert connector in [place[0] for place in human.state.route.avoided]
+
+
+def test_car_that_stands_although_told_to_start_twice_is_asked_why():
+    human = Guide(200.0)
+    human.observation["time"] = np.array([500.0])
+    said: list[DialogueMove] = []
+    for _ in range(4):
+        human.state.speech = replace(human.state.speech.cleared(), last_end=-100.0)
+        guide(human.state, human.view, human.rng)
+        said += human.moves()[:1]
+        human.observation["time"] = human.observation["time"] + 30.0
+    assert DialogueMove.QUERY_W in said
+    assert said.index(DialogueMove.QUERY_W) <= 2
