@@ -171,6 +171,8 @@ class ObservationBuilder(Lookups):
         if spoke or self._spoke:
             participant["speaking"][0] = delivered.speaking[Role.PARTICIPANT]
             co_wizard["speaking"][0] = delivered.speaking[Role.CO_WIZARD]
+            participant["other_speaking"][0] = delivered.speaking[Role.CO_WIZARD] > 0.0
+            co_wizard["other_speaking"][0] = delivered.speaking[Role.PARTICIPANT] > 0.0
         heard = bool(delivered.said or delivered.message)
         if heard or self._heard:
             message = plain_text(delivered.message, MESSAGE_LENGTH) if delivered.message else ""

@@ -195,7 +195,13 @@ class SpeechState:
         return replace(self, quiet_until=min(self.quiet_until, now), heard=values, other=move)
 
     def speak(
-        self, now: float, speaking: float, rng: np.random.Generator, scene: WordingContext | None = None
+        self,
+        now: float,
+        speaking: float,
+        rng: np.random.Generator,
+        scene: WordingContext | None = None,
+        *,
+        other_speaking: bool = False,
     ) -> tuple[Speech | None, SpeechState]:
         """Says the next remark if it is due.
 
@@ -206,6 +212,7 @@ class SpeechState:
             speaking: remaining duration of the own utterance [s].
             rng: random generator for the words.
             scene: context that the words may refer to; the latest acts are added.
+            other_speaking: whether the other speaker is talking; only urgent remarks interrupt.
 
         Returns:
             The utterance, or None, and the new state.
@@ -215,7 +222,8 @@ class SpeechState:
             return None, replace(self, queue=())
         first = queue[0]
         continues = first.joined and speaking > 0.0
-        if not continues and (speaking > 0.0 or (now < self.quiet_until and not first.urgent)):
+        waits = (now < self.quiet_until or other_speaking) and not first.urgent
+        if not continues and (speaking > 0.0 or waits):
             return None, replace(self, queue=queue)
         if not first.text:
             queue = self._worded(queue, rng, scene or WordingContext(), continues)

@@ -171,6 +171,7 @@ def _participant_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldS
         text("tasks", STORY_LENGTH, meaning="descriptions of the live subgoals with their reasons, a line each"),
         text("message", MESSAGE_LENGTH, meaning="message of the Ad-Wizard"),
         _speaking(),
+        _other_speaking(),
         *_utterance(Role.CO_WIZARD, limits, observe_acts),
     )
 
@@ -197,6 +198,7 @@ def _co_wizard_fields(limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpe
             meaning="estimated positions of hidden landmarks, one row per `LandmarkName`",
         ),
         _speaking(),
+        _other_speaking(),
         *_utterance(Role.PARTICIPANT, limits, observe_acts),
     )
 
@@ -281,6 +283,10 @@ def _story() -> FieldSpec:
 
 def _speaking() -> FieldSpec:
     return real("speaking", 1, low=0.0, unit="s", meaning="remaining duration of the own utterance")
+
+
+def _other_speaking() -> FieldSpec:
+    return flags("other_speaking", 1, meaning="1 while the other speaker, participant or Co-Wizard, is heard talking")
 
 
 def _utterance(speaker: Role, limits: SpaceLimits, observe_acts: bool) -> tuple[FieldSpec, ...]:

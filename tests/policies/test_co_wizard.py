@@ -158,6 +158,7 @@ def test_wish_is_kept_at_red_light():
     observation, state = dict(talk.observations["co_wizard"]), talk.state
     until = float(observation["time"][0]) + 5.0
     state = replace(state, intentions=state.intentions.switching(Wish.SWITCH_LEFT, until))
+    observation |= {"other_speaking": np.zeros(1, dtype=np.int8)}
     observation |= {"motion": np.int64(Motion.HAZARD), "hazard": np.int64(ObjectClass.TRAFFIC_LIGHT.value)}
     for _ in range(100):
         observation["time"] = observation["time"] + 0.5

@@ -215,7 +215,7 @@ class SessionWorld:
         for number, subgoal in enumerate(self.session.header.subgoals):
             place = str(self.session.header.landmarks[subgoal["landmark"]]["name"])
             status = None if subgoal["trigger"] else GoalStatus.PENDING.label
-            for event in self.changes:
+            for event in self.session.of_type(EventType.SUBGOAL, EventType.EXCEPTION):
                 if event.data.get("subgoal") == number and event.time <= time:
                     place, status = str(event.data.get("landmark")), str(event.data.get("status"))
             if status is not None and place == name.label:

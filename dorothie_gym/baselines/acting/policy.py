@@ -116,7 +116,8 @@ class BenchmarkCoWizard(Policy[BenchmarkPolicyState]):
         deed = _drive(model, following.history, view, town, waits) if occasion.drives else FeasibleAction(physical=None)
         if occasion.speaks and voice.idle:
             voice = _answer(model, following.history, voice, deed)
-        speech, voice = voice.speak(view.time, view.speaking, np.random.default_rng((state.seed, count)))
+        rng = np.random.default_rng((state.seed, count))
+        speech, voice = voice.speak(view.time, view.speaking, rng, other_speaking=view.other_speaking)
         following = following.acted(speech, deed.physical, view, self.limits.spans)
         action = CoWizardAction(speech=speech, physical=deed.physical).encode(self.limits)
         return action, replace(state, voice=voice, count=count, following=following, watch=watch)

@@ -162,7 +162,7 @@ class CoWizardStyle:
             echoes=float(rng.uniform(0.1, 0.4)),
             checks=float(rng.uniform(0.1, 0.4)),
             announces=float(rng.uniform(0.0, 0.18)),
-            silent=float(rng.uniform(0.3, 0.6)),
+            silent=float(rng.uniform(0.1, 0.4)),
             asks=float(rng.uniform(0.5, 1.0)),
             proposes=float(rng.uniform(0.1, 0.6)),
             mishears=float(rng.uniform(0.0, 0.05)),

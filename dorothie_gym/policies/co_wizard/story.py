@@ -17,7 +17,7 @@ from dorothie_gym.tasks.purposes import read_purpose
 
 _TELLING = frozenset({DialogueMove.INSTRUCT, DialogueMove.EXPLAIN, DialogueMove.REPLY_W})
 _CLAUSE = re.compile(
-    r"\b(?:have to|need to|want to|supposed to) (?P<errand>(?:[^,.?]|(?<=\b(?:Mr|Ms|Dr))\.|(?<=\bMrs)\.)+)"
+    r"\bI(?:'m| am)? (?:have to|need to|want to|supposed to) (?P<errand>(?:[^,.?]|(?<=\b(?:Mr|Ms|Dr))\.|(?<=\bMrs)\.)+)"
 )
 _OF_SPEAKER = re.compile(r"^(my|our) ")
 _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})

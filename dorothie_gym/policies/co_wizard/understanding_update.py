@@ -45,7 +45,7 @@ from dorothie_gym.policies.co_wizard.story import remember
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.speech import intend, repeated
+from dorothie_gym.policies.speech import Remark, intend, repeated
 
 STRAIGHT_ON_DISTANCE = 60.0
 """Distance to a junction within which "go on" means straight across it [m]."""
@@ -65,6 +65,8 @@ _STEERING = frozenset(
 _COMMANDS = _STEERING | {ActionValue.STOP}
 _STOP_AHEAD = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
 _QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
+_SETTLED = _QUESTIONS | {DialogueMove.ALIGN}
+_PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
 _REPEATABLE = _QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
@@ -77,9 +79,11 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         return
     state.dialogue = state.dialogue.after_hearing(view.time)
     state.speech = state.speech.heard_other(view.time, heard.acts)
-    before = state.speech.queue
+    done = any(GoalStatus.COMPLETE in act.slots for act in heard.acts)
+    before = () if done else _still_due(state)
+    state.speech = state.speech.cleared()
     if _mishears(state, heard, rng):
-        state.say_first(intend(Function.NEGATIVE_FEEDBACK))
+        state.say(intend(Function.NEGATIVE_FEEDBACK), *before)
         return
     state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
     for act in heard.acts:
@@ -87,14 +91,34 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         if react is not None:
             react(state, view, act, heard.words, rng)
     remember(state, heard, rng)
-    # one plain acknowledgement is enough for an utterance
-    added = state.speech.queue[len(before) :]
-    kept = tuple(
+    answer = _in_one_breath(state.speech.queue)
+    state.speech = state.speech.cleared().plan(*before, *answer)
+
+
+def _still_due(state: CoWizardState) -> tuple[Remark, ...]:
+    """Returns the queued remarks without own questions and plans, which what was heard may have settled."""
+    kept: list[Remark] = []
+    dropped = False
+    for item in state.speech.queue:
+        idle = item.act.move in _SETTLED or any(said.predicate in _PLANS for said in item.meaning)
+        dropped = dropped if item.joined else idle and not item.urgent
+        if not dropped:
+            kept.append(item)
+    if len(kept) < len(state.speech.queue):
+        state.dialogue = state.dialogue.with_proposal(None)
+    return tuple(kept)
+
+
+def _in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
+    """Joins the answers to an utterance; a mere "okay" is dropped where something more is said for itself."""
+    plain = [item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots for item in answers]
+    leads = [following.joined for following in answers[1:]]
+    kept = [
         item
-        for k, item in enumerate(added)
-        if not k or item.act.move is not DialogueMove.ACKNOWLEDGE or item.act.slots or item.meaning
-    )
-    state.speech = state.speech.cleared().plan(*before, *kept)
+        for k, item in enumerate(answers)
+        if not plain[k] or (k == 0 if all(plain) else k < len(leads) and leads[k])
+    ]
+    return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
 
 
 def _mishears(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> bool:

@@ -33,6 +33,7 @@ class CoWizardView:
         lane: lane of the car, corrected by the turn options.
         station: distance along the lane, corrected by the turn options [m].
         speaking: remaining duration of the own utterance [s].
+        other_speaking: whether the other speaker is talking.
         motion: state of motion.
         hazard: class of what the car brakes or stands for; UNLABELED for nothing.
         manoeuvre: manoeuvre prepared or under way.
@@ -51,6 +52,7 @@ class CoWizardView:
     lane: int
     station: float
     speaking: float
+    other_speaking: bool
     motion: Motion
     hazard: ObjectClass
     manoeuvre: PhysicalAction | None
@@ -74,6 +76,7 @@ class CoWizardView:
             lane=int(observation["lane"]),
             station=scalar(observation, "station"),
             speaking=scalar(observation, "speaking"),
+            other_speaking=bool(observation["other_speaking"][0]),
             motion=Motion(int(observation["motion"])),
             hazard=ObjectClass(int(observation["hazard"])),
             manoeuvre=PhysicalAction(manoeuvre) if manoeuvre else None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -261,6 +262,13 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
     return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
 
 
+def _as_afterthought(item: Remark) -> Remark:
+    """Returns a reason as it is said behind what it is a reason for: "because ..."."""
+    if item.wording.topic != "reason":
+        return item
+    return replace(item, wording=dataclasses.replace(item.wording, topic="reason_after"))
+
+
 def _purpose(state: ParticipantState, view: ParticipantView) -> Purpose | None:
     """Returns the purpose of the target; None without a target, or if the list does not tell."""
     live = [subgoal.index for subgoal in view.subgoals if subgoal.live]
@@ -278,7 +286,7 @@ def _say_announcement(
     if draw < state.style.reasons and reason:
         state.say(replace(reason[0], joined=same_breath), replace(words, joined=True))
     else:
-        state.say(words, *reason)
+        state.say(words, *(_as_afterthought(item) for item in reason))
     goal, target = state.task.goal, state.task.target
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != target]
     named = [mark for mark in later if mark is not None and goal is not None and mark.name is not goal.name]

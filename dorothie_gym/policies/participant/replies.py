@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -51,6 +52,9 @@ _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START, ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
 """Actions that are wanted at once and are not steps of the way."""
+
+_CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we're at|we are at)\b")
+"""Words by which the car says that it has come to a place."""
 
 _AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
 
@@ -201,8 +205,10 @@ def _yes_or_no(
     elif not act.slots and _is_just_short(state, view):
         refusal = _denied(words.asked or _checked(state, act, words))
         state.say_only(refusal, replace(creep_instruction(state, view), joined=True))
+    elif words.asked is not None and words.asked.predicate is Predicate.ARRIVED and not about_to_arrive(state, view):
+        _deny_arrival(state)
     else:
-        asked = words.asked or _checked(state, act, words)
+        asked = words.asked or contents.action(ActionValue.UNKNOWN)
         unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
         yes = _short(Function.AFFIRMATIVE_ANSWER, asked)
         state.say_first(*unsure, yes, *(() if unsure else _addition(state, view, rng)))
@@ -356,7 +362,9 @@ def _is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
 
 def _deny_arrival(state: ParticipantState) -> None:
     """Corrects a car that has mistaken another place for the target."""
-    assert state.task.goal is not None
+    if state.task.goal is None:
+        state.say_first(intend(Function.UNCERTAIN_ANSWER))
+        return
     state.set_guiding(True)
     away = Proposition.of(Predicate.ARRIVED, negated=True, place=state.task.goal.name)
     state.say_first(intend(Function.NEGATIVE_ANSWER, away))
@@ -372,7 +380,7 @@ def _explanation(
     if GoalStatus.UNKNOWN in statuses and names_goal:
         describe(state, view, Function.INFORM, rng)
         return
-    if names_goal and not statuses and _is_elsewhere(state, view):
+    if names_goal and not statuses and _CLAIMS_ARRIVAL.search(words.text.lower()) and _is_elsewhere(state, view):
         _deny_arrival(state)
         return
     if act.values(Slot.OBJECT):

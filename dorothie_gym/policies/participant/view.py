@@ -35,6 +35,7 @@ class ParticipantView:
         lane: lane of the car.
         station: distance along the lane [m].
         speaking: remaining duration of the own utterance [s].
+        other_speaking: whether the other speaker is talking.
         landmarks: all landmarks.
         subgoals: all subgoals.
         objects: objects in sight.
@@ -47,6 +48,7 @@ class ParticipantView:
     lane: int
     station: float
     speaking: float
+    other_speaking: bool
     landmarks: tuple[SeenLandmark, ...]
     subgoals: tuple[SeenSubgoal, ...]
     objects: tuple[SeenObject, ...]
@@ -64,6 +66,7 @@ class ParticipantView:
             lane=lane,
             station=station,
             speaking=scalar(observation, "speaking"),
+            other_speaking=bool(observation["other_speaking"][0]),
             landmarks=read_landmarks(observation, town),
             subgoals=read_subgoals(observation),
             objects=read_objects(observation),
