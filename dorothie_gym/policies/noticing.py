@@ -55,8 +55,8 @@ CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTR
 MORE_THAN_USUAL: Final = 1.5
 """Least number of objects by which a crowd exceeds what is usual."""
 
-USUAL_WEIGHT: Final = 1.0 / 60.0
-"""Weight of a new number of objects in what is usual: that of the last half minute, at two decisions per second."""
+USUAL_TIME: Final = 30.0
+"""Time over which the usual number of objects is averaged [s]."""
 
 CROWD_INTERVAL: Final = 60.0
 """Time between remarks about crowds of a kind [s]."""
@@ -89,12 +89,14 @@ class Noticed:
         mentioned: changes (parameter, whether it is high) that either speaker has mentioned.
         crowds: kinds of crowds, with the time at which each was last noticed [s].
         usual: usual number of objects near, by the kinds of `CROWDS`.
+        looked_at: time of the last look around [s].
     """
 
     weather: frozenset[W] = frozenset()
     mentioned: frozenset[tuple[W, bool]] = frozenset()
     crowds: tuple[tuple[ObjectClass, float], ...] = ()
     usual: tuple[float, ...] = (0.0,) * len(CROWDS)
+    looked_at: float = 0.0
 
     def with_change(self, parameter: W, *, high: bool) -> Noticed:
         """Records that a parameter has become conspicuous, or has ceased to be."""
@@ -113,12 +115,11 @@ class Noticed:
         """Records that a crowd was noticed at a time [s]."""
         return replace(self, crowds=(*(row for row in self.crowds if row[0] is not kind), (kind, now)))
 
-    def after_looking(self, near: Sequence[ObjectClass]) -> Noticed:
-        """Updates the usual numbers of objects by the kinds of those near."""
-        usual = tuple(
-            mean + USUAL_WEIGHT * (near.count(kind) - mean) for kind, mean in zip(CROWDS, self.usual, strict=True)
-        )
-        return self if max(usual) < 0.01 and not any(self.usual) else replace(self, usual=usual)
+    def after_looking(self, near: Sequence[ObjectClass], now: float) -> Noticed:
+        """Updates the usual numbers of objects by the kinds of those near, at a time [s]."""
+        weight = min(max(now - self.looked_at, 0.0) / USUAL_TIME, 1.0)
+        usual = tuple(mean + weight * (near.count(kind) - mean) for kind, mean in zip(CROWDS, self.usual, strict=True))
+        return replace(self, usual=usual, looked_at=now)
 
     def after_hearing(self, words: ParsedText, now: float) -> Noticed:
         """Records what the other speaker has just mentioned at a time [s], which then needs no mention."""
@@ -161,7 +162,7 @@ def notice(
             return weather_change_remark(parameter, high=high), noticed
     near, now = [thing.kind for thing in objects if thing.distance < CROWD_DISTANCE], scalar(observation, "time")
     kind = crowd_among(near, noticed.usual)
-    noticed = noticed.after_looking(near)
+    noticed = noticed.after_looking(near, now)
     if kind is None or now - dict(noticed.crowds).get(kind, -math.inf) < CROWD_INTERVAL:
         return None, noticed
     noticed = noticed.with_crowd(kind, now)

@@ -91,18 +91,18 @@ def looking(noticed: Noticed, count: int, distance: float, kind: ObjectClass = P
 
 def test_crowds_are_many_and_near():
     least = CROWDS[PEOPLE]
-    said, noticed = looking(Noticed(), least, 20.0)
+    said, noticed = looking(Noticed(looked_at=99.5), least, 20.0)
     assert said is not None and said.act.slots == {PEOPLE}
     assert looking(noticed, least, 20.0, time=110.0)[0] is None  # it has been mentioned
-    assert looking(Noticed(), least - 1, 20.0)[0] is None
-    assert looking(Noticed(), 3 * least, 90.0)[0] is None
-    assert looking(Noticed(), 10, 20.0, CARS)[0].act.slots == {CARS}
+    assert looking(Noticed(looked_at=99.5), least - 1, 20.0)[0] is None
+    assert looking(Noticed(looked_at=99.5), 3 * least, 90.0)[0] is None
+    assert looking(Noticed(looked_at=99.5), 10, 20.0, CARS)[0].act.slots == {CARS}
 
 
 def test_usual_traffic_is_no_crowd():
     noticed = Noticed()
-    for _ in range(400):
-        noticed = noticed.after_looking([CARS] * 5)
+    for decision in range(400):
+        noticed = noticed.after_looking([CARS] * 5, 0.5 * decision)
     assert crowd_among([CARS] * 5, noticed.usual) is None
     assert crowd_among([CARS] * 8, noticed.usual) is CARS
 
@@ -112,7 +112,7 @@ def test_usual_traffic_is_no_crowd():
     [("there are so many people here", PEOPLE), ("lots of pedestrians here", PEOPLE), ("look at that traffic", None)],
 )
 def test_crowd_that_the_other_mentions_is_not_mentioned_again(text, kind):
-    noticed = Noticed().after_hearing(understand(text), 95.0)
+    noticed = Noticed(looked_at=99.5).after_hearing(understand(text), 95.0)
     assert (looking(noticed, 5, 20.0)[0] is None) is (kind is PEOPLE)
 
 

@@ -111,9 +111,11 @@ def _located(world: SessionWorld, said: Proposition, time: float, speaker: Role)
     if not rows:
         return None
     if isinstance(street, StreetName):
-        return any(world.street_name(row["street"]) == street.label for row in rows)
+        rows = [row for row in rows if world.street_name(row["street"]) == street.label]
     if isinstance(cross, StreetName):
-        return any(_is_at_corner(world, row, cross) for row in rows)
+        rows = [row for row in rows if _is_at_corner(world, row, cross)]
+    if side is None:
+        return bool(rows) if street is not None or cross is not None else None
     if isinstance(side, Direction):
         right = side is Direction.RIGHT
         return any(is_on_right(world.town, row["lane"], row["x"], row["y"]) is right for row in rows)

@@ -61,6 +61,7 @@ class CoWizardConfig:
         gps_variance: variance of the position that shows that it is not measured [m^2]; 0.02 to 0.15 while it is.
         found_variance: variance of the position below which it is measured again [m^2].
         contradictions: instructions against the route to a destination after which it is checked.
+        looks_every: decisions after which the Co-Wizard looks around for changes to mention.
         leaves_weather: probability that mentioning the weather is left to the participant.
         accepts: probability that an instruction is accepted ("will do") rather than only heard ("okay").
     """
@@ -109,6 +110,7 @@ class CoWizardConfig:
     gps_variance: float = 0.4
     found_variance: float = 0.08
     contradictions: int = 2
+    looks_every: int = 8
     leaves_weather: float = 0.25
     accepts: float = 0.45
 

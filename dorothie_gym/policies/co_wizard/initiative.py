@@ -282,7 +282,9 @@ def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
 
 
 def _look_around(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Mentions, by chance, a conspicuous change of the weather, or a crowd."""
+    """Mentions, by chance, a conspicuous change of the weather, or a crowd; leaves the participant time to do so."""
+    if state.count % state.config.looks_every:
+        return
     said, noticed = notice(
         state.dialogue.noticed, view.raw, view.objects, rng, chance=state.style.notices, handled=_HANDLED
     )

@@ -35,7 +35,7 @@ _SIGNS = {
 _CLOSE, _FAR = 120.0, 220.0
 """Way to the target up to which it is called close, and from which on it is called far [m]."""
 
-_MEASURED = 60.0, 600.0
+_MEASURED = 60.0, 350.0
 """Ways to the target whose length is told [m]."""
 
 _FEELINGS = 0.25
@@ -91,19 +91,20 @@ def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Propositi
         left = progress.left(view.station)
         if left < _CLOSE or left > _FAR:
             yield Proposition.of(Predicate.CLOSE, place=goal.name, negated=left > _FAR)
-        if _MEASURED[0] < left < _MEASURED[1]:
-            yield Proposition.of(Predicate.DISTANCE, place=goal.name, metres=_rounded(left))
-        if not progress.astray and not view.standing:
-            yield Proposition.of(Predicate.RIGHT_WAY, place=goal.name)
         direct = not progress.turns_round_first(state.town, view.station)
+        if direct and _MEASURED[0] < left < _MEASURED[1]:
+            yield Proposition.of(Predicate.DISTANCE, place=goal.name, metres=_rounded(left))
+        if direct and not progress.astray and not view.standing and not state.guidance.guiding:
+            yield Proposition.of(Predicate.RIGHT_WAY, place=goal.name)
         if direct and progress.next_crossing(state.town, view.station) is None:
             yield Proposition.of(Predicate.LOCATED, place=goal.name, side=_side(state, view, goal))
     if goal.street is not StreetName.UNKNOWN and street_of(view.raw, state.town, view.lane) is goal.street:
         yield Proposition.of(Predicate.LOCATED, place=goal.name, street=goal.street)
     cross = corner_of(state.town, state.town.lanes[goal.lane].street, goal.x, goal.y)
     names = view.raw["street_names"]
-    if cross is not None and cross < len(names) and StreetName(int(names[cross])) is not StreetName.UNKNOWN:
-        yield Proposition.of(Predicate.LOCATED, place=goal.name, cross=StreetName(int(names[cross])))
+    crossing = StreetName(int(names[cross])) if cross is not None and cross < len(names) else StreetName.UNKNOWN
+    if StreetName.UNKNOWN not in (crossing, goal.street) and crossing is not goal.street:
+        yield Proposition.of(Predicate.LOCATED, place=goal.name, street=goal.street, cross=crossing)
     near = famous_nearby(goal, view, state.config.near_landmark)
     if near is not None:
         yield Proposition.of(Predicate.NEAR, place=goal.name, landmark=near.name)
