@@ -33,7 +33,7 @@ import numpy as np
 
 from dorothie_gym.analysis.exception_mentions import mentions
 from dorothie_gym.analysis.units import SaidUnit, Units
-from dorothie_gym.dialogue import Proposition
+from dorothie_gym.dialogue import Predicate, Proposition
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.ontology import (
     ActionValue,
@@ -123,6 +123,7 @@ _WORDS: Final[Mapping[ExceptionKind, re.Pattern[str]]] = MappingProxyType(
 )
 """Words that refer to an exception of a kind, in case-folded text."""
 
+_ABOUT_THE_WAY: Final = frozenset({Predicate.WILL, Predicate.SHORTER, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY})
 _PUT_OFF: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.PENDING})
 _ASKING: Final = frozenset(MoveGroup.ASK.moves)
 
@@ -191,7 +192,7 @@ def handled_by(units: Units) -> dict[int, Event]:
             cause is None
             and last is not None
             and exchange.start - last[0] <= ANSWER_TIMEOUT
-            and last[1].is_asked_on(exchange)
+            and last[1].is_asked_on(exchange, meant=meant)
         ):
             cause = last[1]
         if cause is not None:
@@ -296,9 +297,17 @@ class _Happened:
             return time - self.event.time <= PROMPT_WINDOW and bool(values & _CAUTION)
         return 0.0 <= time - self.met <= PROMPT_WINDOW and bool(values & _AROUND)
 
-    def is_asked_on(self, exchange: SaidUnit) -> bool:
-        """Returns whether an exchange, right after one that handles the exception, continues it by a question."""
+    def is_asked_on(self, exchange: SaidUnit, *, meant: bool = False) -> bool:
+        """Returns whether an exchange, right after one that handles the exception, continues it by a question.
+
+        Args:
+            exchange: the exchange.
+            meant: whether the session has meanings; a question about an obstacle then has to be about the way.
+        """
         first = exchange.moves[0].act
+        if meant and self.kind.is_plan_level:
+            about_way = any(said.predicate in _ABOUT_THE_WAY for said in exchange.moves[0].meaning)
+            return about_way and first.move in _ASKING and not first.values(Slot.LANDMARK)
         if first.move not in _ASKING:
             return False
         if self.kind.is_task:
