@@ -224,7 +224,7 @@ class _Sentence:
         if closer is not None and template.covers and realizer.random() < closer.rate * style.chattiness:
             end = closer.phrase.say(realizer)
             body = body if _words(end)[0] in _words(body) else f"{body}{'' if end[0] == ',' else ' '}{end}"
-        if style.address and realizer.random() < style.addressing:
+        if style.address and realizer.random() < style.addressing and style.address not in body.lower():
             body = f"{body}, {style.address}"
         return body
 
@@ -249,9 +249,9 @@ def _words(text: str) -> list[str]:
 
 
 def _repeats(front: str, body: str) -> bool:
-    """Returns whether the body begins with a word of the discourse marker: "so so", "okay, okay"."""
+    """Returns whether the body begins with a word of the discourse marker, or with a marker of its own: "then because"."""
     start = _words(body)
-    return not start or start[0] in _words(front)
+    return not start or start[0] in _words(front) or start[0] == "because"
 
 
 @functools.lru_cache(maxsize=8192)

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Predicate, Proposition, Wording
+from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
 from dorothie_gym.ontology import DialogueMove, GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.state import CoWizardState
@@ -47,8 +47,8 @@ def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:
     named = [value for act in heard.acts for value in act.values(Slot.LANDMARK)]
     place = contents.first_name(named) or state.beliefs.goal
     clause = _CLAUSE.search(heard.words.text)
-    if place is None or clause is None:
-        return None
+    if place is None or clause is None or understand(clause["errand"]).actions:
+        return None  # "I need you to take the next right" tells of no errand
     purpose = read_purpose(clause["errand"])
     item = _OF_SPEAKER.sub("your ", purpose.items[0]) if purpose.items else None
     person = None if purpose.person is None else _OF_SPEAKER.sub("your ", purpose.person)
