@@ -52,7 +52,8 @@ def _names(corpus: Corpus) -> list[str]:
     ]
     texts += [name for kind in catalogue().values() for listed in kind.attributes.values() for name in listed]
     texts += [subgoal["description"] for session in corpus for subgoal in session.header.subgoals]
-    return sorted({word.removesuffix("'s") for text in texts for word in _WORD.findall(text)})
+    names = {word.removesuffix("'s") for text in texts for word in _WORD.findall(text)}
+    return sorted(names | {f"{name}'s" for name in names})
 
 
 def _linter(names: list[str]) -> Any:

@@ -249,7 +249,7 @@ def _words(text: str) -> list[str]:
 
 
 def _repeats(front: str, body: str) -> bool:
-    """Returns whether the body begins with a word of the discourse marker, or with a marker of its own: "then because"."""
+    """Returns whether the body begins with a word of the discourse marker ("so so"), or with a marker of its own."""
     start = _words(body)
     return not start or start[0] in _words(front) or start[0] == "because"
 
