@@ -127,21 +127,23 @@ class Conversation:
         self.max_spans = max_spans
         self._air: dict[Role, Utterance] = {}
 
-    def say(self, speaker: Role, span: Span, now: float) -> str | None:
+    def say(self, speaker: Role, span: Span, now: float, onset: float = 0.0, pace: float = 1.0) -> str | None:
         """Starts an utterance, or appends a span to the current one of the speaker.
 
         Args:
             speaker: role of the speaker.
             span: words and dialogue act.
             now: time of the decision [s].
+            onset: time until the first word of an utterance that starts [s].
+            pace: speaking rate relative to that of the conversation.
 
         Returns:
             None on success, otherwise the reason for the refusal.
         """
-        seconds = speech_seconds(span.text, self.words_per_second)
+        seconds = speech_seconds(span.text, pace * self.words_per_second)
         current = self._air.get(speaker)
         if current is None:
-            self._air[speaker] = Utterance(speaker, (span,), now, now + seconds)
+            self._air[speaker] = Utterance(speaker, (span,), now + onset, now + onset + seconds)
             return None
         if len(current.spans) >= self.max_spans:
             return f"{speaker.value} has {self.max_spans} acts in this utterance already: wait until it is over"

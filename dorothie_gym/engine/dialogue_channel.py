@@ -115,7 +115,8 @@ class DialogueChannel:
     def say(self, role: Role, speech: Speech, now: float) -> str | None:
         """Starts or continues an utterance at a time [s]; returns the reason of a refusal."""
         text = speech.text.strip() or self._worded(speech.act, role)
-        return self._conversation.say(role, Span(text, speech.act, speech.meaning), now)
+        span = Span(text, speech.act, speech.meaning)
+        return self._conversation.say(role, span, now, speech.onset, speech.pace)
 
     def note(self, landmark: LandmarkName, status: GoalStatus) -> None:
         """Updates the annotation with a change of a subgoal's status, which ends transactions."""

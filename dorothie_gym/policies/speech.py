@@ -19,19 +19,13 @@ from dorothie_gym.dialogue import (
     SpeakerStyle,
     Wording,
     WordingContext,
-    speech_seconds,
     word_acts,
 )
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
-from dorothie_gym.policies.policy import DecisionClock, replace
+from dorothie_gym.policies.delivery import Delivery
+from dorothie_gym.policies.policy import DECISION_INTERVAL, DecisionClock, replace
 from dorothie_gym.spaces import Speech
-
-PAUSE = 0.8
-"""Silence between an utterance and the next one of the same speaker [s]."""
-
-ANSWER_TIME = 3.0
-"""Silence after a move that wants an answer [s]."""
 
 LONGEST_BREATH = 3
 """Largest number of acts that are worded together."""
@@ -143,6 +137,8 @@ class SpeechState:
         said: latest remarks said, the last one at the end.
         heard: slot values that the other speaker has just named, which may be referred to by "that one".
         other: last move of the other speaker, None at first.
+        delivery: timing of the speech.
+        reply_at: time before which no reply begins, unless it is urgent [s].
     """
 
     role: Role
@@ -154,6 +150,8 @@ class SpeechState:
     said: tuple[Remark, ...] = ()
     heard: frozenset[SlotValue] = frozenset()
     other: DialogueMove | None = None
+    delivery: Delivery = field(default_factory=Delivery)
+    reply_at: float = -math.inf
 
     @property
     def idle(self) -> bool:
@@ -188,11 +186,22 @@ class SpeechState:
         """Extends the silence to a time [s]."""
         return replace(self, quiet_until=max(self.quiet_until, until))
 
-    def heard_other(self, now: float, acts: Sequence[DialogueAct] = ()) -> SpeechState:
-        """Records an utterance of the other speaker, which ends the silence left for an answer."""
+    def heard_other(
+        self, now: float, acts: Sequence[DialogueAct] = (), rng: np.random.Generator | None = None, late: float = 0.0
+    ) -> SpeechState:
+        """Records an utterance of the other speaker, which ends the silence left for an answer.
+
+        Args:
+            now: time [s].
+            acts: acts of the utterance.
+            rng: source of the gap before a reply; None for none.
+            late: time for which the utterance has been over, as far as is known [s].
+        """
+        gap = self.delivery.draw_gap(rng) if rng is not None else 0.0
         values = frozenset(value for act in acts for value in act.slots)
         move = acts[-1].move if acts else self.other
-        return replace(self, quiet_until=min(self.quiet_until, now), heard=values, other=move)
+        until = min(self.quiet_until, now)
+        return replace(self, quiet_until=until, heard=values, other=move, reply_at=now + max(gap - late, 0.0))
 
     def speak(
         self,
@@ -201,6 +210,7 @@ class SpeechState:
         rng: np.random.Generator,
         scene: WordingContext | None = None,
         *,
+        interval: float = DECISION_INTERVAL,
         other_speaking: bool = False,
     ) -> tuple[Speech | None, SpeechState]:
         """Says the next remark if it is due.
@@ -212,6 +222,7 @@ class SpeechState:
             speaking: remaining duration of the own utterance [s].
             rng: random generator for the words.
             scene: context that the words may refer to; the latest acts are added.
+            interval: time to the next decision [s].
             other_speaking: whether the other speaker is talking; only urgent remarks interrupt.
 
         Returns:
@@ -225,13 +236,17 @@ class SpeechState:
         waits = (now < self.quiet_until or other_speaking) and not first.urgent
         if not continues and (speaking > 0.0 or waits):
             return None, replace(self, queue=queue)
+        onset = 0.0 if continues or first.urgent else self._onset(now, interval, rng)
+        if onset >= interval:
+            return None, replace(self, queue=queue)
         if not first.text:
             queue = self._worded(queue, rng, scene or WordingContext(), continues)
             first = queue[0]
         first = replace(first, text=self._punctuated(queue, continues))
-        end = now + speaking + speech_seconds(first.text)
-        pause = ANSWER_TIME if first.act.move in _WANTS_ANSWER else PAUSE
-        return Speech(act=first.act, text=first.text, meaning=first.meaning), replace(
+        end = now + onset + speaking + self.delivery.seconds(first.text)
+        pause = self.delivery.draw_pause(rng, wants_answer=first.act.move in _WANTS_ANSWER)
+        pace = self.delivery.pace_of(first.text)
+        return Speech(act=first.act, text=first.text, meaning=first.meaning, onset=onset, pace=pace), replace(
             self,
             queue=queue[1:],
             quiet_until=end + pause,
@@ -248,6 +263,12 @@ class SpeechState:
             text = text[0].upper() + text[1:]
         goes_on = len(queue) > 1 and queue[1].joined
         return f"{text}," if goes_on and text[-1].isalnum() else text
+
+    def _onset(self, now: float, interval: float, rng: np.random.Generator) -> float:
+        """Returns the time to the first word [s]: the rest of the gap before a reply; otherwise it begins any time."""
+        if self.reply_at > now or now - self.reply_at < interval or self.delivery.gap == 0.0:
+            return max(round(self.reply_at - now, 2), 0.0)
+        return round(float(rng.uniform(0.0, 0.9 * interval)), 2)
 
     def _worded(
         self, queue: tuple[Remark, ...], rng: np.random.Generator, scene: WordingContext, continues: bool

@@ -20,8 +20,8 @@ _ONE_BYTE = "bB?"
 
 _FLAGS = b"\0\1"
 
-OPTIONAL_FIELDS = frozenset({"meaning"})
-"""Text fields that an action dict may leave out; they are then empty."""
+OPTIONAL_FIELDS = frozenset({"meaning", "onset", "pace"})
+"""Fields that an action dict may leave out; texts are then empty, and numbers 0."""
 
 
 class ActionFieldTable:
@@ -74,7 +74,7 @@ class ActionReader:
     def integer(self, name: str) -> int:
         """Returns an integer field; raises `ValueError` if it is no integer or out of range."""
         low, high = self._table.ranges[name]
-        value = self._action[name]
+        value = self._action.get(name, 0) if name in OPTIONAL_FIELDS else self._action[name]
         if type(value) is int and low <= value <= high:
             return value
         if isinstance(value, np.ndarray) and value.ndim != 0:

@@ -46,6 +46,12 @@ from dorothie_gym.spaces.limits import (
 NO_MOVE = len(DialogueMove)
 """Value of `move` for silence."""
 
+MAX_ONSET = 100
+"""Longest time from a decision to the first word [0.01 s]."""
+
+MAX_PACE = 250
+"""Fastest speaking rate relative to that of the environment [%]."""
+
 PROPS = tuple(PropKind)
 SENSORS = tuple(Sensor)
 WEATHER = tuple(WeatherParameter)
@@ -77,11 +83,15 @@ class Speech:
         act: the dialogue act.
         text: its words; empty to have them generated.
         meaning: propositions that the speaker states, asks or asks for. They are recorded, and observed by nobody.
+        onset: time from the decision to the first word of an utterance [s]; a span that continues one has none.
+        pace: speaking rate relative to that of the environment.
     """
 
     act: DialogueAct
     text: str = ""
     meaning: tuple[Proposition, ...] = ()
+    onset: float = 0.0
+    pace: float = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -347,6 +357,8 @@ def _participant_fields(limits: SpaceLimits) -> tuple[FieldSpec, ...]:
         flags("slots", len(LABELS), meaning="label vector of the slot values, in the order of `LABELS`"),
         text("utterance", UTTERANCE_LENGTH, meaning="words; empty to let the NLG word the act"),
         text("meaning", MEANING_LENGTH, meaning="propositions as JSON (`encode_meaning`), recorded; may be empty"),
+        choice("onset", MAX_ONSET + 1, unit="0.01 s", meaning="time to the first word; 0 at once"),
+        choice("pace", MAX_PACE + 1, unit="%", meaning="speaking rate relative to the environment's; 0 for 100"),
     )
 
 
@@ -413,6 +425,8 @@ def _encode_speech(speech: Speech | None) -> ActionDict:
         "slots": np.array(slots, dtype=np.int8),
         "utterance": speech.text if speech else "",
         "meaning": encode_meaning(speech.meaning) if speech else "",
+        "onset": min(round(100 * speech.onset), MAX_ONSET) if speech else 0,
+        "pace": min(round(100 * speech.pace), MAX_PACE) if speech and speech.pace != 1.0 else 0,
     }
 
 
@@ -427,10 +441,16 @@ def _fields(role: Role, limits: SpaceLimits) -> ActionFieldTable:
 
 def _read_speech(reader: ActionReader) -> Speech | None:
     move, slots, text = reader.integer("move"), reader.flags("slots"), reader.text("utterance")
-    meaning = reader.text("meaning")
+    meaning, onset, pace = reader.text("meaning"), reader.integer("onset"), reader.integer("pace")
     if move == NO_MOVE:
         return None
-    return Speech(act=_act(move, slots), text=text, meaning=find_meaning(meaning) or ())
+    return Speech(
+        act=_act(move, slots),
+        text=text,
+        meaning=find_meaning(meaning) or (),
+        onset=onset / 100,
+        pace=(pace or 100) / 100,
+    )
 
 
 @lru_cache(maxsize=4096)

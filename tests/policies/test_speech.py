@@ -2,7 +2,8 @@ import numpy as np
 
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.ontology import DialogueMove, LandmarkName, Role
-from dorothie_gym.policies.speech import ANSWER_TIME, SpeechState, remark
+from dorothie_gym.policies.delivery import Delivery
+from dorothie_gym.policies.speech import SpeechState, remark
 
 RNG = np.random.default_rng(0)
 
@@ -17,7 +18,7 @@ def test_question_is_followed_by_silence_for_answer():
     assert first is not None and first.act.move is DialogueMove.QUERY_W
     silent, speaker = speaker.speak(speaker.last_end + 0.1, 0.0, RNG)
     assert silent is None
-    spoken, _ = speaker.speak(speaker.last_end + ANSWER_TIME + 0.1, 0.0, RNG)
+    spoken, _ = speaker.speak(speaker.last_end + Delivery().patience + 0.1, 0.0, RNG)
     assert spoken is not None
 
 

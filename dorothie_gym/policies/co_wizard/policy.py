@@ -109,7 +109,9 @@ def respond(decision: PendingDecision, physical: Physical | None) -> CoWizardAct
     announce_action(state, view, physical, rng)
     take_initiative(state, view, rng)
     scene = None if state.speech.idle else scene_of(state, view)
-    speech, state.speech = state.speech.speak(view.time, view.speaking, rng, scene, other_speaking=view.other_speaking)
+    speech, state.speech = state.speech.speak(
+        view.time, view.speaking, rng, scene, interval=state.clock.interval, other_speaking=view.other_speaking
+    )
     return CoWizardAction(speech=speech, physical=physical, mental=_next_update(state))
 
 

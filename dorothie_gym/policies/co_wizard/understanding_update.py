@@ -78,7 +78,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     if heard is None:
         return
     state.dialogue = state.dialogue.after_hearing(view.time)
-    state.speech = state.speech.heard_other(view.time, heard.acts)
+    state.speech = state.speech.heard_other(view.time, heard.acts, rng, state.clock.interval / 2.0)
     done = any(GoalStatus.COMPLETE in act.slots for act in heard.acts)
     before = () if done else _still_due(state)
     state.speech = state.speech.cleared()

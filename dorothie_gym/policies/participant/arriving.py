@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import SpeakerStyle, Wording, speech_seconds, word_act
+from dorothie_gym.dialogue import SpeakerStyle, Wording, word_act
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies.participant.orders import order
@@ -71,7 +71,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     if _room_to_stop(state, view, left)[0] < -config.late_stop:
         # there is only time for a shout
         shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(SHOUTS)]
-        shortest = min(*shouts, state.guidance.stop_text, key=speech_seconds)
+        shortest = min(*shouts, state.guidance.stop_text, key=state.speech.delivery.seconds)
         state.guidance = state.guidance.with_stop_text(shortest)
     if _is_time_to_stop(state, view, left):
         if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > 0.0:
@@ -87,7 +87,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
 def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
     """Returns the time after which the stop instruction is repeated [s]: soon if the car does not brake."""
     heeded = view.speed < state.motion.speed - BRAKING
-    return STOP_REPEAT if heeded else speech_seconds(state.guidance.stop_text) + REACTION
+    return STOP_REPEAT if heeded else state.speech.delivery.seconds(state.guidance.stop_text) + REACTION
 
 
 def _announce_place(state: ParticipantState, view: ParticipantView, left: float) -> None:
@@ -130,7 +130,7 @@ def _room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -
     acceleration is extrapolated.
     """
     interval, config = state.clock.interval, state.config
-    delay = math.ceil(speech_seconds(state.guidance.stop_text) / interval - 1e-6) * interval
+    delay = math.ceil(state.speech.delivery.seconds(state.guidance.stop_text) / interval - 1e-6) * interval
     gain = min(max((view.speed - state.motion.speed) / interval, GAIN_RANGE[0]), GAIN_RANGE[1])
     corner = state.town.lanes[view.lane].in_junction or view.station < BEHIND_CORNER
     speeds_up = corner and not state.guidance.slowed_early and view.speed < config.soon_speed

@@ -82,7 +82,7 @@ class ScriptedParticipant(Policy[ParticipantState]):
         react(updated, view, rng)
         scene = None if updated.speech.idle else scene_of(updated, view)
         speech, updated.speech = updated.speech.speak(
-            view.time, view.speaking, rng, scene, other_speaking=view.other_speaking
+            view.time, view.speaking, rng, scene, interval=updated.clock.interval, other_speaking=view.other_speaking
         )
         updated.motion = updated.motion.with_speed(view.speed)
         return ParticipantAction(speech=speech).encode(self.limits), updated

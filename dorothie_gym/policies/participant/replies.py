@@ -65,7 +65,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
     if heard is None:
         return
     state.conversation = state.conversation.after_hearing(view.time)
-    state.speech = state.speech.heard_other(view.time, heard.acts)
+    state.speech = state.speech.heard_other(view.time, heard.acts, rng, state.clock.interval / 2.0)
     if heard.acts and has_missed(state, view, heard, rng):
         return
     puzzled_by = state.conversation.puzzled_by
