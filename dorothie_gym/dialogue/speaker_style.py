@@ -72,18 +72,27 @@ class _StyleSpread:
     proper: float
 
 
-def draw_style(role: Role, rng: np.random.Generator) -> SpeakerStyle:
+def draw_style(
+    role: Role, rng: np.random.Generator, leanings: Mapping[str, float] | None = None
+) -> SpeakerStyle:  # fmt: skip
     """Samples the style of a speaker for a session.
 
     Args:
         role: the Ad-Wizard shares the distribution of the participant, the car itself that of the Co-Wizard.
-        rng: source of randomness.
+        rng: source of randomness; the same numbers are drawn whatever the leanings.
+        leanings: places in [0, 1] of some shares in their ranges, and of "register" from blunt to polite.
     """
+    leanings = leanings or {}
     spread = _spreads()[Role.PARTICIPANT if role in (Role.PARTICIPANT, Role.AD_WIZARD) else Role.CO_WIZARD]
     registers = list(spread.registers)
     weights = np.array([spread.registers[register] for register in registers])
     register = registers[int(rng.choice(len(registers), p=weights / weights.sum()))]
+    if "register" in leanings:
+        register = _register(spread.registers, leanings["register"])
     shares = {name: float(rng.uniform(*spread.ranges[name])) for name in _SHARES}
+    for name in leanings.keys() & set(_SHARES):
+        low, high = spread.ranges[name]
+        shares[name] = low + (high - low) * leanings[name]
     address = spread.addresses[int(rng.integers(len(spread.addresses)))] if spread.addresses else ""
     return SpeakerStyle(
         register=register,
@@ -98,6 +107,19 @@ def draw_style(role: Role, rng: np.random.Generator) -> SpeakerStyle:
         habit=shares["habit"],
         addressing=shares["addressing"],
     )
+
+
+def _register(shares: Mapping[Register, float], politeness: float) -> Register:
+    """Returns the register of a speaker by its politeness in [0, 1]; over all speakers, registers have their shares."""
+    left = politeness * sum(shares.values())
+    for register in _BY_POLITENESS:
+        left -= shares.get(register, 0.0)
+        if left < 0.0:
+            return register
+    return _BY_POLITENESS[-1]
+
+
+_BY_POLITENESS = (Register.BLUNT, Register.SLANGY, Register.PLAIN, Register.POLITE)
 
 
 @functools.cache

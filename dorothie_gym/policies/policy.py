@@ -67,6 +67,10 @@ class Policy(ABC, Generic[State]):
             town: the map, known to every role; landmarks are part of the observations.
         """
 
+    def persona_of(self, state: State) -> Mapping[str, float | str] | None:
+        """Returns the traits of the persona that a state belongs to, in JSON types, for the record; None for none."""
+        return None
+
     @abstractmethod
     def step(self, observation: ObservationMapping, state: State) -> tuple[ActionDict, State]:
         """Chooses an action.

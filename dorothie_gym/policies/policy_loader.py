@@ -17,6 +17,7 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard
 from dorothie_gym.policies.participant import ScriptedParticipant
+from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy
 from dorothie_gym.policies.pretrained import check_fits, is_pretrained, names_for, pretrained_folder
 from dorothie_gym.policies.trivial import LaneFollowPolicy, RandomPolicy, SilentPolicy
@@ -24,6 +25,9 @@ from dorothie_gym.spaces import SpaceLimits
 
 POLICY_NAMES = ("scripted", "silent", "random")
 """Names that `make_policy` accepts for every role."""
+
+WITH_TRAITS: Final = "scripted:"
+"""Beginning of the name of a scripted policy whose personas have given traits."""
 
 LANE_FOLLOW = "lane-follow"
 """Name of the Co-Wizard's policy that drives and never talks."""
@@ -39,8 +43,10 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     """Returns a policy by name.
 
     Args:
-        name: "scripted", "silent" (does nothing) or "random" (samples the action space); for the Co-Wizard also
-            "lane-follow" (drives on, never talks), or a shipped model such as "pretrained:maskable-ppo".
+        name: "scripted", "silent" (does nothing) or "random" (samples the action space); for participant and Co-Wizard
+            also "scripted:" with traits of the persona ("scripted:talkativeness=0.8..1", see
+            `dorothie_gym.policies.persona`); for the Co-Wizard also "lane-follow" (drives on, never talks), or a
+            shipped model such as "pretrained:maskable-ppo".
         role: role of the policy.
         limits: sizes of the spaces.
 
@@ -50,6 +56,11 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     """
     if role not in (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD):
         raise ValueError(f"role is {role}; policies act for participant, co_wizard and ad_wizard")
+    if _gives_traits(name, role):
+        traits = parse_traits(name.removeprefix(WITH_TRAITS))
+        if role is Role.PARTICIPANT:
+            return ScriptedParticipant(limits, traits=traits)
+        return ScriptedCoWizard(limits, traits=traits)
     if name == "silent":
         return SilentPolicy(role, limits)
     if name == "random":
@@ -65,6 +76,10 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     if role is Role.PARTICIPANT:
         return ScriptedParticipant(limits)
     return ScriptedCoWizard(limits) if role is Role.CO_WIZARD else ScriptedAdWizard(limits)
+
+
+def _gives_traits(name: str, role: Role) -> bool:
+    return name.startswith(WITH_TRAITS) and role in (Role.PARTICIPANT, Role.CO_WIZARD)
 
 
 Loader: TypeAlias = Callable[[Path, Role, SpaceLimits], AnyPolicy]
@@ -123,7 +138,7 @@ class Player:
     """Source of a role's policy, by name or from a file; can be sent to other processes.
 
     Attributes:
-        name: name of the policy, or the path that was given.
+        name: name of the policy, with traits if any are given, or the path that was given.
         path: file or folder of a trained policy; None for a policy by name, also for that of a shipped model, whose
             place differs between machines.
         loader: function that reads it.
@@ -171,6 +186,12 @@ def find_player(given: str, role: Role) -> Player:
     Raises:
         PolicyLoadError: there is no such policy for the role, no such file, or none that can be played.
     """
+    if _gives_traits(given, role):
+        try:
+            parse_traits(given.removeprefix(WITH_TRAITS))
+        except ValueError as error:
+            raise PolicyLoadError(f"{role}: {error}") from None
+        return Player(name=given)
     if given in policy_names(role):
         return _shipped_player(given, role) if is_pretrained(given) else Player(name=given)
     path = Path(given)

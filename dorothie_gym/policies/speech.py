@@ -8,7 +8,7 @@ import math
 from collections.abc import Collection, Sequence
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Generic, Self, TypeVar
+from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from dorothie_gym.dialogue import (
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
 from dorothie_gym.policies.delivery import Delivery
+from dorothie_gym.policies.mood import Happening, Mood
+from dorothie_gym.policies.persona import Persona
 from dorothie_gym.policies.policy import DECISION_INTERVAL, DecisionClock, replace
 from dorothie_gym.spaces import Speech
 
@@ -302,7 +304,16 @@ def _alive(queue: tuple[Remark, ...], now: float) -> tuple[Remark, ...]:
 
 # --- state of a speaking agent ----------------------------------------------------------------------------------------
 
-StyleT = TypeVar("StyleT")
+
+class Style(Protocol):
+    """Traits of a speaker in a session."""
+
+    def in_mood(self, mood: Mood) -> Self:
+        """Returns the traits as a mood changes them."""
+        ...
+
+
+StyleT = TypeVar("StyleT", bound=Style)
 ConfigT = TypeVar("ConfigT")
 
 
@@ -316,6 +327,9 @@ class SpeakingState(Generic[StyleT, ConfigT]):
         style: traits drawn for the session.
         config: tunable numbers.
         speech: remarks queued and said.
+        persona: lasting traits; None where the style was given.
+        temper: style in the usual mood; None before the first event that moves the mood.
+        mood: state of mind.
         count: number of decisions taken.
         clock: time between decisions.
     """
@@ -325,6 +339,9 @@ class SpeakingState(Generic[StyleT, ConfigT]):
     style: StyleT
     config: ConfigT
     speech: SpeechState
+    persona: Persona | None = None
+    temper: StyleT | None = None
+    mood: Mood = field(default_factory=Mood)
     count: int = 0
     clock: DecisionClock = field(default_factory=DecisionClock)
 
@@ -333,6 +350,12 @@ class SpeakingState(Generic[StyleT, ConfigT]):
         updated = copy(self)
         updated.count += 1
         return updated, np.random.default_rng((updated.seed, updated.count))
+
+    def feel(self, happening: Happening, now: float) -> None:
+        """Moves the mood by an event at a time [s], and with it the style."""
+        self.temper = self.style if self.temper is None else self.temper
+        self.mood = self.mood.after(happening, now)
+        self.style = self.temper.in_mood(self.mood)
 
     def say(self, *remarks: Remark) -> None:
         """Queues remarks at the end."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Final, Protocol
 
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.engine.session_engine import SessionEngine
@@ -13,8 +14,11 @@ from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.files import noticing_deletion
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.recording import SessionWriter
+from dorothie_gym.recording import SessionHeader, SessionWriter
 from dorothie_gym.spaces import ActionMapping
+
+PERSONAS: Final = "personas"
+"""Field of a header with the personas of the scripted speakers, by role; see `dorothie_gym.policies.persona`."""
 
 
 class SessionHost(Protocol):
@@ -70,7 +74,8 @@ def play_session(
     with ExitStack() as stack:
         writer = None
         if folder is not None:
-            writer = stack.enter_context(SessionWriter(folder, engine.session_header(), create=create))
+            header = with_personas(engine.session_header(), policies, states)
+            writer = stack.enter_context(SessionWriter(folder, header, create=create))
             stack.enter_context(noticing_deletion(writer.folder))
         recorder = None if writer is None else SessionRecorder(engine, writer)
         if on_step is not None:
@@ -87,3 +92,12 @@ def play_session(
         if writer is not None:
             writer.finish(engine.summary())
     return engine.summary()
+
+
+def with_personas(
+    header: SessionHeader, policies: Mapping[Role, AnyPolicy], states: Mapping[Role, object]
+) -> SessionHeader:  # fmt: skip
+    """Returns a header that records the personas of policies, by role; the same one where there are none."""
+    found = {str(role): policy.persona_of(states[role]) for role, policy in policies.items()}
+    personas = {role: persona for role, persona in found.items() if persona is not None}
+    return replace(header, extra={**header.extra, PERSONAS: personas}) if personas else header

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
@@ -48,7 +48,9 @@ def resimulate(session: Session, town: Town, *, storyboard: StoryboardTemplate |
     """
     engine = _begin(session, town, storyboard)
     with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
-        with SessionWriter(Path(folder) / "again", engine.session_header()) as writer:
+        # personas belong to the policies, which are not played
+        header = replace(engine.session_header(), extra=session.header.extra)
+        with SessionWriter(Path(folder) / "again", header) as writer:
             recorder = SessionRecorder(engine, writer)
             for actions in _decided_actions(engine, session):
                 _step(engine, session, actions)

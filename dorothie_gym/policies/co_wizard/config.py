@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
+from dorothie_gym.policies.mood import Mood
+from dorothie_gym.policies.persona import Driving, Persona, within
+from dorothie_gym.policies.policy import replace
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,24 +161,37 @@ class CoWizardStyle:
     pace: int = USUAL_SPEED
 
     @classmethod
-    def draw(cls, rng: np.random.Generator) -> CoWizardStyle:
-        """Draws a style."""
+    def of(cls, persona: Persona, rng: np.random.Generator) -> CoWizardStyle:
+        """Returns the style of a persona; the random generator adds what is the speaker's own."""
+        gentle, brisk = persona.driving is Driving.GENTLE, persona.driving is Driving.BRISK
         return cls(
-            echoes=float(rng.uniform(0.1, 0.4)),
-            checks=float(rng.uniform(0.1, 0.4)),
-            announces=float(rng.uniform(0.0, 0.18)),
-            silent=float(rng.uniform(0.1, 0.4)),
-            asks=float(rng.uniform(0.5, 1.0)),
-            proposes=float(rng.uniform(0.1, 0.6)),
-            mishears=float(rng.uniform(0.0, 0.05)),
-            careful=float(rng.uniform(0.9, 1.0)),
-            eases=bool(rng.random() < 0.3),
-            gentle=bool(rng.random() < 0.25),
-            rambles=float(rng.uniform(0.15, 0.5)),
-            offers=float(rng.uniform(0.3, 1.0)),
-            reassures=float(rng.uniform(0.0, 0.3)),
-            pace=int(rng.choice((30, 35, 40))),
-            chats=float(rng.uniform(0.1, 0.6)),
-            notices=float(rng.uniform(0.4, 0.95)),
-            recalls=float(rng.uniform(0.1, 0.6)),
+            echoes=within(0.1, 0.4, persona.politeness, rng),
+            checks=within(0.4, 0.1, persona.certainty, rng),
+            announces=within(0.0, 0.18, persona.talkativeness, rng),
+            silent=within(0.75, 0.35, persona.talkativeness, rng),
+            asks=within(1.0, 0.5, persona.certainty, rng),
+            proposes=within(0.1, 0.6, persona.certainty, rng),
+            mishears=within(0.05, 0.0, persona.attention, rng),
+            careful=within(0.9, 1.0, persona.patience, rng),
+            eases=gentle or (not brisk and bool(rng.random() < 0.15)),
+            gentle=gentle,
+            rambles=within(0.1, 0.45, persona.talkativeness, rng),
+            offers=within(0.3, 1.0, persona.attention, rng),
+            reassures=within(0.3, 0.0, persona.certainty, rng),
+            pace=int(rng.choice((30, 35))) if gentle else 40 if brisk else int(rng.choice((35, 40))),
+            chats=within(0.1, 0.6, persona.humour, rng),
+            notices=0.0 if persona.ignores else within(0.4, 0.95, persona.attention, rng),
+            recalls=within(0.1, 0.6, persona.attention, rng),
+        )
+
+    def in_mood(self, mood: Mood) -> CoWizardStyle:
+        """Returns the style as stress and mistrust change it."""
+        return replace(
+            self,
+            checks=mood.likelier_without_trust(self.checks),
+            echoes=mood.likelier_without_trust(self.echoes),
+            asks=mood.likelier_without_trust(self.asks),
+            rambles=mood.rarer(self.rambles),
+            chats=mood.rarer(self.chats),
+            announces=mood.rarer(self.announces),
         )

@@ -44,7 +44,7 @@ CREEP_LEAD, CREEP_RENEW = 16.0, 6.0
 
 def drive(state: CoWizardState, view: CoWizardView) -> Physical | None:
     """Chooses the physical action of this decision; None continues what the car is doing."""
-    for consider in _CONCERNS:
+    for consider in _CONCERNS if view.time >= state.commands.ready_at else _STOPS:
         action = consider(state, view)
         if action is not None:
             return action
@@ -357,9 +357,11 @@ def _set_speed_and_lights(state: CoWizardState, view: CoWizardView) -> Physical 
     return None
 
 
+_STOPS = (_stop_at_place, _stand)
+"""Reasons to stop, for which the Co-Wizard is always ready."""
+
 _CONCERNS: tuple[Callable[[CoWizardState, CoWizardView], Physical | None], ...] = (
-    _stop_at_place,
-    _stand,
+    *_STOPS,
     _carry_out_wish,
     _follow_route,
     _rest,

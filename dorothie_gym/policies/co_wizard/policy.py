@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from dorothie_gym.policies.co_wizard.obstacles import watch_road
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
 from dorothie_gym.policies.co_wizard.understanding_update import listen
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, ObservationMapping, Physical, SpaceLimits
@@ -35,30 +37,43 @@ class ScriptedCoWizard(Policy[CoWizardState]):
         limits: SpaceLimits | None = None,
         style: CoWizardStyle | None = None,
         config: CoWizardConfig | None = None,
+        traits: Mapping[str, Trait] | None = None,
     ) -> None:
         """Prepares the policy.
 
         Args:
             limits: sizes of the spaces.
-            style: traits; None draws them for each session.
+            style: style; None draws a persona for each session, and its style follows from it.
             config: tunable numbers; None takes the defaults.
+            traits: values or ranges of traits of the personas that are drawn, see `parse_traits`.
         """
         super().__init__(Role.CO_WIZARD, limits)
-        self._style, self._config = style, CoWizardConfig() if config is None else config
+        self._style, self._traits = style, traits
+        self._config = CoWizardConfig() if config is None else config
 
     def initial_state(self, seed: int, town: Town) -> CoWizardState:
         """Returns the state before anything was said."""
         rng = np.random.default_rng((seed, 0))
-        style = CoWizardStyle.draw(rng) if self._style is None else self._style
-        speech = SpeechState(role=Role.CO_WIZARD, style=draw_style(Role.CO_WIZARD, rng))
+        persona = Persona.draw(rng, self._traits) if self._style is None else None
+        style = self._style or CoWizardStyle.of(persona or Persona(), rng)
+        speech = SpeechState(
+            role=Role.CO_WIZARD, style=draw_style(Role.CO_WIZARD, rng, None if persona is None else persona.leanings)
+        )
+        if persona is not None:
+            speech = replace(speech, delivery=persona.delivery)
         return CoWizardState(
             seed=seed,
             town=town,
             style=style,
             config=self._config,
             speech=speech,
+            persona=persona,
             intentions=Intentions(speed=style.pace, usual=style.pace),
         )
+
+    def persona_of(self, state: CoWizardState) -> Mapping[str, float | str] | None:
+        """Returns the traits of the session's persona."""
+        return None if state.persona is None else state.persona.to_json()
 
     def step(self, observation: ObservationMapping, state: CoWizardState) -> tuple[ActionDict, CoWizardState]:
         """Listens, looks, drives, and says something or nothing."""

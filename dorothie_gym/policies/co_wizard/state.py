@@ -447,6 +447,7 @@ class CommandState:
         rest_until: end of a stop because of something in the way [s].
         rest_for: what the car stops for.
         rest_decided: whether stopping at the present hazard has been decided on.
+        ready_at: time before which the Co-Wizard has not reacted to an instruction yet, except to stop [s].
     """
 
     standing_since: float | None = 0.0
@@ -459,6 +460,11 @@ class CommandState:
     rest_until: float = -math.inf
     rest_for: ObjectClass = ObjectClass.UNLABELED
     rest_decided: bool = False
+    ready_at: float = -math.inf
+
+    def reacting_until(self, ready_at: float) -> CommandState:
+        """Sets the end of the reaction to an instruction [s]."""
+        return replace(self, ready_at=ready_at)
 
     def observed(self, now: float, *, standing: bool) -> CommandState:
         """Brings the standstill up to date."""

@@ -43,6 +43,7 @@ from dorothie_gym.policies.co_wizard.repetition import note_order
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.story import remember
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend, repeated
@@ -79,6 +80,9 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         return
     state.dialogue = state.dialogue.after_hearing(view.time)
     state.speech = state.speech.heard_other(view.time, heard.acts, rng, state.clock.interval / 2.0)
+    if state.persona is not None:
+        reaction = state.persona.draw_reaction(rng) - state.clock.interval / 2.0
+        state.commands = state.commands.reacting_until(view.time + reaction)
     done = any(GoalStatus.COMPLETE in act.slots for act in heard.acts)
     before = () if done else _still_due(state)
     state.speech = state.speech.cleared()
@@ -351,6 +355,7 @@ def _explanation(
     if _COMMANDS & set(act.values(Slot.ACTION)):
         _instruction(state, view, act, words, rng)  # "you should be turning left" counts as an instruction
     elif GoalStatus.COMPLETE in statuses:
+        state.feel(Happening.DONE, view.time)
         complete(state, name)
         if rng.random() < 0.5:
             state.say(intend(Function.POSITIVE_FEEDBACK))
@@ -376,6 +381,7 @@ def _statement(
     landmarks, statuses = _landmarks(act), act.values(Slot.STATUS)
     name = landmarks[0] if landmarks else None
     if "wrong" in words.text.lower():
+        state.feel(Happening.WRONG_WAY, view.time)
         if not state.beliefs.exact:
             state.route = state.route.with_progress(None)
         state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
@@ -442,6 +448,7 @@ def _yes(
 def _no(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
+    state.feel(Happening.MISUNDERSTOOD, view.time)
     state.dialogue = state.dialogue.after_refusal()
     if state.intentions.arrived:
         doubt(state)
@@ -491,6 +498,7 @@ def _confusion(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Repeats the last remark that can be repeated."""
+    state.feel(Happening.MISUNDERSTOOD, view.time)
     said = [item for item in state.speech.said if item.act.move in _REPEATABLE]
     if not said:
         return

@@ -7,6 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from dorothie_gym.policies.guidance_config import USUAL_SPEED, GuidanceConfig
+from dorothie_gym.policies.mood import Mood
+from dorothie_gym.policies.persona import Directions, Persona, within
+from dorothie_gym.policies.policy import replace
+
+BACKSEAT = 0.22
+"""Knowledge times talkativeness above which a participant guides to known places, too; two in five do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,21 +175,39 @@ class ParticipantStyle:
     puzzled: float = 0.0
 
     @classmethod
-    def draw(cls, rng: np.random.Generator) -> ParticipantStyle:
-        """Draws a style; two in five guide most of the way."""
+    def of(cls, persona: Persona, rng: np.random.Generator) -> ParticipantStyle:
+        """Returns the style of a persona; the random generator adds what is the speaker's own."""
+        precise, vague = persona.directions is Directions.TURNS, persona.directions is Directions.VAGUE
+        landmarks = persona.directions is Directions.LANDMARKS
+        by_turns = persona.knowledge * persona.talkativeness > BACKSEAT
         return cls(
-            guides=0.2 if rng.random() < 0.4 else 0.02,
-            names_goal=float(rng.uniform(0.4, 1.0)),
-            names_street=float(rng.uniform(0.1, 0.7)),
-            hurries=float(rng.uniform(0.4, 0.95)),
-            patience=float(rng.uniform(7.0, 14.0)),
-            chat=float(rng.uniform(40.0, 120.0)),
-            waits=float(rng.uniform(0.5, 0.95)),
-            hints=float(rng.uniform(0.42, 0.87)),
-            reasons=float(rng.uniform(0.24, 0.54)),
-            aligns=float(rng.uniform(0.0, 0.15)),
-            nods=float(rng.uniform(0.5, 0.85)),
-            curious=float(rng.uniform(0.02, 0.25)),
-            puzzled=float(rng.uniform(0.0, 0.35)),
-            notices=float(rng.uniform(0.5, 1.0)),
+            guides=0.2 if by_turns else 0.02,
+            names_goal=within(0.4, 1.0, persona.certainty, rng),
+            names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
+            hurries=within(0.95, 0.4, persona.patience, rng),
+            patience=within(7.0, 14.0, persona.patience, rng),
+            chat=within(140.0, 40.0, (persona.talkativeness + persona.humour) / 2.0, rng),
+            waits=within(0.4, 0.8, persona.patience, rng) + 0.15 * vague,
+            hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
+            reasons=within(0.1, 0.45, persona.talkativeness, rng) + 0.2 * landmarks,
+            aligns=within(0.15, 0.0, persona.certainty, rng),
+            nods=within(0.4, 0.8, persona.politeness, rng),
+            curious=within(0.02, 0.25, persona.attention, rng),
+            puzzled=within(0.35, 0.0, persona.certainty, rng),
+            notices=0.0 if persona.ignores else within(0.5, 1.0, persona.attention, rng),
+        )
+
+    def in_mood(self, mood: Mood) -> ParticipantStyle:
+        """Returns the style as stress, hurry and mistrust change it."""
+        return replace(
+            self,
+            guides=mood.likelier_without_trust(self.guides),
+            aligns=mood.likelier_without_trust(self.aligns),
+            curious=mood.likelier_without_trust(self.curious),
+            hurries=mood.likelier_in_hurry(self.hurries),
+            patience=self.patience * (1.0 - 0.5 * mood.stress),
+            chat=self.chat * (1.0 + 2.0 * mood.stress),
+            nods=mood.rarer(self.nods),
+            reasons=mood.rarer(self.reasons),
+            hints=mood.rarer(self.hints),
         )

@@ -16,6 +16,7 @@ from dorothie_gym.ontology import (
     StreetName,
 )
 from dorothie_gym.policies import contents
+from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.hints import famous_nearby, looks_remark
 from dorothie_gym.policies.participant.state import ParticipantState
@@ -34,6 +35,7 @@ def note_tasks(state: ParticipantState, view: ParticipantView, rng: np.random.Ge
     state.task = state.task.with_subgoals(view.subgoals)
     for old, new in zip(before, view.subgoals, strict=False):
         if new.reached and not old.reached:
+            state.feel(Happening.DONE, view.time)
             _report_done(state, view, new, rng)
         elif new.open and not old.live:
             _report_added(state, view, new, rng)
@@ -41,6 +43,8 @@ def note_tasks(state: ParticipantState, view: ParticipantView, rng: np.random.Ge
             _report_dropped(state, view, old, rng)
         elif new.open and new.landmark != old.landmark:
             _report_changed(state, view, old, new, rng)
+        if new.live is not old.live or (new.open and new.landmark != old.landmark):
+            state.feel(Happening.CHANGED_TASK, view.time)
 
 
 def _report_done(

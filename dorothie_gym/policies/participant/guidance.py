@@ -18,6 +18,7 @@ from dorothie_gym.dialogue import (
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import ActionValue, DialogueMove, Role, Slot, StreetName
 from dorothie_gym.policies.feasibility import slowing_distance
+from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, approach
 from dorothie_gym.policies.participant.hints import hint
@@ -66,6 +67,7 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
         drove_past = before < config.missed_within and former.next_manoeuvre(view.station) is None
         missed = drove_past or state.route.has_missed(before, view.station)
         if state.guidance.guiding and missed:
+            state.feel(Happening.MISSED, view.time)
             state.guidance = state.guidance.after_miss()
             state.route = state.route.after_miss(state.town, view.place, former)
             remark_on_miss(state, view, passed=drove_past)
@@ -89,6 +91,8 @@ def _point_out_wrong_turn(state: ParticipantState, view: ParticipantView, before
     assert progress is not None
     turn_given = guidance.guiding and guidance.step is not None and guidance.step[0] == "turn"
     farther = progress.left(view.station) > before + state.config.wrong_turn_detour and math.isfinite(before)
+    if turn_given and farther:
+        state.feel(Happening.WRONG_WAY, view.time)
     if turn_given and farther and not remark_on_wrong_turn(state, view):
         expires = view.time + WRONG_WAY_EXPIRES
         state.say_only(_wrong_way(state, expires))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from dorothie_gym.dialogue import draw_style
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import Role
+from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.participant.goals import announce_target, choose_target, note_tasks, resume_after_wait
 from dorothie_gym.policies.participant.guidance import follow_route, guide, watch
@@ -15,10 +18,14 @@ from dorothie_gym.policies.participant.reactions import react, scene_of
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.participant.state import ConversationState, ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.speech import SpeechState
 from dorothie_gym.spaces import ActionDict, ObservationMapping, ParticipantAction, SpaceLimits
+
+LONG_RED = 10.0
+"""Standstill at a red light that is felt as long [s]."""
 
 TURN_TIME = 4.0
 """Standstill across the lane after which a car is no longer regarded as turning [s]."""
@@ -36,31 +43,45 @@ class ScriptedParticipant(Policy[ParticipantState]):
         limits: SpaceLimits | None = None,
         style: ParticipantStyle | None = None,
         config: ParticipantConfig | None = None,
+        traits: Mapping[str, Trait] | None = None,
     ) -> None:
         """Prepares the policy.
 
         Args:
             limits: sizes of the spaces.
-            style: traits; None draws them for each session.
+            style: style; None draws a persona for each session, and its style follows from it.
             config: tunable numbers; None takes the defaults.
+            traits: values or ranges of traits of the personas that are drawn, see `parse_traits`.
         """
         super().__init__(Role.PARTICIPANT, limits)
-        self._style, self._config = style, ParticipantConfig() if config is None else config
+        self._style, self._traits = style, traits
+        self._config = ParticipantConfig() if config is None else config
 
     def initial_state(self, seed: int, town: Town) -> ParticipantState:
         """Returns the state at the start of a session."""
         rng = np.random.default_rng((seed, 0))
-        style = ParticipantStyle.draw(rng) if self._style is None else self._style
+        persona = Persona.draw(rng, self._traits) if self._style is None else None
+        style = self._style or ParticipantStyle.of(persona or Persona(), rng)
         chat_at = float(rng.uniform(25.0, style.chat + 25.0))
-        speech = SpeechState(role=Role.PARTICIPANT, style=draw_style(Role.PARTICIPANT, rng))
+        speech = SpeechState(
+            role=Role.PARTICIPANT,
+            style=draw_style(Role.PARTICIPANT, rng, None if persona is None else persona.leanings),
+        )
+        if persona is not None:
+            speech = replace(speech, delivery=persona.delivery)
         return ParticipantState(
             seed=seed,
             town=town,
             style=style,
             config=self._config,
             speech=speech,
+            persona=persona,
             conversation=ConversationState(chat_at=chat_at),
         )
+
+    def persona_of(self, state: ParticipantState) -> Mapping[str, float | str] | None:
+        """Returns the traits of the session's persona."""
+        return None if state.persona is None else state.persona.to_json()
 
     def step(self, observation: ObservationMapping, state: ParticipantState) -> tuple[ActionDict, ParticipantState]:
         """Processes utterances, observes the car, and chooses a remark or silence."""
@@ -101,4 +122,7 @@ def _excuse_at_light(state: ParticipantState, view: ParticipantView) -> None:
         return
     if light_ahead(state.town, view.lane, view.station, view.time) in (None, LightColour.GREEN):
         return
+    waited = state.motion.standstill(view.time)
+    if waited - state.clock.interval < LONG_RED <= waited:
+        state.feel(Happening.RED_LIGHT, view.time)
     state.motion = state.motion.at_red_light(view.time, config.start_time)

@@ -12,6 +12,7 @@ from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import ActionValue, ObjectClass, PropKind, StreetName, WeatherParameter
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
+from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.noticing import PARAMETER, notice, view_remark
 from dorothie_gym.policies.observation_parser import (
     is_dark,
@@ -101,6 +102,7 @@ def note_blocked(state: ParticipantState, view: ParticipantView, near: bool = Fa
         return
     route = state.route.with_roadblock(state.town, found)
     progress = progress.replanned(state.town, view.place, route.blocked)
+    state.feel(Happening.OBSTACLE, view.time)
     state.route = route.with_progress(progress)
     state.guidance = state.guidance.for_new_route(progress.left(view.station))
     if state.guidance.guiding and not near:

@@ -23,6 +23,7 @@ from dorothie_gym.ontology import (
     StreetName,
 )
 from dorothie_gym.policies import contents
+from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import SeenSubgoal, heard_utterance
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, describe, route_length, story_remark, switch_target
@@ -407,6 +408,7 @@ def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, w
     again = correction(state, view, act, words)
     if again is None:
         return False
+    state.feel(Happening.MISUNDERSTOOD, view.time)
     state.task = state.task.after_reminding(view.time)
     refusal = (_denied(_checked(state, act, words)),) if act.move is DialogueMove.CONFIRM else ()
     state.say_only(*refusal, replace(again, joined=bool(refusal)))
@@ -417,6 +419,7 @@ def _confusion(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     """Clarifies the last step, the target, or the last remark."""
+    state.feel(Happening.MISUNDERSTOOD, view.time)
     last, goal = state.speech.last, state.task.goal
     lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
     if last is not None and lately and _is_of_the_moment(last):

@@ -1,0 +1,198 @@
+"""Personas: lasting traits of the scripted speakers, drawn for a session or fixed by its settings."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from dorothie_gym.errors import did_you_mean
+from dorothie_gym.policies.delivery import Delivery
+
+
+class Directions(enum.StrEnum):
+    """How a participant gives directions."""
+
+    TURNS = "turns"
+    """By turns, with ordinals and the names of streets."""
+    LANDMARKS = "landmarks"
+    """By what is to be seen on the way and at the goal."""
+    VAGUE = "vague"
+    """Late and without details, so that the car has to ask."""
+
+
+class Driving(enum.StrEnum):
+    """How a Co-Wizard drives."""
+
+    GENTLE = "gentle"
+    """Slowly, and slower before turns and places."""
+    USUAL = "usual"
+    BRISK = "brisk"
+    """As fast as is usual, without slowing down early."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Persona:
+    """Lasting traits of a speaker. Without a unit, a trait is in [0, 1], and its average is 0.5.
+
+    Attributes:
+        talkativeness: how much is said beside what is needed.
+        patience: how long standstills and silence are borne.
+        politeness: from blunt to polite.
+        certainty: how rarely the speaker hesitates, checks, and asks to repeat.
+        knowledge: how well the participant knows the town: names of streets, and the way.
+        attention: how much of weather, crowds and the way is noticed; below `INATTENTIVE` nothing is remarked on.
+        humour: how much small talk there is.
+        directions: way of giving directions (participant).
+        driving: driving style (Co-Wizard).
+        pace: speaking rate relative to the average.
+        gap: median of the time before a reply [s].
+        reaction: median of the time from the end of an instruction to pedal or button [s].
+    """
+
+    talkativeness: float = 0.5
+    patience: float = 0.5
+    politeness: float = 0.5
+    certainty: float = 0.5
+    knowledge: float = 0.5
+    attention: float = 0.5
+    humour: float = 0.5
+    directions: Directions = Directions.TURNS
+    driving: Driving = Driving.USUAL
+    pace: float = 1.0
+    gap: float = 0.3
+    reaction: float = 0.75
+
+    @property
+    def ignores(self) -> bool:
+        """Whether the speaker remarks on nothing around the car."""
+        return self.attention < INATTENTIVE
+
+    @property
+    def delivery(self) -> Delivery:
+        """Timing of the speech."""
+        return Delivery(
+            pace=self.pace, gap=self.gap, pause=0.5 + 0.6 * self.patience, patience=2.0 + 2.0 * self.patience
+        )
+
+    @property
+    def leanings(self) -> Mapping[str, float]:
+        """Places of the traits of the wording in their ranges, see `draw_style`."""
+        return {
+            "register": self.politeness,
+            "indirectness": self.politeness,
+            "chattiness": self.talkativeness,
+            "disfluency": 1.0 - self.certainty,
+        }
+
+    def draw_reaction(self, rng: np.random.Generator) -> float:
+        """Draws the time from the end of an instruction to pedal or button [s]."""
+        return self.reaction * math.exp(REACTION_SPREAD * float(rng.standard_normal()))
+
+    def to_json(self) -> dict[str, float | str]:
+        """Returns the traits in JSON types."""
+        return {name: value if isinstance(value, str) else round(value, 3) for name, value in asdict(self).items()}
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, given: Mapping[str, Trait] | None = None) -> Persona:
+        """Draws a persona.
+
+        Args:
+            rng: source of randomness; the same numbers are drawn whatever is given.
+            given: values of some traits, or ranges of them.
+        """
+        drawn: dict[str, float | str] = {name: float(rng.random()) for name in SHARES}
+        drawn["directions"] = _pick(rng, {Directions.TURNS: 0.5, Directions.LANDMARKS: 0.25, Directions.VAGUE: 0.25})
+        drawn["driving"] = _pick(rng, {Driving.GENTLE: 0.3, Driving.USUAL: 0.45, Driving.BRISK: 0.25})
+        for name, (median, spread, low, high) in _TIMES.items():
+            drawn[name] = min(max(median * math.exp(spread * float(rng.standard_normal())), low), high)
+        for name, trait in (given or {}).items():
+            place = float(rng.random())
+            drawn[name] = trait if isinstance(trait, str) else trait[0] + (trait[1] - trait[0]) * place
+        return cls(**drawn)  # type: ignore[arg-type]  # the names and types are those of the fields
+
+
+Trait = str | tuple[float, float]
+"""Value of a named trait, or range of a numeric one."""
+
+REACTION_SPREAD: Final = 0.25
+"""Standard deviation of the logarithm of one speaker's reaction times; set by hand."""
+
+INATTENTIVE: Final = 0.08
+"""Attention below which a speaker remarks on nothing around the car."""
+
+SHARES: Final = ("talkativeness", "patience", "politeness", "certainty", "knowledge", "attention", "humour")
+"""Traits in [0, 1]."""
+
+_TIMES: Final[Mapping[str, tuple[float, float, float, float]]] = MappingProxyType(
+    {
+        # between-speaker spread set by hand; rates of short turns are lowered by `Delivery`
+        "pace": (1.08, 0.1, 0.8, 1.4),
+        # English: mean 236 ms over questions (Stivers et al., PNAS 106, 2009); planning takes 600 ms and more (Levinson
+        # and Torreira, Frontiers in Psychology 6:731, 2015)
+        "gap": (0.3, 0.35, 0.12, 0.9),
+        # drivers brake 0.7 to 1.5 s after a signal, by how much it is expected (Green, Transportation Human Factors 2,
+        # 2000)
+        "reaction": (0.75, 0.2, 0.5, 1.4),
+    }
+)
+"""Median, spread of the logarithm between speakers, least and greatest value of the traits with a unit."""
+
+_NAMED: Final[Mapping[str, type[enum.StrEnum]]] = MappingProxyType({"directions": Directions, "driving": Driving})
+
+
+def parse_traits(text: str) -> dict[str, Trait]:
+    """Parses traits as they are given on a command line: "talkativeness=0.8..1,directions=vague".
+
+    Raises:
+        ValueError: a trait or a value is unknown, or out of range.
+    """
+    found: dict[str, Trait] = {}
+    names = [field.name for field in fields(Persona)]
+    for part in text.split(","):
+        name, _, value = (piece.strip() for piece in part.partition("="))
+        if name not in names:
+            raise ValueError(
+                f"there is no trait {name!r}; {did_you_mean(name, names)}the traits are {', '.join(names)}, "
+                "as in talkativeness=0.8..1,directions=vague"
+            )
+        found[name] = _named_value(name, value) if name in _NAMED else _range(name, value)
+    return found
+
+
+def _named_value(name: str, value: str) -> str:
+    try:
+        return _NAMED[name](value)
+    except ValueError:
+        raise ValueError(f"{name} is {value!r}; it must be one of {', '.join(_NAMED[name])}") from None
+
+
+def _range(name: str, text: str) -> tuple[float, float]:
+    low, high = (0.0, 1.0) if name in SHARES else _TIMES[name][2:]
+    ends = text.split("..")
+    try:
+        first, last = float(ends[0]), float(ends[-1])
+    except ValueError:
+        first, last = math.nan, math.nan
+    if len(ends) > 2 or not low <= first <= last <= high:
+        raise ValueError(f"{name} is {text!r}; it must be a number or a range such as {low:g}..{high:g}, within these")
+    return first, last
+
+
+def within(low: float, high: float, trait: float, rng: np.random.Generator) -> float:
+    """Returns a value of a range at the place of a trait, three quarters of it; the rest is the speaker's own."""
+    return low + (high - low) * (0.75 * trait + 0.25 * float(rng.random()))
+
+
+def _pick(rng: np.random.Generator, shares: Mapping[str, float]) -> str:
+    drawn = float(rng.random())
+    for name, share in shares.items():
+        drawn -= share
+        if drawn < 0.0:
+            return name
+    return list(shares)[-1]
