@@ -44,8 +44,9 @@ Players = Annotated[int | None, typer.Option(min=1, help="Number of worker proce
 Participant = Annotated[
     str,
     typer.Option(
-        metavar="scripted|silent|random|FILE",
-        help="Policy of the participant; a file holds a learned policy.",
+        metavar="scripted[:TRAITS]|silent|random|FILE",
+        help="Policy of the participant; a file holds a learned policy. Traits fix the persona: "
+        "scripted:patience=0..0.2,directions=vague.",
         autocompletion=complete_policy("participant"),
     ),
 ]
@@ -54,8 +55,8 @@ CoWizard = Annotated[
     str,
     typer.Option(
         metavar="NAME|FILE",
-        help="Policy of the Co-Wizard: scripted, silent, random, lane-follow, pretrained:maskable-ppo (see "
-        "`policies`), or the folder of a learned policy.",
+        help="Policy of the Co-Wizard: scripted (also with traits), silent, random, lane-follow, "
+        "pretrained:maskable-ppo (see `policies`), or the folder of a learned policy.",
         autocompletion=complete_policy("co_wizard"),
     ),
 ]

@@ -11,7 +11,7 @@ from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import intend
 
-FRAGMENT = 4
+FRAGMENT = 3
 """Largest number of words that are taken for the rest of a misheard utterance if they make no sense."""
 
 

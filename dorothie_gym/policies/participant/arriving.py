@@ -19,7 +19,7 @@ from dorothie_gym.policies.speech import Remark
 STOP_REPEAT = 5.0
 """Time after which the stop instruction is repeated [s]."""
 
-REACTION = 1.2
+REACTION = 1.8
 """Time in which a car that has heard an instruction to stop begins to brake [s]."""
 
 BRAKING = 0.2
