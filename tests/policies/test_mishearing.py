@@ -29,8 +29,15 @@ def test_words_without_sense_are_asked_for_again() -> None:
     assert M.CONFUSE in talk.moves()
 
 
-def test_small_talk_is_no_reason_to_ask() -> None:
+def test_first_words_without_sense_are_asked_for_again_however_long() -> None:
     talk = Talk()
+    says(talk, M.IRRELEVANT, "take me to the tea jack first", decisions=14)
+    assert M.CONFUSE in talk.moves()
+
+
+def test_small_talk_on_the_way_is_no_reason_to_ask() -> None:
+    talk = Talk()
+    says(talk, M.INSTRUCT, "to that place", talk.landmarks(hidden=False)[0].name, decisions=6)
     says(talk, M.IRRELEVANT, "we used to come here every summer when I was little")
     assert M.CONFUSE not in talk.moves()
 

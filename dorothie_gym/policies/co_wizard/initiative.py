@@ -107,7 +107,10 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
     state.dialogue = state.dialogue.after_asking_way(choice.lane, view.time)
     pausing = state.intentions.pausing or (progress is None and bool(rng.random() < state.style.careful))
     state.intentions = state.intentions.with_pause(pausing)
-    if not asked and rng.random() < state.style.proposes:
+    if state.beliefs.goal is None and dialogue.heard_at >= 0.0 and silence > config.goal_interval:
+        # the place may have been misheard, and it helps more than the way
+        state.say(intend(Function.SET_QUESTION, contents.destination(LandmarkName.QUERIED)))
+    elif not asked and rng.random() < state.style.proposes:
         _propose_way(state, view, choice, rng)
     else:
         state.dialogue = state.dialogue.with_proposal(None)

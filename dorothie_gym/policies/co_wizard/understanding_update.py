@@ -510,7 +510,8 @@ def _confusion(
 def _small_talk(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    expected = view.time - state.dialogue.asked_at < state.config.answer_time and state.beliefs.goal is None
+    awaited = not state.beliefs.statuses or view.time - state.dialogue.asked_at < state.config.answer_time
+    expected = awaited and state.beliefs.goal is None and state.intentions.directive is None
     if _senseless(state, view, act, words, asks=expected or is_garbled(words)):
         return
     if rng.random() < state.style.chats:
