@@ -3,7 +3,7 @@
 - weather: `weather` with a parameter of the same kind (fog; rain and wet roads; sun; clouds; wind); `visibility` where
   that kind limits it; `lights_on`, and switching the head lights, for the altitude of the sun;
 - vehicles, pedestrians: `crowded` with their class, and `hinders` near the place;
-- an object on the road: `blocked`; `hinders` or `sees` with an obstacle;
+- an object on the road: `blocked`, and `hinders` with an obstacle;
 - a sensor fault: `failed` with the sensor or with none; `localised` for the GPS; `visibility` for the camera;
 - a task exception: `task`, `goal`, `order` or `purpose` with its landmark.
 
@@ -64,8 +64,8 @@ def _is_about(said: Proposition, kind: ExceptionKind, event: Event, near: bool) 
     if kind in _CROWDS:
         crowd = thing is _CROWDS[kind]
         return crowd and (predicate is Predicate.CROWDED or (predicate is Predicate.HINDERS and near))
-    obstacle = thing is ObjectClass.STATIC and predicate in (Predicate.HINDERS, Predicate.SEES) and not said.asks
-    return predicate is Predicate.BLOCKED or obstacle
+    hinders = predicate is Predicate.HINDERS and thing is ObjectClass.STATIC
+    return predicate is Predicate.BLOCKED or hinders
 
 
 def _is_about_weather(said: Proposition, event: Event) -> bool:

@@ -63,6 +63,7 @@ def test_environment_is_handled_by_what_is_about_it(happened, said):
         (FOG, "it's windy", fog(W.WIND_INTENSITY)),
         (FOG, "slow down before the corner", Proposition.of(P.WILL, action=ActionValue.SPEED_CHANGE)),
         (CONE, "it's past the next block", Proposition.of(P.CLOSE, place=LandmarkName.KFC, negated=True)),
+        (CONE, "is that a dumpster", Proposition.of(P.SEES, object=ObjectClass.STATIC)),
         (GPS, "do you know where we are going", Proposition.of(P.HAS_ROUTE)),
         (GPS, "my camera is blurred", Proposition.of(P.FAILED, sensor=Sensor.BLUR)),
         (PEOPLE, "so many cars", Proposition.of(P.CROWDED, object=ObjectClass.VEHICLES)),
