@@ -23,7 +23,7 @@ from dorothie_gym.ontology import (
     parse_move,
 )
 
-_SENTENCE_END = re.compile(r"(?<=[.?!])\s+")
+_SENTENCE_END = re.compile(r"(?<=[.?!])(?<!\b(?:Mr|Ms|Dr)\.)(?<!\bMrs\.)\s+")
 _DOMAIN_RULE = "%domain"
 _WORD_LISTS = ("domain", "small_talk", "reports")
 

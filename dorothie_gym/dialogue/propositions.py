@@ -240,6 +240,11 @@ class Proposition:
         """The proposition with the other polarity."""
         return Proposition(self.predicate, self.arguments, not self.negated)
 
+    def contains(self, other: Proposition) -> bool:
+        """Returns whether all that another proposition says is said by this one."""
+        same = self.predicate is other.predicate and self.negated is other.negated
+        return same and set(other.arguments) <= set(self.arguments)
+
     def without(self, *names: str) -> Proposition:
         """Returns the proposition without some arguments."""
         kept = tuple((name, value) for name, value in self.arguments if name not in names)

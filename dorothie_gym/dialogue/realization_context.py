@@ -95,6 +95,8 @@ class WordingContext:
         street: street of the car: "this street".
         landmark: a landmark in view: "the KFC over there".
         exception: whether an exception is in progress; selects alarm markers.
+        owner: person whose house is the destination: "Mateo's house".
+        friend: name of the person who is the destination: "my friend Priya".
     """
 
     joined: DialogueMove | None = None
@@ -103,3 +105,5 @@ class WordingContext:
     street: StreetName | None = None
     landmark: LandmarkName | None = None
     exception: bool = False
+    owner: str | None = None
+    friend: str | None = None

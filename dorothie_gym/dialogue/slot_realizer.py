@@ -22,6 +22,7 @@ from dorothie_gym.ontology import (
     SLOT_VALUES,
     ActionValue,
     DialogueAct,
+    GoalStatus,
     LandmarkName,
     PropKind,
     Slot,
@@ -260,7 +261,9 @@ class SlotRealizer:
             return self.pick(lexicon.forms(value, "here"))
         forms = lexicon.phrases[value]
         paraphrased = _COLLOQUIAL * (2 if style.register is _SLANGY else 1)
-        name = self.pick(forms["also" if "also" in forms and self.random() < paraphrased else "say"])
+        name = self._of_person(value) or self.pick(
+            forms["also" if "also" in forms and self.random() < paraphrased else "say"]
+        )
         if not self._of_rider and name.startswith("my "):
             name = f"your {name[3:]}"
         if not named and value is scene.landmark and self.random() < style.chattiness * _DEIXIS:
@@ -271,7 +274,18 @@ class SlotRealizer:
                 name = f"{self.pick(lexicon.phrases[wrong]['say'])}, {self.pick(lexicon.repairs)} {name}"
         return name
 
+    def _of_person(self, value: SlotValue) -> str | None:
+        """Returns a name by a person, "Mateo's house" or "my friend Priya"; None by chance or if it is not known."""
+        scene = self._scene
+        owner, friend = value is LandmarkName.HOUSE and scene.owner, value is LandmarkName.PERSON and scene.friend
+        elsewhere = not _ELSEWHERE.isdisjoint(self.values.get(Slot.STATUS, ()))
+        if not (owner or friend) or elsewhere or self.random() >= _NAMES_PERSON:
+            return None
+        return f"{owner}'s house" if owner else f"my friend {friend}"
 
+
+_NAMES_PERSON = 0.6  # probability that a house or a person is called by name
+_ELSEWHERE = frozenset({GoalStatus.PENDING, GoalStatus.ABANDONED})  # of an errand that is not the present one
 _INDEFINITE = re.compile(r"^(an?|some|another|the) ")
 _POSSESSED = re.compile(r"^(my|your|our|his|her|their|\w+'s) ")
 _NAMELESS = frozenset({"Unknown", "Queried"})

@@ -34,17 +34,17 @@ MANOEUVRE_OVERDUE_DISTANCE = 18.0
 def find_leg(tables: RouteTables, legs: RecordArray[LegRecord], count: int, leg: int, lane: int, station: float) -> int:
     """Returns the leg that a car is on, the present one or one ahead; -1 if it is off the route.
 
-    A car that has passed the end of its leg, where it had to change lanes, turn round or stop, is off the route.
+    A car that has passed the end of a leg, where it had to change lanes, turn round or stop, is not on that leg.
     """
     for k in range(leg, count):
-        if legs[k].lane == lane and (k > leg or not _is_overdue(tables, legs, count, leg, station)):
+        if legs[k].lane == lane and not _is_overdue(tables, legs, count, k, station):
             return k
     return NONE
 
 
 @compiled
 def _is_overdue(tables: RouteTables, legs: RecordArray[LegRecord], count: int, leg: int, station: float) -> bool:
-    """Returns whether the manoeuvre or the goal at the end of the present leg has been passed."""
+    """Returns whether the manoeuvre or the goal at the end of a leg has been passed."""
     if leg + 1 == count:
         return station > legs[leg].end + PASSED
     entry = legs[leg + 1].entry

@@ -160,6 +160,11 @@ class SpeechState:
         """Returns whether no remark is queued."""
         return not self.queue
 
+    @property
+    def has_just_asked_back(self) -> bool:
+        """Returns whether the last remark said that the other speaker was not understood."""
+        return self.last is not None and self.last.act.move is DialogueMove.CONFUSE
+
     def has_just_spoken(self, now: float, within: float) -> bool:
         """Returns whether the last utterance ended no longer than `within` ago [s], or has not ended yet."""
         return now - self.last_end < within
@@ -183,6 +188,18 @@ class SpeechState:
     def cleared(self) -> SpeechState:
         """Drops the queued remarks."""
         return replace(self, queue=())
+
+    def without_told(self, told: Proposition | None) -> SpeechState:
+        """Drops the queued statements of what the other speaker has just said; what is joined to them stays."""
+        if told is None:
+            return self
+        kept, dropped = [], False
+        for item in self.queue:
+            same = item.act.move is DialogueMove.EXPLAIN and any(said.contains(told) for said in item.meaning)
+            if not same:
+                kept.append(replace(item, joined=False) if dropped and item.joined else item)
+            dropped = same
+        return replace(self, queue=tuple(kept))
 
     def hold(self, until: float) -> SpeechState:
         """Extends the silence to a time [s]."""

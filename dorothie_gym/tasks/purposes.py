@@ -31,6 +31,7 @@ class Purpose:
             the verb needs it: "take lunch to Mrs. Silva's", "bring the child to Coco".
         place: place with its preposition, "at Ikea", "from Anton's"; None if the text names none.
         person: person that the errand is for or leads to: "Mateo's mother", "Yusuf"; None if the text names none.
+        owner: person whose house it leads to: "Samuel" of "Samuel's house", "my sister"; None if the text names none.
         items: what is bought, fetched or brought: "a newspaper", "the spare key".
         reason: clause as it follows "because": "the buses are on strike"; None if the text gives none.
     """
@@ -39,6 +40,7 @@ class Purpose:
     action: str | None = None
     place: str | None = None
     person: str | None = None
+    owner: str | None = None
     items: tuple[str, ...] = ()
     reason: str | None = None
 
@@ -80,7 +82,7 @@ def read_purpose(line: str) -> Purpose:
     if imperative is None:
         owner = _HOUSE.search(clause)
         person = None if owner is None else _owner(owner)
-        return Purpose(text=text, person=person, items=items, reason=reason)
+        return Purpose(text=text, person=person, owner=_named_owner(person), items=items, reason=reason)
     action, place, owner_name = _without_place(imperative)
     spoken = in_first_person(action) if action is not None else None
     person = _person(imperative if action is None else action) or owner_name
@@ -89,9 +91,17 @@ def read_purpose(line: str) -> Purpose:
         action=spoken,
         place=None if place is None else in_first_person(place),
         person=None if person is None else in_first_person(person),
+        owner=_named_owner(owner_name),
         items=items or _object(action),
         reason=reason,
     )
+
+
+def _named_owner(owner: str | None) -> str | None:
+    """Returns the owner of a house as the participant names it; None for "the bride" and the like."""
+    if owner is None or owner.lower().startswith(("the ", "a ", "an ")):
+        return None
+    return in_first_person(owner)
 
 
 @functools.lru_cache(maxsize=256)

@@ -51,3 +51,9 @@ def test_equal_turns_before_one_junction_are_a_loop():
 def test_left_and_right_are_different_orders():
     sides = zip((5.0, 7.0, 9.0), ("right", "left", "right"), strict=True)
     assert not has_loop(drive(*(human(time, f"take the next {side}", M.INSTRUCT, A.J_TURN) for time, side in sides)))
+
+
+def test_other_order_in_between_does_not_end_a_loop():
+    other = human(22.0, "take the next right", M.INSTRUCT, A.J_TURN)
+    assert has_loop(drive(turns_round(5.0), turns_round(20.0), other, turns_round(35.0)))
+    assert not has_loop(drive(turns_round(5.0), turns_round(20.0), other))

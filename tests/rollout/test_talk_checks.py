@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.analysis.talk.checks import TalkChecks, check_session, has_loop
+from dorothie_gym.analysis.talk.checks import TalkChecks, check_session
 from dorothie_gym.analysis.talk.session_world import SessionWorld
 from dorothie_gym.analysis.talk.truth import agrees, is_right_cause, is_true
 from dorothie_gym.dialogue import ASKED, Direction, Predicate, Proposition
@@ -185,16 +185,6 @@ def test_answers_are_about_what_was_asked():
     assert exchange(close, Proposition.of(P.CLOSE, place=LandmarkName.IKEA)) == 0.0
     assert exchange(time, Proposition.of(P.ARRIVES_IN, place=LandmarkName.KFC, seconds=30)) == 1.0
     assert exchange(STANDS, Proposition.of(P.BECAUSE, effect=STANDS, cause=Proposition.of(P.RED))) == 1.0
-
-
-def test_same_order_three_times_in_a_row_is_a_loop():
-    def order(start: float, action: ActionValue) -> list:
-        return human(start, "do it", M.INSTRUCT, action)
-
-    turns = [order(5.0 * k, A.U_TURN) for k in range(1, 4)]
-    assert has_loop(drive(*turns))
-    assert not has_loop(drive(*turns[:2]))
-    assert not has_loop(drive(turns[0], turns[1], order(12.0, A.J_TURN), turns[2]))
 
 
 def test_command_prints_every_figure(tmp_path: Path, world):

@@ -45,7 +45,8 @@ def acknowledge(
     elif rng.random() < state.style.echoes:
         state.say(*_repeated(wanted, wording, rng))
     else:
-        state.say(taken_on(state, wanted, rng), *plan_remark(state, view, rng, joined=True))
+        more = () if action in _AT_ONCE else plan_remark(state, view, rng, joined=True)
+        state.say(taken_on(state, wanted, rng), *more)
 
 
 def taken_on(state: CoWizardState, wanted: Proposition, rng: np.random.Generator) -> Remark:

@@ -51,7 +51,7 @@ def answer_yes_no(
     """Answers a yes/no question by what the Co-Wizard believes of it."""
     asked = asked_proposition(act, words)
     if asked is None:
-        state.say(intend(Function.UNCERTAIN_ANSWER))
+        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
     elif asked.predicate is Predicate.LIGHTS_ON:
         _answer_lights(state, view)
     else:

@@ -11,6 +11,7 @@ from dorothie_gym.dialogue import Predicate, Proposition, Wording
 from dorothie_gym.maps.routing import Place, router
 from dorothie_gym.ontology import (
     ActionValue,
+    DialogueMove,
     GoalStatus,
     LandmarkName,
     MentalAction,
@@ -101,6 +102,8 @@ def set_goal(
         state.beliefs = state.beliefs.with_status(dropped, GoalStatus.ABANDONED)
     if mark is None:
         _set_unknown_goal(state, name, streets, rng)
+        if any(item.act.move is DialogueMove.QUERY_W for item in state.speech.queue):
+            state.dialogue = state.dialogue.after_asking(view.time)
         return
     aim(state, view, mark)
     if dropped is not None:
@@ -235,8 +238,11 @@ def hear_description(
         if not state.intentions.arrived:
             state.intentions = state.intentions.resumed()
     street = streets[0] if streets and rng.random() < state.style.echoes else None
-    heard = None if street is None else contents.located(goal, street)
-    state.say(intend(Function.POSITIVE_FEEDBACK, heard, elided=("place",)))
+    if street is None:
+        asked = view.time - state.dialogue.asked_at < state.config.answer_time
+        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="answered" if asked else "told")))
+    else:
+        state.say(intend(Function.POSITIVE_FEEDBACK, contents.located(goal, street), elided=("place",)))
     if rng.random() < state.style.reassures:
         state.say(intend(Function.FEEDBACK_ELICITATION, joined=True))
 

@@ -75,6 +75,7 @@ def scene_of(state: CoWizardState, view: CoWizardView) -> WordingContext:
         street=street if street is not StreetName.UNKNOWN else None,
         landmark=landmark.name if landmark is not None else None,
         exception=state.dialogue.detour_asked_at is not None or blocked,
+        owner=state.beliefs.owner if state.beliefs.goal is LandmarkName.HOUSE else None,
     )
 
 
@@ -170,11 +171,14 @@ def _say_arrived(state: CoWizardState, view: CoWizardView, rng: np.random.Genera
 
 def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     intentions, dialogue, config = state.intentions, state.dialogue, state.config
+    goal = state.beliefs.goal
+    lost = goal is not None and not state.beliefs.exact and intentions.halted and not intentions.arrived
     idle = (
-        state.beliefs.goal is None
+        (goal is None or lost)
         and intentions.directive is None
         and intentions.wish is None
         and intentions.nudge is None
+        and state.route.progress is None
     )
     if not idle or intentions.creeping:
         state.dialogue = dialogue.busy(view.time)
@@ -190,6 +194,9 @@ def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator
     draw = rng.random()
     if again and draw < 0.5:
         state.say(intend(Function.FEEDBACK_ELICITATION))
+    elif lost:
+        asked = contents.located(goal, StreetName.QUERIED) if draw < 0.75 else contents.action(ActionValue.QUERIED)
+        state.say(intend(Function.SET_QUESTION, asked))
     elif state.beliefs.statuses and draw < 0.25:
         state.say(intend(Function.SET_QUESTION, contents.errand(None, GoalStatus.QUERIED)))
     else:

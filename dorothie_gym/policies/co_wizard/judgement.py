@@ -190,7 +190,8 @@ def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | N
         return Proposition.of(Predicate.TOLD, action=ActionValue.STOP)
     if goal is None and intentions.directive is None:
         return Proposition.of(Predicate.GOAL, negated=True)
-    if view.motion is Motion.WAITING or intentions.pausing:
+    guided = goal is not None and not state.beliefs.exact and state.route.progress is None
+    if view.motion is Motion.WAITING or intentions.pausing or (guided and intentions.directive is None):
         return Proposition.of(Predicate.HAS_ROUTE, negated=True)
     return None
 

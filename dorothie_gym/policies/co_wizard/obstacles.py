@@ -22,7 +22,7 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
     """Looks for obstacles on the path, announces a new one, and asks about a detour or takes it."""
     asked_at = state.dialogue.detour_asked_at
     if asked_at is not None and view.time - asked_at > state.config.detour_answer_time:
-        take_detour(state, view, rng)
+        take_detour(state, view, rng, agreed=False)
     thing = _obstacle_on_path(state, view)
     if thing is None or view.manoeuvring:
         return
@@ -81,8 +81,15 @@ def _distance_to_path(waypoints: np.ndarray, thing: SeenObject) -> float:
     return float(np.hypot(*(offset - np.clip(share, 0.0, 1.0)[:, None] * step).T).min())
 
 
-def take_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Plans another route and announces it."""
+def take_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generator, *, agreed: bool = True) -> None:
+    """Plans another route, and says so.
+
+    Args:
+        state: working copy of the state.
+        view: observation.
+        rng: random generator of the decision.
+        agreed: whether the participant has asked for it, or agreed to it.
+    """
     state.dialogue = state.dialogue.with_detour_question(None)
     state.intentions = state.intentions.resumed()
     plan_route(state, view)
@@ -92,7 +99,8 @@ def take_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generat
     street = first_new_street(view.raw, state.town, view.lane, progress)
     if street is not None:
         over = contents.action(None, street=street)
-        state.say(intend(CommunicativeFunction.CONFIRM, over, wording=Wording(topic="detour")))
+        function = CommunicativeFunction.ACCEPT if agreed else CommunicativeFunction.INFORM
+        state.say(intend(function, over, wording=Wording(topic="detour")))
     if progress.turns_round_first(state.town, view.station) and rng.random() < 0.6:
         turn = contents.action(ActionValue.U_TURN)
         state.say(intend(CommunicativeFunction.INFORM, turn, joined=street is not None))

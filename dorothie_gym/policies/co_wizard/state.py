@@ -206,6 +206,8 @@ class BeliefState:
         ruled_out: places of houses and people that were visited, or that were not the ones meant.
         updates: belief updates (mental actions) to be sent, the next first.
         told: purposes of errands that the participant has told, the latest last.
+        sent_goal: landmark of the last goal update with a guessed place.
+        owner: person whose house the goal is, as the participant has told; None if it is none, or nobody's by name.
     """
 
     goal: LandmarkName | None = None
@@ -217,6 +219,8 @@ class BeliefState:
     ruled_out: tuple[Place, ...] = ()
     updates: tuple[Mental, ...] = ()
     told: tuple[Proposition, ...] = ()
+    sent_goal: LandmarkName | None = None
+    owner: str | None = None
 
     @property
     def stop_place(self) -> Place | None:
@@ -231,6 +235,10 @@ class BeliefState:
         """Keeps what the participant has told about an errand."""
         return replace(self, told=(*self.told, told))
 
+    def with_owner(self, owner: str | None) -> BeliefState:
+        """Sets the person whose house the goal is."""
+        return replace(self, owner=owner)
+
     def after_sending(self) -> BeliefState:
         """Removes the first queued update."""
         return replace(self, updates=self.updates[1:])
@@ -243,7 +251,7 @@ class BeliefState:
 
     def with_known_goal(self, landmark: LandmarkName, place: Place) -> BeliefState:
         """Sets a goal whose place is on the map."""
-        return replace(self, goal=landmark, place=place, exact=True)
+        return replace(self, goal=landmark, place=place, exact=True, sent_goal=None)
 
     def with_unknown_goal(self, landmark: LandmarkName) -> BeliefState:
         """Sets a goal whose place is not on the map; a description of the same goal stays valid."""
@@ -259,7 +267,9 @@ class BeliefState:
         where = LanePosition(lane=place[0], metres=round(place[1]))
         guess = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=landmark, place=where)
         others = (update for update in self.updates if update.action is not MentalAction.KNOWLEDGE_UPDATE)
-        updated = replace(self, place=place, updates=(*others, guess))
+        updated = replace(self, place=place, updates=(*others, guess), sent_goal=landmark)
+        if landmark is self.sent_goal:
+            return updated
         return updated.with_update(Mental(action=MentalAction.GOAL_UPDATE, goals=(landmark,)))
 
     def with_plan(self, junctions: tuple[int, ...]) -> BeliefState:
@@ -282,7 +292,7 @@ class BeliefState:
 
     def without_goal(self) -> BeliefState:
         """Removes the goal."""
-        return replace(self, goal=None, place=None, exact=False, plan=())
+        return replace(self, goal=None, place=None, exact=False, plan=(), sent_goal=None)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,6 +20,9 @@ _CLAUSE = re.compile(
     r"\bI(?:'m| am)? (?:have to|need to|want to|supposed to) (?P<errand>(?:[^,.?]|(?<=\b(?:Mr|Ms|Dr))\.|(?<=\bMrs)\.)+)"
 )
 _OF_SPEAKER = re.compile(r"^(my|our) ")
+_OWNER = re.compile(
+    r"\b(?P<owner>(?:(?:Mr|Mrs|Ms|Dr|Se.ora)\.? )?(?:[A-Z]\w+ ){0,2}[A-Z]\w+|my \w+)'s (?:house|home|place)\b"
+)
 _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
 
 
@@ -38,6 +41,19 @@ def remember(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generat
     if rng.random() < state.style.recalls:
         joined = not state.speech.idle
         state.say(intend(Function.POSITIVE_FEEDBACK, told, elided=("place",), joined=joined))
+
+
+def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
+    """Keeps whose house the participant wants to go to: "Mateo" of "go to Mateo's house"."""
+    named = {value for act in heard.acts for value in act.values(Slot.LANDMARK)}
+    later = any(GoalStatus.PENDING in act.slots or _OVER & act.slots for act in heard.acts)
+    if LandmarkName.HOUSE not in named or later:
+        return
+    found = _OWNER.search(heard.words.text)
+    if found is not None:
+        state.beliefs = state.beliefs.with_owner(_OF_SPEAKER.sub("your ", found["owner"]))
+    elif state.beliefs.goal is not LandmarkName.HOUSE:
+        state.beliefs = state.beliefs.with_owner(None)  # another house than the last one
 
 
 def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:

@@ -41,7 +41,7 @@ from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, is_garbled, note_contradiction
 from dorothie_gym.policies.co_wizard.repetition import note_order
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
-from dorothie_gym.policies.co_wizard.story import remember
+from dorothie_gym.policies.co_wizard.story import note_owner, remember
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
@@ -84,12 +84,14 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
         reaction = state.persona.draw_reaction(rng) - state.clock.interval / 2.0
         state.commands = state.commands.reacting_until(view.time + reaction)
     done = any(GoalStatus.COMPLETE in act.slots for act in heard.acts)
+    state.speech = state.speech.without_told(heard.words.told)
     before = () if done else _still_due(state)
     state.speech = state.speech.cleared()
     if _mishears(state, heard, rng):
         state.say(intend(Function.NEGATIVE_FEEDBACK), *before)
         return
     state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
+    note_owner(state, heard)
     for act in heard.acts:
         react = _REACTIONS.get(act.move)
         if react is not None:
@@ -114,7 +116,12 @@ def _still_due(state: CoWizardState) -> tuple[Remark, ...]:
 
 
 def _in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
-    """Joins the answers to an utterance; a mere "okay" is dropped where something more is said for itself."""
+    """Joins the answers to an utterance.
+
+    A mere "okay" is dropped where something more is said for itself, and "what?" where a part of it was understood.
+    """
+    understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
+    answers = understood or answers[:1]
     plain = [item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots for item in answers]
     leads = [following.joined for following in answers[1:]]
     kept = [
@@ -146,7 +153,7 @@ def _instruction(
         name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
         approach_stop(state, view, name, float(words.distance))
         if state.speech.idle and rng.random() > state.style.silent:
-            state.say(intend(Function.POSITIVE_FEEDBACK))
+            state.say(_heard("taken"))
     elif actions:
         _obey(state, view, act, actions, words, rng)
     elif streets:
@@ -358,11 +365,11 @@ def _explanation(
         state.feel(Happening.DONE, view.time)
         complete(state, name)
         if rng.random() < 0.5:
-            state.say(intend(Function.POSITIVE_FEEDBACK))
+            state.say(_heard("done"))
     elif GoalStatus.ABANDONED in statuses:
         abandon(state, name)
         if name is None:
-            state.say(intend(Function.POSITIVE_FEEDBACK))
+            state.say(_heard("told"))
         else:
             _accept_change(state, contents.errand(name, GoalStatus.ABANDONED), rng)
     elif name is not None and not statuses and (state.beliefs.goal is None or state.intentions.arrived):
@@ -387,9 +394,14 @@ def _statement(
         state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
-        state.say(intend(Function.POSITIVE_FEEDBACK))
+        state.say(_heard("told"))
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
-        state.say(intend(Function.POSITIVE_FEEDBACK))
+        state.say(_heard("told"))
+
+
+def _heard(topic: str) -> Remark:
+    """Returns the sign that something was heard: an order ("taken"), news ("told"), an answer, or an errand done."""
+    return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
 
 
 def _reply(
@@ -412,7 +424,7 @@ def _reply(
     elif view.time - state.dialogue.asked_at < state.config.answer_time and words.order is None and not act.slots:
         state.say(intend(Function.NEGATIVE_FEEDBACK))  # it does not answer the question
     elif rng.random() < 0.5:
-        state.say(intend(Function.POSITIVE_FEEDBACK))
+        state.say(_heard("answered"))
 
 
 def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
@@ -515,7 +527,8 @@ def _small_talk(
     if _senseless(state, view, act, words, asks=expected or is_garbled(words)):
         return
     if rng.random() < state.style.chats:
-        state.say(intend(Function.OTHER if rng.random() < 0.6 else Function.POSITIVE_FEEDBACK))
+        replies = intend(Function.OTHER, wording=Wording(topic="reply"))
+        state.say(replies if rng.random() < 0.6 else _heard("chat"))
 
 
 _REACTIONS: dict[

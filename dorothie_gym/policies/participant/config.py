@@ -105,7 +105,7 @@ class ParticipantConfig(GuidanceConfig):
     run_up: float = 45.0
     run_up_per_lane: float = 50.0
     lane_return_time: float = 30.0
-    way_round_cost: float = 150.0
+    way_round_cost: float = 400.0
     off_route: int = 3
     missed_within: float = 15.0
     wrong_turn_detour: float = 60.0

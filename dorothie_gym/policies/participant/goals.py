@@ -58,6 +58,7 @@ def _report_done(
     delay = float(rng.uniform(*state.config.report_delay))
     state.speech = state.speech.cleared().hold(view.time + delay).plan(done)
     state.task = state.task.closed(subgoal.index)
+    state.task = state.task.after_finishing(None if landmark is None else landmark.name, view.time)
     if subgoal.index == state.task.target:
         state.forget_target()
         same_breath = bool(rng.random() < state.style.hurries)
@@ -246,7 +247,7 @@ PURPOSES = 0.75
 
 def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns what the target is for, or why it matters, as the story tells; nothing where the story does not."""
-    told, goal = _purpose(state, view), state.task.goal
+    told, goal = purpose_of_target(state, view), state.task.goal
     if told is None or goal is None:
         return ()
     options = {
@@ -273,7 +274,7 @@ def _as_afterthought(item: Remark) -> Remark:
     return replace(item, wording=dataclasses.replace(item.wording, topic="reason_after"))
 
 
-def _purpose(state: ParticipantState, view: ParticipantView) -> Purpose | None:
+def purpose_of_target(state: ParticipantState, view: ParticipantView) -> Purpose | None:
     """Returns the purpose of the target; None without a target, or if the list does not tell."""
     live = [subgoal.index for subgoal in view.subgoals if subgoal.live]
     purposes = read_purposes(str(view.raw["tasks"]))

@@ -73,6 +73,10 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
             remark_on_miss(state, view, passed=drove_past)
         state.guidance = state.guidance.for_another_approach()
         _point_out_wrong_turn(state, view, before)
+        assert state.route.progress is not None
+        if drove_past and not state.guidance.guiding:
+            # the car has not been told yet that it is there
+            state.guidance = state.guidance.for_new_route(state.route.progress.left(view.station))
     assert state.route.progress is not None
     state.guidance = state.guidance.with_distance(state.route.progress.left(view.station))
 

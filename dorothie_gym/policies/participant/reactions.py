@@ -23,6 +23,7 @@ from dorothie_gym.policies.observation_parser import (
     street_of,
     weather,
 )
+from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
@@ -56,11 +57,19 @@ def scene_of(state: ParticipantState, view: ParticipantView) -> WordingContext:
     """Returns the context that utterances may refer to: street, landmark nearby, and whether there is an exception."""
     landmark = nearest_landmark(view.raw, view.landmarks, *view.position)
     street = street_of(view.raw, state.town, view.lane)
+    purpose = purpose_of_target(state, view)
     return WordingContext(
         street=street if street is not StreetName.UNKNOWN else None,
         landmark=landmark.name if landmark is not None else None,
         exception=is_foggy(view.raw) or is_rainy(view.raw),
+        owner=None if purpose is None else purpose.owner,
+        friend=None if purpose is None else _first_name(purpose.person),
     )
+
+
+def _first_name(person: str | None) -> str | None:
+    """Returns the name of a person that is called by one name: not "Aunt Mei" or "the children"."""
+    return person if person is not None and person.isalpha() and person[0].isupper() else None
 
 
 def react(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -225,7 +234,8 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
         return
     if view.time - conversation.heard_at < 4.0:
         return
-    stands = state.motion.standing_since is not None and view.time - state.motion.moved_at > config.long_stop
+    long = view.time - state.motion.moved_at > config.long_stop and view.time > state.motion.excused_until
+    stands = state.motion.standing_since is not None and long
     if not stands and not view.turning:
         return
     state.conversation = conversation.after_wondering(view.time)

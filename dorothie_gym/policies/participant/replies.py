@@ -24,7 +24,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.mood import Happening
-from dorothie_gym.policies.observation_parser import SeenSubgoal, heard_utterance
+from dorothie_gym.policies.observation_parser import HeardUtterance, SeenSubgoal, heard_utterance
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, describe, route_length, story_remark, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
@@ -54,6 +54,11 @@ _AFTER_A_NOD = frozenset({DialogueMove.EXPLAIN, DialogueMove.INSTRUCT})
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START, ActionValue.SPEED_CHANGE, ActionValue.LIGHT_CHANGE})
 """Actions that are wanted at once and are not steps of the way."""
 
+_GARBLED_WHERE = re.compile(r"(so|and|now|well|okay|,| )*where\b")
+
+JUST_DONE = 12.0
+"""Time for which the last errand is what a car that asks whether it has arrived means [s]."""
+
 _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we're at|we are at)\b")
 """Words by which the car says that it has come to a place."""
 
@@ -76,6 +81,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
         state.conversation = state.conversation.with_puzzle(None)
     noticed = state.conversation.noticed.after_hearing(heard.words, view.time)
     state.conversation = state.conversation.with_noticed(noticed)
+    state.speech = state.speech.without_told(heard.words.told)
     if heard.words.told is not None and heard.words.told.predicate in _POOR_VIEW:
         state.conversation = state.conversation.after_talking_about_view()
     asked = any(act.move is DialogueMove.QUERY_W for act in heard.acts)
@@ -88,7 +94,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
             answer(state, view, act, heard.words, rng)
     if state.speech is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
         # an utterance that takes up an instruction needs no acknowledgement of its own
-        _nod(state, view, rng, alone=heard.acts[0].move not in _ACKNOWLEDGEMENTS)
+        _nod(state, view, rng, _nod_to(view, heard), alone=heard.acts[0].move not in _ACKNOWLEDGEMENTS)
 
 
 # --- yes/no questions-------------- --------------------------------------------------------------------------------
@@ -184,7 +190,10 @@ def _yes_or_no(
 ) -> None:
     objects, landmarks = act.values(Slot.OBJECT), act.values(Slot.LANDMARK)
     offered = _offered_subgoal(state, view, landmarks)
-    if offered is not None:
+    if _asks_about_finished(state, view, act, words):
+        there = Proposition.of(Predicate.ARRIVED, place=state.task.finished[0])
+        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, there))
+    elif offered is not None:
         _answer_offer(state, view, offered)
     elif act.values(Slot.STREET) and not landmarks and not act.values(Slot.ACTION):
         _answer_street(state, view, act)
@@ -213,6 +222,17 @@ def _yes_or_no(
         unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
         yes = _short(Function.AFFIRMATIVE_ANSWER, asked)
         state.say_first(*unsure, yes, *(() if unsure else _addition(state, view, rng)))
+
+
+def _asks_about_finished(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText
+) -> bool:  # fmt: skip
+    """Returns whether the car, which stands, asks if it has arrived where an errand was just done."""
+    place, at = state.task.finished
+    if not view.standing or view.time - at > JUST_DONE:
+        return False
+    asks = words.asked is not None and words.asked.predicate is Predicate.ARRIVED
+    return asks and set(act.values(Slot.LANDMARK)) <= {place}
 
 
 def _offered_subgoal(
@@ -295,8 +315,12 @@ def _open_question(
         if not _was_just_named(state, view):
             state.set_guiding(True)
             _name_step(state, view, DialogueMove.REPLY_W, rng)
-    else:
+    elif landmarks or act.values(Slot.STREET) or words.asked is not None:
         describe(state, view, Function.ANSWER, rng)
+    elif _GARBLED_WHERE.match(words.text.lower()) or state.speech.has_just_asked_back:
+        _name_target(state, view, rng)  # most probably
+    else:
+        state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
 
 
 def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *more: Remark) -> None:
@@ -390,17 +414,28 @@ def _explanation(
             note_blocked(state, view, near=True)
 
 
-def _nod(state: ParticipantState, view: ParticipantView, rng: np.random.Generator, *, alone: bool) -> None:
+def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
+    """Returns the sign that an explanation was heard: a reason for a stop, something to be seen, or anything else."""
+    said = {value for act in heard.acts for value in act.slots}
+    objects = any(isinstance(value, ObjectClass) for value in said)
+    reason = ActionValue.STOP in said or (objects and view.standing)
+    topic = "why" if reason else "seen" if objects or heard.words.told is not None else None
+    return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
+
+
+def _nod(
+    state: ParticipantState, view: ParticipantView, rng: np.random.Generator, nod: Remark, *, alone: bool
+) -> None:  # fmt: skip
     """Acknowledges an explanation: before the next remark, or, where `alone` allows it, by itself."""
     waiting = state.speech.queue
     if waiting and not waiting[0].urgent and not waiting[0].text:
         done = GoalStatus.COMPLETE in waiting[0].act.slots
         if waiting[0].act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:
-            state.speech = state.speech.led_by(intend(Function.POSITIVE_FEEDBACK))
+            state.speech = state.speech.led_by(nod)
     elif not alone or not state.speech.idle or (state.guidance.guiding and about_to_arrive(state, view)):
         return
     elif rng.random() < state.style.nods:
-        state.say(intend(Function.POSITIVE_FEEDBACK), *_addition(state, view, rng))
+        state.say(nod, *_addition(state, view, rng))
 
 
 def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:

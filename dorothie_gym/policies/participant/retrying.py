@@ -99,8 +99,10 @@ def _try_another_way(state: ParticipantState, view: ParticipantView, reason: Rem
     progress = RouteProgress.plan(state.town, view.place, progress.goal, state.route.closed, cost)
     state.route = state.route.with_progress(progress)
     state.guidance = replace(state.guidance, u_turns=0, step=None, best=progress.left(view.station))
-    another = Proposition.of(Predicate.WILL)
-    way = intend(CommunicativeFunction.REQUEST, another, wording=Wording(topic="another_way"), joined=True)
+    turns_round = progress.turns_round_first(state.town, view.station)
+    another = Proposition.of(Predicate.WILL, action=ActionValue.U_TURN if turns_round else None)
+    wording = Wording(topic="once_more" if turns_round else "another_way")
+    way = intend(CommunicativeFunction.REQUEST, another, elided=("action",), wording=wording, joined=True)
     state.say_only(reason, way)
 
 

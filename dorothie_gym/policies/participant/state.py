@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from dorothie_gym.dialogue import Proposition
+from dorothie_gym.ontology import LandmarkName
 from dorothie_gym.policies.noticing import Noticed
 from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
@@ -122,6 +123,7 @@ class TaskProgress:
         resume_at: time at which a car that was asked to wait is sent on [s]; infinite where it does not wait.
         put_off: subgoals that were interrupted and are to be resumed.
         told: what has been said about the way to the target, its place, and what the speaker feels about it.
+        finished: landmark of the last errand that is done, and when it was done [s].
     """
 
     subgoals: tuple[SeenSubgoal, ...] = ()
@@ -135,6 +137,7 @@ class TaskProgress:
     resume_at: float = math.inf
     put_off: frozenset[int] = frozenset()
     told: frozenset[Proposition] = frozenset()
+    finished: tuple[LandmarkName | None, float] = (None, -math.inf)
 
     def with_subgoals(self, subgoals: tuple[SeenSubgoal, ...]) -> TaskProgress:
         """Sets the subgoals as observed."""
@@ -179,6 +182,10 @@ class TaskProgress:
     def put_off_target(self) -> TaskProgress:
         """Marks the target as interrupted."""
         return self if self.target is None else replace(self, put_off=self.put_off | {self.target})
+
+    def after_finishing(self, landmark: LandmarkName | None, now: float) -> TaskProgress:
+        """Records the landmark of an errand that is done, at a time [s]."""
+        return replace(self, finished=(landmark, now))
 
     def closed(self, index: int) -> TaskProgress:
         """Removes a subgoal from those to be resumed."""

@@ -77,8 +77,8 @@ class Played(NamedTuple):
 
 
 def play(folder: Path, *, town: str, seed: int, seconds: float) -> Played:
-    """Plays a session of the scripted three."""
-    env = DuoWizardEnv(town, config=EnvConfig(max_seconds=seconds))
+    """Plays a session of the scripted three, in which every word is recognised."""
+    env = DuoWizardEnv(town, config=EnvConfig(max_seconds=seconds, word_error_rate=0.0))
     policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
     policies[Role.CO_WIZARD] = listener = Listening(policies[Role.CO_WIZARD])
     play_session(env, policies, seed=seed, folder=folder)

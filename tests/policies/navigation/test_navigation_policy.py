@@ -67,7 +67,7 @@ class Ride:
     """Session in which the test speaks as the participant and keeps the driver's observations."""
 
     def __init__(self, seed: int = 0) -> None:
-        self.env = DuoWizardEnv("brookside", config=EnvConfig(words_per_second=20.0))
+        self.env = DuoWizardEnv("brookside", config=EnvConfig(words_per_second=20.0, word_error_rate=0.0))
         self.observations, _ = self.env.reset(seed=seed)
         self.player = NavigationPolicy(self._drive, self.env.limits)
         self.state = self.player.initial_state(0, self.env.town)
