@@ -19,8 +19,8 @@ from dorothie_gym.maps.model import Array
 CELL = 24.0
 """Size of a cell [m]."""
 
-TILE = 16
-"""Size of a tile of samples [samples]."""
+TILE = 8
+"""Size of a tile of samples [samples]; `find_tiles` compares eight rows and columns at once."""
 
 _RINGS = 128  # distances at which cells are sorted
 _RING = 8.0  # [m]
@@ -52,7 +52,8 @@ class CellOrder(NamedTuple):
         order: (m,) int32 cells in view, from near to far.
         ring: (m,) int32 distance of each cell in rings, -1 if it is out of view.
         tiles: (rows, columns) float32 smallest nearness in a tile of samples [1/m].
-        line: (w,) float32 smallest nearness in the columns of a row of tiles [1/m].
+        line: (columns * TILE,) float32 smallest nearness in the columns of a row of tiles [1/m], infinite beyond
+            the picture.
     """
 
     rings: NDArray[np.int32]
@@ -79,10 +80,10 @@ def sorted_by_cell(mesh: Mesh, size: float = CELL) -> tuple[Mesh, CellTable, NDA
 
 def new_order(cells: CellTable, width: int, height: int) -> CellOrder:
     """Returns scratch space for some cells and a picture."""
-    count = len(cells.ranges)
+    count, rows, columns = len(cells.ranges), -(-height // TILE), -(-width // TILE)
     return CellOrder(
         np.zeros(_RINGS + 1, np.int32), np.zeros(count, np.int32), np.zeros(count, np.int32),
-        np.zeros((-(-height // TILE), -(-width // TILE)), np.float32), np.zeros(width, np.float32),
+        np.zeros((rows, columns), np.float32), np.full(columns * TILE, np.inf, np.float32),
     )  # fmt: skip
 
 
@@ -190,24 +191,34 @@ def is_in_view(view: View, low: Array, high: Array) -> bool:
 @compiled
 def find_tiles(view: View, buffer: VisibilityBuffer, scratch: CellOrder) -> None:
     """Writes the smallest nearness in each tile of samples."""
-    height, width = view.height, view.width
-    tiles, line = scratch.tiles, scratch.line
+    tiles, line, last = scratch.tiles, scratch.line, view.height - 1
     for row in range(tiles.shape[0]):
-        first = row * TILE
-        line[:] = np.inf
-        for y in range(first, min(first + TILE, height)):
-            _lower(line, buffer.nearness[y])
+        y, near = row * TILE, buffer.nearness
+        _find_line(
+            line, near[y], near[min(y + 1, last)], near[min(y + 2, last)], near[min(y + 3, last)],
+            near[min(y + 4, last)], near[min(y + 5, last)], near[min(y + 6, last)], near[min(y + 7, last)],
+        )  # fmt: skip
         for column in range(tiles.shape[1]):
-            least = line[column * TILE]
-            for x in range(column * TILE + 1, min((column + 1) * TILE, width)):
-                least = min(least, line[x])
-            tiles[row, column] = least
+            tiles[row, column] = _least(line, column * TILE)
 
 
 @inlined
-def _lower(values: NDArray[np.float32], others: NDArray[np.float32]) -> None:
-    for k in range(len(values)):
-        values[k] = others[k] if others[k] < values[k] else values[k]
+def _find_line(
+    line: NDArray[np.float32], a: NDArray[np.float32], b: NDArray[np.float32], c: NDArray[np.float32],
+    d: NDArray[np.float32], e: NDArray[np.float32], f: NDArray[np.float32], g: NDArray[np.float32],
+    h: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Writes the smallest value in each column of `TILE` rows; written so that the compiler makes vectors of it."""
+    for k in range(len(a)):
+        line[k] = min(min(min(a[k], b[k]), min(c[k], d[k])), min(min(e[k], f[k]), min(g[k], h[k])))
+
+
+@inlined
+def _least(line: NDArray[np.float32], k: int) -> np.float32:
+    """Returns the smallest of `TILE` values, which the processor compares side by side."""
+    one, two = min(line[k], line[k + 1]), min(line[k + 2], line[k + 3])
+    three, four = min(line[k + 4], line[k + 5]), min(line[k + 6], line[k + 7])
+    return min(min(one, two), min(three, four))
 
 
 @compiled

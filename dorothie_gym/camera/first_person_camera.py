@@ -182,8 +182,8 @@ class FirstPersonCamera:
             placed = self._draw(view.scaled(config.samples), self._buffer, self._orders, bodies, placed)
             if self._casts_shadows:
                 _draw_shadows(
-                    self._shadows, self.scene.town, self.scene.cells, self._overlay, self._overlay_cells, pose.x,
-                    pose.y, pose.z, self.scene.bank.mesh, self.scene.bank.ranges, bodies,
+                    view, self._shadows, self.scene.town, self.scene.cells, self._overlay, self._overlay_cells,
+                    self.scene.bank.mesh, self.scene.bank.ranges, self.scene.bank.boxes, bodies,
                 )  # fmt: skip
             if light.beams > 0.0:
                 _draw_head_lights(self._beams, pose.x, pose.y, pose.heading, bodies)

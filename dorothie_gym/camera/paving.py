@@ -19,7 +19,7 @@ from dorothie_gym.camera.ground.colours import (
     noise_place,
     patch_weight,
 )  # fmt: skip
-from dorothie_gym.camera.ground.lookup import PARTS, SEVERAL, GroundArrays, part_of
+from dorothie_gym.camera.ground.lookup import PARTS, SEVERAL, GroundArrays, material_of_square, part_at, part_of
 from dorothie_gym.camera.mesh import Surface
 from dorothie_gym.camera.optics import Optics
 from dorothie_gym.camera.samples import (
@@ -58,14 +58,18 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
     values, places, sheet = samples.values[first:], samples.indices[first:], face.kind[1]
     _place_ground(optics, ground, values, places, face, count)
     samples.surfaces[first : first + count] = _GROUND
-    cells, squares, noise = ground.cells[ground.firsts[sheet] :], ground.squares, ground.noise
+    cells, noise = ground.cells[ground.firsts[sheet] :], ground.noise
     outside = int(ground.outside[sheet])
     for k in range(count):
         width, place, material = values[ONE + k], places[FIRST + k], outside
         if place >= 0:
             material = int(cells[place // PARTS])
             if material < 0:
-                material = int(squares[-1 - material, place % PARTS]) if width <= SHARP else SEVERAL
+                material = SEVERAL
+                if width <= SHARP:
+                    material = material_of_square(ground, sheet, place)
+                elif width <= BLENDED:
+                    material = _common_material(ground, sheet, values[X + k], values[Y + k], width / 4.0)
         if material != SEVERAL and width <= BLENDED:
             fine, coarse = places[SECOND + k], places[THIRD + k]
             grain = noise_at(noise, fine) * values[TWO + k] + noise_at(noise, coarse) * values[THREE + k]
@@ -77,6 +81,16 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
             values[RED + k], values[GREEN + k], values[BLUE + k] = colour_at(
                 ground, sheet, values[X + k], values[Y + k], width
             )
+
+
+@inlined
+def _common_material(ground: GroundArrays, sheet: int, x: float, y: float, step: float) -> int:
+    """Returns the material of both samples that `colour_at` takes first, `SEVERAL` if they may differ."""
+    part, other = part_at(ground, sheet, x - step, y - step), part_at(ground, sheet, x + step, y + step)
+    material = material_of_square(ground, sheet, part)
+    if other != part and material != SEVERAL and material_of_square(ground, sheet, other) != material:
+        return SEVERAL
+    return material
 
 
 @inlined

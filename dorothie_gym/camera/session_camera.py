@@ -18,7 +18,7 @@ from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.camera.road_slopes import RoadSlopes, rise_at
 from dorothie_gym.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows
 from dorothie_gym.camera.town_scene import SessionScene
-from dorothie_gym.compilation import concurrent
+from dorothie_gym.compilation import concurrent, direct
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records
 from dorothie_gym.maps.traffic_lights import LightColour, LightPhase
 from dorothie_gym.ontology import Sensor, WeatherParameter
@@ -142,7 +142,7 @@ class SessionCamera:
             argument(bodies.vehicles), argument(bodies.pedestrians), argument(bodies.props),
             np.array([pose.x, pose.y]), REACH, own, drives_with_lights(weather), placed,
         )  # fmt: skip
-        _lift(self.scene.town.ground.arrays, self.scene.town.slopes, placed, count)
+        _lift_bodies(self.scene.town.ground.arrays, self.scene.town.slopes, placed, count)
         return placed[:count]
 
     def _show_programmes(self, time: float) -> None:
@@ -204,3 +204,6 @@ def _lift(ground: GroundArrays, slopes: RoadSlopes, placed: RecordArray[Placemen
                     raised |= _RAISED[material] and body.z < _BELOW
             if raised:
                 body.z += KERB_HEIGHT
+
+
+_lift_bodies = direct(_lift)

@@ -3,7 +3,8 @@
 Points are moved along the sun's rays to height 0. A map holds, for each square of that plane, how high the highest
 surface is whose light falls there; a point lies in shadow if a surface with the same place on the plane is higher. The
 map of the town consists of tiles around the camera that are kept as long as the sun stands still; the map of bodies is
-drawn for every picture. Both depend on the pose alone, not on earlier pictures.
+drawn for every picture, without those whose shadows are out of view. Both depend on the picture alone, not on earlier
+ones.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.cells import CellTable
+from dorothie_gym.camera.bodies import surround
+from dorothie_gym.camera.cells import CellTable, is_in_view
 from dorothie_gym.camera.mesh import TOWN, Mesh, Surface
 from dorothie_gym.camera.models.model_bank import PlacementRecord
+from dorothie_gym.camera.pose import View
 from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.records import RecordArray
@@ -41,6 +44,7 @@ _WRAP = _SIDE - 1
 _BODIES = 512  # width of the map of bodies [squares]
 _NOTHING = -32768
 _LINE_BELOW = 10.0  # [1/50 m] by which the line of a narrow triangle lies below it: it lights the triangle itself
+_BESIDE = 3.0 * TEXEL  # [m] around a shadow that squares of the map and their mixture darken at most
 _GROUND = int(Surface.GROUND)
 
 
@@ -91,26 +95,37 @@ def turn_sun(maps: ShadowMaps, sun: Array, strength: float) -> bool:
 
 @concurrent
 def draw_shadows(
-    maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable, x: float, y: float,
-    z: float, bank: Mesh, ranges: NDArray[np.int32], bodies: RecordArray[PlacementRecord],
+    view: View, maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable,
+    bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32], bodies: RecordArray[PlacementRecord],
 ) -> None:  # fmt: skip
-    """Draws the tiles around a position [m] that the map does not hold, and the map of bodies.
+    """Draws the tiles around the camera that the map does not hold, and the map of bodies whose shadows may be seen.
 
     Args:
+        view: projection of the picture.
         maps: to be drawn to.
         town: what stands in every session, sorted by cell.
         town_cells: its cells.
         overlay: what stands only in this session, sorted by cell.
         overlay_cells: its cells.
-        x: [m].
-        y: [m].
-        z: [m].
         bank: triangles of all models.
         ranges: of `ModelBank`.
+        boxes: of `ModelBank`.
         bodies: models and places.
     """
-    _draw_tiles(maps, town, town_cells, overlay, overlay_cells, x, y, z)
-    _draw_bodies(maps, bank, ranges, bodies)
+    _draw_tiles(maps, town, town_cells, overlay, overlay_cells, view.origin[0], view.origin[1], view.origin[2])
+    lowest = min(_lowest(town_cells), _lowest(overlay_cells))
+    for k in range(len(bodies)):
+        lowest = min(lowest, bodies[k].z)
+    _draw_bodies(view, maps, bank, ranges, boxes, bodies, lowest)
+
+
+@inlined
+def _lowest(cells: CellTable) -> float:
+    """Returns the smallest height in any cell [m]."""
+    lowest = np.inf
+    for cell in range(len(cells.ranges)):
+        lowest = min(lowest, cells.low[cell, 2])
+    return lowest
 
 
 @compiled
@@ -166,8 +181,11 @@ def _shades(maps: ShadowMaps, low: Array, high: Array, column: int, row: int) ->
 
 
 @compiled
-def _draw_bodies(maps: ShadowMaps, bank: Mesh, ranges: NDArray[np.int32], bodies: RecordArray[PlacementRecord]) -> None:
-    """Draws the map of bodies, those near its middle."""
+def _draw_bodies(
+    view: View, maps: ShadowMaps, bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32],
+    bodies: RecordArray[PlacementRecord], lowest: float,
+) -> None:  # fmt: skip
+    """Draws the map of bodies, those near its middle whose shadows may be seen on surfaces from a height on [m]."""
     squares = maps.bodies[0:_BODIES, 0:_BODIES]  # a part, as tiles are: `_cast` is compiled once
     first, reach = maps.window, 0.5 * _BODIES * TEXEL
     for y in range(_BODIES):
@@ -176,9 +194,24 @@ def _draw_bodies(maps: ShadowMaps, bank: Mesh, ranges: NDArray[np.int32], bodies
         body = bodies[k]
         across = abs(body.x - maps.slope[0] * body.z - first[2] * TEXEL - reach)
         down = abs(body.y - maps.slope[1] * body.z - first[3] * TEXEL - reach)
-        if max(across, down) < reach:
+        if max(across, down) < reach and _is_shadow_in_view(view, maps, body, boxes[body.model], lowest):
             for j in range(ranges[body.model, 0], ranges[body.model, 1]):
                 _cast(maps, squares, bank, j, first[2], first[3], body.x, body.y, body.z, body.cos, body.sin)
+
+
+@inlined
+def _is_shadow_in_view(
+    view: View, maps: ShadowMaps, body: PlacementRecord, model: NDArray[np.float32], lowest: float
+) -> bool:  # fmt: skip
+    """Returns whether a body, or what lies behind it from the sun down to a height [m], touches the picture."""
+    box = maps.corners
+    surround(body, model, box)
+    for axis in range(2):
+        shift = maps.slope[axis] * (box[1, 2] - lowest)
+        box[0, axis] -= max(shift, 0.0) + _BESIDE
+        box[1, axis] -= min(shift, 0.0) - _BESIDE
+    box[0, 2] = lowest - _BESIDE
+    return is_in_view(view, box[0], box[1])
 
 
 @compiled

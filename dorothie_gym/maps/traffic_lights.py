@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -72,8 +73,8 @@ class LightProgramme:
 
     def phase_at(self, time: float) -> LightPhase:
         """Returns the phase at a simulated time [s]."""
-        now = (time - self.offset) % self.cycle
-        return next((phase for phase, end in zip(self.phases, self._ends, strict=True) if now < end), self.phases[0])
+        ends = self._ends
+        return self.phases[bisect_right(ends, (time - self.offset) % ends[-1]) % len(ends)]
 
     def colour(self, signal: int, time: float) -> LightColour:
         """Returns the colour of a signal at a simulated time [s]."""

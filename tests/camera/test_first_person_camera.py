@@ -203,6 +203,17 @@ def test_a_car_casts_a_shadow() -> None:
     assert columns.mean() > 62  # to the south, which is on the right
 
 
+def test_a_car_behind_the_camera_casts_a_shadow_into_the_picture() -> None:
+    camera = FirstPersonCamera(scene(MeshBuilder()), CONFIG)
+    low = weather(sun_altitude_angle=8.0, sun_azimuth_angle=180.0)  # behind the camera
+    behind, empty = (camera.render(EYE, low, bodies=placed(*places)).rgb for places in ([(-5.0, 0.0, 0.0)], []))
+    assert behind is not None
+    assert empty is not None
+    height, width, _ = behind.shape
+    assert behind[-1, width // 2, 1] < 0.9 * empty[-1, width // 2, 1]
+    np.testing.assert_array_equal(behind[: height // 2], empty[: height // 2])
+
+
 def test_pictures_do_not_depend_on_earlier_ones() -> None:
     rng, builder = np.random.default_rng(0), MeshBuilder()
     for _ in range(60):

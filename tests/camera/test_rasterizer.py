@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from dorothie_gym.camera.cells import draw_cells, new_order, sorted_by_cell
+from dorothie_gym.camera.cells import TILE, draw_cells, new_order, sorted_by_cell
 from dorothie_gym.camera.ground.arrays import ground_arrays
 from dorothie_gym.camera.ground.cells import Painted
 from dorothie_gym.camera.ground.materials import Material
@@ -113,18 +113,23 @@ def test_what_the_near_plane_cuts_is_seen_as_rays_see_it(scale: float) -> None:
     assert (numbers_of(view, mesh) == hit).mean() >= 0.998
 
 
-def test_cells_show_the_same_as_the_whole_mesh() -> None:
+@pytest.mark.parametrize(("width", "height"), [(192, 128), (171, 101)])
+def test_cells_show_the_same_as_the_whole_mesh(width: int, height: int) -> None:
     mesh, cells, order = sorted_by_cell(street(7, 1500))
     np.testing.assert_array_equal(mesh.corners, street(7, 1500).corners[order])
+    scratch = new_order(cells, width, height)
     for heading in np.linspace(0, 6, 7):
-        view = view_from(CameraPose(20.0, -5.0, 1.5, heading), 192, 128, 90.0)
-        buffer = new_buffer(192, 128)
+        view = view_from(CameraPose(20.0, -5.0, 1.5, heading), width, height, 90.0)
+        buffer = new_buffer(width, height)
         clear(buffer)
-        drawn = draw_cells(view, buffer, mesh, cells, new_order(cells, 192, 128), 0)
+        drawn = draw_cells(view, buffer, mesh, cells, scratch, 0)
         whole = seen(view, mesh)
         np.testing.assert_array_equal(buffer.nearness, whole.nearness)
         assert (buffer.triangles == whole.triangles).mean() > 0.999  # others are equally near
         assert drawn < mesh.size
+        for (row, column), least in np.ndenumerate(scratch.tiles):
+            samples = buffer.nearness[row * TILE : (row + 1) * TILE, column * TILE : (column + 1) * TILE]
+            assert least == samples.min()
 
 
 def convex_surface(rng: np.random.Generator, count: int) -> NDArray[np.float32]:

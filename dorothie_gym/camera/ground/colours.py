@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.ground.lookup import GroundArrays, cell_at, material_at, material_in
+from dorothie_gym.camera.ground.lookup import (
+    GroundArrays,
+    cell_at,
+    is_mixed,
+    material_in,
+    material_of_part,
+    materials_around,
+    part_at,
+)  # fmt: skip
 from dorothie_gym.compilation import compiled, inlined
 
 TEXEL = 0.5
@@ -50,19 +58,17 @@ def _sampled(
     ground: GroundArrays, sheet: int, x: float, y: float, footprint: float
 ) -> tuple[float, float, float]:  # fmt: skip
     """Returns the colour of the material, or the mean of four samples where they differ, with noise."""
-    if footprint <= SHARP or cell_at(ground, sheet, x, y) >= 0:
-        red, green, blue, grain = _look(ground, material_at(ground, sheet, x, y))
+    middle = part_at(ground, sheet, x, y)
+    if footprint <= SHARP or not is_mixed(ground, sheet, middle):
+        red, green, blue, grain = _look(ground, material_of_part(ground, sheet, middle, x, y))
     else:
-        step, share = footprint / 4.0, 0.5
-        a = material_at(ground, sheet, x - step, y - step)
-        d = material_at(ground, sheet, x + step, y + step)
-        red, green, blue, grain = _look(ground, a)
-        r, g, b, n = _look(ground, d)
+        share, (first, second, third, fourth) = 0.5, materials_around(ground, sheet, x, y, footprint / 4.0)
+        red, green, blue, grain = _look(ground, first)
+        r, g, b, n = _look(ground, fourth)
         red, green, blue, grain = red + r, green + g, blue + b, grain + n
-        if a != d:
+        if first != fourth:
             for k in range(2):
-                side = step if k == 0 else -step
-                r, g, b, n = _look(ground, material_at(ground, sheet, x + side, y - side))
+                r, g, b, n = _look(ground, second if k == 0 else third)
                 red, green, blue, grain = red + r, green + g, blue + b, grain + n
             share = 0.25
         red, green, blue, grain = red * share, green * share, blue * share, grain * share
@@ -111,24 +117,24 @@ def _averaged(
     ground: GroundArrays, sheet: int, x: float, y: float, footprint: float
 ) -> tuple[float, float, float]:  # fmt: skip
     """Returns the colour of the averaged pictures: linear within two levels and between them."""
-    level, size, last = 0, TEXEL, ground.levels.shape[1] - 1
-    while level < last and footprint >= 2.0 * size:
-        level, size = level + 1, 2.0 * size
-    red, green, blue = _level_colour(ground, sheet, level, size, x, y)
-    share = min(max(footprint / size - 1.0, 0.0), 1.0)
+    level, density, last = 0, 1.0 / TEXEL, ground.levels.shape[1] - 1
+    while level < last and footprint * density >= 2.0:
+        level, density = level + 1, 0.5 * density
+    red, green, blue = _level_colour(ground, sheet, level, density, x, y)
+    share = min(max(footprint * density - 1.0, 0.0), 1.0)
     if share > 0.0 and level < last:
-        r, g, b = _level_colour(ground, sheet, level + 1, 2.0 * size, x, y)
+        r, g, b = _level_colour(ground, sheet, level + 1, 0.5 * density, x, y)
         red, green, blue = red + share * (r - red), green + share * (g - green), blue + share * (b - blue)
     return red, green, blue
 
 
 @compiled
 def _level_colour(
-    ground: GroundArrays, sheet: int, level: int, size: float, x: float, y: float
+    ground: GroundArrays, sheet: int, level: int, density: float, x: float, y: float
 ) -> tuple[float, float, float]:  # fmt: skip
-    """Returns the bilinear colour of one level, whose texels have a size [m]."""
+    """Returns the bilinear colour of one level with a number of texels per metre, a power of two."""
     columns, rows = ground.levels[sheet, level, 0], ground.levels[sheet, level, 1]
-    u, v = (x - ground.origins[sheet, 0]) / size - 0.5, (y - ground.origins[sheet, 1]) / size - 0.5
+    u, v = (x - ground.origins[sheet, 0]) * density - 0.5, (y - ground.origins[sheet, 1]) * density - 0.5
     if u < -0.5 or v < -0.5 or u > columns - 0.5 or v > rows - 0.5:
         red, green, blue, _ = _look(ground, int(ground.outside[sheet]))
         return red, green, blue

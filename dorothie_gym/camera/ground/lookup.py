@@ -142,6 +142,21 @@ def part_of(left: float, top: float, inverse: float, columns: int, rows: int, x:
 
 
 @inlined
+def is_mixed(ground: GroundArrays, sheet: int, part: int) -> bool:
+    """Returns whether there are several materials in the cell of a square."""
+    return part >= 0 and ground.cells[ground.firsts[sheet] + part // PARTS] < 0
+
+
+@inlined
+def material_of_square(ground: GroundArrays, sheet: int, part: int) -> int:
+    """Returns the material of a square, `SEVERAL` if an edge touches it."""
+    if part < 0:
+        return int(ground.outside[sheet])
+    value = int(ground.cells[ground.firsts[sheet] + part // PARTS])
+    return value if value >= 0 else int(ground.squares[-1 - value, part % PARTS])
+
+
+@inlined
 def material_of_part(ground: GroundArrays, sheet: int, part: int, x: float, y: float) -> int:
     """Returns the material at a position [m] whose square is known from `part_of`."""
     if part < 0:
@@ -153,14 +168,80 @@ def material_of_part(ground: GroundArrays, sheet: int, part: int, x: float, y: f
     return material if material != SEVERAL else material_in(ground, sheet, -1 - value, x, y)
 
 
-@compiled
-def material_at(ground: GroundArrays, sheet: int, x: float, y: float) -> int:
-    """Returns the material of a sheet at a position [m]: of the top-most polygon that contains it."""
-    part = part_of(
+@inlined
+def part_at(ground: GroundArrays, sheet: int, x: float, y: float) -> int:
+    """Returns the number of the square of a sheet at a position [m], see `part_of`."""
+    return part_of(
         ground.origins[sheet, 0], ground.origins[sheet, 1], 1.0 / ground.size[0], ground.shapes[sheet, 0],
         ground.shapes[sheet, 1], x, y,
     )  # fmt: skip
-    return material_of_part(ground, sheet, part, x, y)
+
+
+@compiled
+def material_at(ground: GroundArrays, sheet: int, x: float, y: float) -> int:
+    """Returns the material of a sheet at a position [m]: of the top-most polygon that contains it."""
+    return material_of_part(ground, sheet, part_at(ground, sheet, x, y), x, y)
+
+
+@compiled
+def materials_around(
+    ground: GroundArrays, sheet: int, x: float, y: float, step: float
+) -> tuple[int, int, int, int]:  # fmt: skip
+    """Returns the materials at the corners of a square of `2 * step` around a position [m].
+
+    They are those at the smallest x and y, at the largest x and smallest y, at the smallest x and largest y, and at the
+    largest x and y. If the first and the last are equal, the others need not be right.
+    """
+    x0, y0, x1, y1 = x - step, y - step, x + step, y + step
+    part, other = part_at(ground, sheet, x0, y0), part_at(ground, sheet, x1, y1)
+    first, last = material_of_square(ground, sheet, part), material_of_square(ground, sheet, other)
+    if first == last and first != SEVERAL:
+        return first, first, first, first
+    if part >= 0 and part // PARTS == other // PARTS:
+        return _materials_in(ground, sheet, -1 - ground.cells[ground.firsts[sheet] + part // PARTS], x0, y0, x1, y1)
+    first, last = material_of_part(ground, sheet, part, x0, y0), material_of_part(ground, sheet, other, x1, y1)
+    if first == last:
+        return first, first, first, first
+    return first, material_at(ground, sheet, x1, y0), material_at(ground, sheet, x0, y1), last
+
+
+@compiled
+def _materials_in(
+    ground: GroundArrays, sheet: int, mixed: int, x0: float, y0: float, x1: float, y1: float
+) -> tuple[int, int, int, int]:  # fmt: skip
+    """Returns the materials at the corners of a box in a mixed cell, as `material_in` does for each of them.
+
+    A corner is a bit: 1, 2, 4, 8 in the order of `materials_around`.
+    """
+    size = ground.size[0]
+    left = ground.origins[sheet, 0] + np.floor((x0 - ground.origins[sheet, 0]) / size) * size
+    top = ground.origins[sheet, 1] + np.floor((y0 - ground.origins[sheet, 1]) / size) * size
+    a = b = c = d = int(ground.bases[mixed])
+    rest = 15
+    for entry in range(ground.entries[mixed], ground.entries[mixed + 1]):
+        inside = 15 if ground.parities[entry] else 0
+        for use in range(ground.uses[entry], ground.uses[entry + 1]):
+            edge = ground.edges[use]
+            ax, ay = ground.segments[edge, 0], ground.segments[edge, 1]
+            bx, by = ground.segments[edge, 2], ground.segments[edge, 3]
+            if (ax < left) != (bx < left):
+                at = ay + (left - ax) / (bx - ax) * (by - ay)
+                inside ^= (3 if (at > top) != (at > y0) else 0) ^ (12 if (at > top) != (at > y1) else 0)
+            if (ay > y0) != (by > y0):
+                at = ax + (y0 - ay) / (by - ay) * (bx - ax)
+                inside ^= (1 if (at < left) != (at < x0) else 0) ^ (2 if (at < left) != (at < x1) else 0)
+            if (ay > y1) != (by > y1):
+                at = ax + (y1 - ay) / (by - ay) * (bx - ax)
+                inside ^= (4 if (at < left) != (at < x0) else 0) ^ (8 if (at < left) != (at < x1) else 0)
+        inside &= rest
+        if inside:
+            material = int(ground.materials[entry])
+            a, b = material if inside & 1 else a, material if inside & 2 else b
+            c, d = material if inside & 4 else c, material if inside & 8 else d
+            rest ^= inside
+            if rest == 0:
+                break
+    return a, b, c, d
 
 
 @compiled

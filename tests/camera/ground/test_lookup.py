@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dorothie_gym.camera.ground.arrays import ground_arrays
 from dorothie_gym.camera.ground.cells import Painted
 from dorothie_gym.camera.ground.colours import colour_at
-from dorothie_gym.camera.ground.lookup import GroundArrays, material_at, materials_at
+from dorothie_gym.camera.ground.lookup import GroundArrays, material_at, materials_around, materials_at
 from dorothie_gym.camera.ground.materials import LOOKS, MATERIALS, SYMBOLS, Material, Relief
 from dorothie_gym.camera.ground.sheets import MAP_SCALE, Sheet, town_sheets
 from dorothie_gym.compilation import compiled
@@ -76,6 +76,27 @@ def test_simple_polygons_are_found_as_by_shapely(seed: int, size: float) -> None
     ground = ground_arrays([sheet_of([Painted(corners, Material.ROAD)])])
     inside = shapely.contains_xy(shapely.Polygon(corners), points[:, 0], points[:, 1])
     assert ((found(ground, points) == Material.ROAD) == inside).all()
+
+
+@compiled
+def corners_at(ground: GroundArrays, points: Array, step: float, out: NDArray[np.uint8]) -> None:
+    for k in range(len(points)):
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = materials_around(ground, 0, points[k, 0], points[k, 1], step)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10**9), count=st.integers(1, 12), step=st.sampled_from([0.0, 0.01, 0.1, 0.7]))
+def test_materials_around_a_point_are_those_of_the_corners(seed: int, count: int, step: float) -> None:
+    rng = np.random.default_rng(seed)
+    polygons = [Painted(rng.uniform(-2.0, 10.0, (7, 2)), KINDS[rng.integers(len(KINDS))]) for _ in range(count)]
+    ground, points = ground_arrays([sheet_of(polygons)]), rng.uniform(-3.0, 11.0, (400, 2))
+    out = np.empty((len(points), 4), dtype=np.uint8)
+    corners_at(ground, points, step, out)
+    shifts = [(-step, -step), (step, -step), (-step, step), (step, step)]
+    expected = np.stack([found(ground, points + shift) for shift in shifts], axis=1)
+    np.testing.assert_array_equal(out[:, [0, 3]], expected[:, [0, 3]])
+    differ = expected[:, 0] != expected[:, 3]
+    np.testing.assert_array_equal(out[differ], expected[differ])
 
 
 @pytest.mark.parametrize("name", ["brookside", "midtown", "Town01", "Town05"])
