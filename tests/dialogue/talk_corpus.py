@@ -108,9 +108,11 @@ class Sampler:
         if move in (M.IRRELEVANT, M.ALIGN, M.CONFUSE) or rng.random() < bare:
             if move is M.EXPLAIN and human and rng.random() < 0.25:
                 return DialogueAct.of(move), self.one_of(errands())
-            topic = {M.ACKNOWLEDGE: ["sorry", "align", None], M.CONFIRM: ["taken"], M.EXPLAIN: [None, *TOPICS]}.get(
-                move, [None]
-            )
+            heard = ["why", "seen", None] if human else ["ordered", "ordered", "told", "answered", "done", "chat"]
+            topic = {
+                M.ACKNOWLEDGE: [*heard, "sorry", "align"], M.CONFIRM: ["taken"], M.EXPLAIN: [None, *TOPICS],
+                M.IRRELEVANT: [None, "reply"],
+            }.get(move, [None])  # fmt: skip
             return DialogueAct.of(move), Wording(topic=self.one_of(topic) if rng.random() < 0.5 else None)
         drawn = rng.random()
         action = self.weighted(ACTIONS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
@@ -31,6 +32,10 @@ _COMMANDS: Final[Mapping[ActionValue, tuple[PhysicalAction, ...]]] = MappingProx
 )
 """Physical actions by which an announcement is carried out; following a lane needs none."""
 
+BELIEF_DELAY: Final = 3.0
+"""Time within which a belief update follows the words that state it [s]."""
+
+_OPEN: Final = frozenset({GoalStatus.PENDING, GoalStatus.ONGOING})
 _ARTICLE: Final = re.compile(r"^(an?|the|some|my|your|our) ")
 _COUNTERMANDS: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_N, DialogueMove.CLARIFY})
 
@@ -62,12 +67,20 @@ def _goes(angle: float | None, direction: object) -> bool:
 
 
 def is_goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Returns whether a place is one of the open tasks; without a place, whether one has been named."""
-    place = said.get("place")
+    """Returns whether a place is one of the open tasks; without a place, whether one has been named.
+
+    Statements of the Co-Wizard that agree with its recorded beliefs count as true: it may have misheard the place.
+    Whether an open task is not the one to be done now cannot be told.
+    place, own = said.get("place"), speaker is Role.CO_WIZARD
     if place is None:
-        return world.goal_named(time)
-    statuses = world.statuses(time, place) if isinstance(place, LandmarkName) else ()
-    return bool({GoalStatus.PENDING, GoalStatus.ONGOING} & set(statuses))
+        return world.goal_named(time) and not (own and world.believed_goal(time) is None)
+    if not isinstance(place, LandmarkName):
+        return False
+    open_here = bool(_OPEN & set(world.statuses(time, place)))
+    if own:
+        return open_here or world.believed_goal(time + BELIEF_DELAY) is place
+    others = any(_OPEN & set(world.statuses(time, name)) for name in LandmarkName if name is not place)
+    return None if open_here and others and said.negated else open_here
 
 
 def has_status(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
@@ -76,8 +89,8 @@ def has_status(world: SessionWorld, said: Proposition, time: float, speaker: Rol
     if not isinstance(place, LandmarkName) or not isinstance(status, GoalStatus):
         return None
     found = set(world.statuses(time, place))
-    if status in (GoalStatus.PENDING, GoalStatus.ONGOING):
-        return bool(found & {GoalStatus.PENDING, GoalStatus.ONGOING})
+    if status in _OPEN:
+        return bool(found & _OPEN)
     return status in found if status in (GoalStatus.COMPLETE, GoalStatus.ABANDONED) else None
 
 
@@ -99,7 +112,12 @@ def has_purpose(world: SessionWorld, said: Proposition, time: float, speaker: Ro
     texts += [str(row["change"] or "") for row in header.subgoals]
     known = " ".join(texts).casefold()
     named = [str(said.get(name)) for name in ("person", "item") if said.get(name) is not None]
-    return all(_ARTICLE.sub("", words.casefold()) in known for words in named) if named else None
+    return all(_ARTICLE.sub("", _plain(words)) in _plain(known) for words in named) if named else None
+
+
+def _plain(text: str) -> str:
+    """Returns a text in lower case and without accents, which observed texts do not have."""
+    return "".join(c for c in unicodedata.normalize("NFKD", text.casefold()) if not unicodedata.combining(c))
 
 
 EVALUATORS: Final[Mapping[Predicate, Callable[[SessionWorld, Proposition, float, Role], bool | None]]] = (

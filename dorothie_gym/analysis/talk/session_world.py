@@ -246,6 +246,22 @@ class SessionWorld:
             for move in self.session.moves(Role.PARTICIPANT)
         )
 
+    def believed_goal(self, time: float) -> LandmarkName | None:
+        """Returns the destination that the Co-Wizard believes in at a time [s], by its recorded belief updates."""
+        goal: str | None = None
+        for event in self.session.of_type(EventType.BELIEF_UPDATE):
+            if event.time > time:
+                break
+            named, status = event.data.get("landmark"), event.data.get("status")
+            goals = event.data.get("landmarks")
+            if isinstance(goals, list | tuple) and goals:
+                goal = str(goals[0])
+            elif status in _TAKEN_UP:
+                goal = str(named)
+            elif status is not None and named == goal:
+                goal = None
+        return next((name for name in LandmarkName if name.label == goal), None)
+
     def goal_named(self, time: float) -> bool:
         """Returns whether the participant has named a place to go to since the last change of a task."""
         since = max((event.time for event in self.changes if event.time <= time), default=0.0)
@@ -258,6 +274,7 @@ class SessionWorld:
         )
 
 
+_TAKEN_UP: Final = frozenset({GoalStatus.ONGOING.label, GoalStatus.UNKNOWN.label})
 ACTORS: Final = {
     ObjectClass.VEHICLES: (ActorKind.VEHICLE, ActorKind.CYCLIST),
     ObjectClass.PEDESTRIAN: (ActorKind.PEDESTRIAN,),

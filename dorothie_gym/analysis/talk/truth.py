@@ -299,5 +299,5 @@ _CAUSES: Final[dict[Predicate, Callable[[SessionWorld, Proposition, float], bool
     Predicate.BEHIND: _behind,
     Predicate.BLOCKED: _blocked,
     Predicate.ARRIVED: lambda world, cause, time: _arrived(world, cause, time, Role.CO_WIZARD),
-    Predicate.GOAL: lambda world, cause, time: world.goal_named(time),
+    Predicate.GOAL: lambda world, cause, time: world.goal_named(time) and world.believed_goal(time) is not None,
 }

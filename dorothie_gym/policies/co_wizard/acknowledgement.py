@@ -8,7 +8,7 @@ from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import ParsedText, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies import contents
-from dorothie_gym.policies.co_wizard.judgement import seconds_to_goal
+from dorothie_gym.policies.co_wizard.judgement import believes, seconds_to_goal
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
@@ -51,15 +51,17 @@ def acknowledge(
 
 def taken_on(state: CoWizardState, wanted: Proposition, rng: np.random.Generator) -> Remark:
     """Returns an acceptance ("will do") of what is wanted, or the sign that it was heard ("okay"), by chance."""
-    function = Function.ACCEPT if rng.random() < state.config.accepts else Function.POSITIVE_FEEDBACK
-    return intend(function, wanted, elided=contents.arguments_of(wanted), wording=Wording(topic="taken"))
+    accepts = rng.random() < state.config.accepts
+    function, topic = (Function.ACCEPT, "taken") if accepts else (Function.POSITIVE_FEEDBACK, "ordered")
+    return intend(function, wanted, elided=contents.arguments_of(wanted), wording=Wording(topic=topic))
 
 
 def _repeated(wanted: Proposition, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Takes on an instruction by repeating it: "turning left", or "okay, I'm turning left"."""
     if rng.random() < 0.35:
         return (intend(Function.ACCEPT, wanted, wording=replace(wording, topic="taken")),)
-    heard = intend(Function.POSITIVE_FEEDBACK, wanted, elided=contents.arguments_of(wanted))
+    elided = contents.arguments_of(wanted)
+    heard = intend(Function.POSITIVE_FEEDBACK, wanted, elided=elided, wording=Wording(topic="ordered"))
     return heard, intend(Function.INFORM, wanted, wording=wording, joined=True)
 
 
@@ -84,6 +86,8 @@ def plan_remark(
         content = Proposition.of(Predicate.HAS_ROUTE, place=goal)
     elif goal is not None:
         content = Proposition.of(Predicate.KNOWS, place=goal, negated=True)
+        if believes(state, view, content) is not True:
+            return ()
     else:
         content, elided = Proposition.of(Predicate.GOAL, negated=True), ()
     repeated = any(content.predicate is known.predicate for item in state.speech.said for known in item.meaning)

@@ -54,12 +54,12 @@ def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
         _give_up_wish,
         _ask_way,
         _say_arrived,
+        _mention_localization,
         _ask_goal,
         _explain_hazard,
         _mention_camera,
         _mention_weather,
         _look_around,
-        _mention_localization,
     ):
         consider(state, view, rng)
         if not state.speech.idle:
@@ -172,7 +172,9 @@ def _say_arrived(state: CoWizardState, view: CoWizardView, rng: np.random.Genera
 def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     intentions, dialogue, config = state.intentions, state.dialogue, state.config
     goal = state.beliefs.goal
-    lost = goal is not None and not state.beliefs.exact and intentions.halted and not intentions.arrived
+    stopped = view.time - dialogue.stop_instructed_at < config.recent_stop
+    unknown = goal is not None and not state.beliefs.exact
+    lost = unknown and intentions.halted and not (intentions.arrived or stopped)
     idle = (
         (goal is None or lost)
         and intentions.directive is None

@@ -23,6 +23,7 @@ _OF_SPEAKER = re.compile(r"^(my|our) ")
 _OWNER = re.compile(
     r"\b(?P<owner>(?:(?:Mr|Mrs|Ms|Dr|Se.ora)\.? )?(?:[A-Z]\w+ ){0,2}[A-Z]\w+|my \w+)'s (?:house|home|place)\b"
 )
+_BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})
 _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
 
 
@@ -51,7 +52,9 @@ def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
         return
     found = _OWNER.search(heard.words.text)
     if found is not None:
-        state.beliefs = state.beliefs.with_owner(_OF_SPEAKER.sub("your ", found["owner"]))
+        first, _, rest = found["owner"].partition(" ")
+        name = rest if rest and first.lower() in _BEFORE_NAMES else found["owner"]
+        state.beliefs = state.beliefs.with_owner(_OF_SPEAKER.sub("your ", name))
     elif state.beliefs.goal is not LandmarkName.HOUSE:
         state.beliefs = state.beliefs.with_owner(None)  # another house than the last one
 

@@ -153,7 +153,7 @@ def _instruction(
         name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
         approach_stop(state, view, name, float(words.distance))
         if state.speech.idle and rng.random() > state.style.silent:
-            state.say(_heard("taken"))
+            state.say(_heard("ordered"))
     elif actions:
         _obey(state, view, act, actions, words, rng)
     elif streets:
@@ -400,7 +400,7 @@ def _statement(
 
 
 def _heard(topic: str) -> Remark:
-    """Returns the sign that something was heard: an order ("taken"), news ("told"), an answer, or an errand done."""
+    """Returns the sign that something was heard: an order ("ordered"), news ("told"), an answer, or an errand done."""
     return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
 
 

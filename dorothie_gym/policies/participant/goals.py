@@ -258,12 +258,17 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
     if not options:
         return ()
     prefers = "purpose" if rng.random() < PURPOSES else "reason"
-    topic = prefers if prefers in options else next(iter(options))
     item = told.items[0] if told.items else None
-    said = Proposition.of(
-        Predicate.PURPOSE, place=goal.name, purpose=options.get("purpose") if topic == "purpose" else None,
-        reason=options.get("reason") if topic == "reason" else None, person=told.person, item=item,
-    )  # fmt: skip
+    for topic in sorted(options, key=lambda name: name != prefers):
+        purpose, reason = (options[topic] if topic == name else None for name in ("purpose", "reason"))
+        said = Proposition.of(
+            Predicate.PURPOSE, place=goal.name, person=told.person, item=item, purpose=purpose, reason=reason
+        )  # fmt: skip
+        if said not in state.task.told:
+            break
+    else:
+        return ()  # all of it has been told
+    state.task = state.task.after_telling(said)
     return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
 
 

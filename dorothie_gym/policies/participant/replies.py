@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -154,7 +154,7 @@ def _fits(
     instructed = next((item for item in reversed(state.speech.said) if item.act.values(Slot.ACTION)), None)
     lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
     if instructed is not None and lately and actions & set(instructed.act.slots):
-        return instructed.wording.direction in (None, words.direction)
+        return words.direction is None or instructed.wording.direction in (None, words.direction)
     meant, wanted = set(step[2].act.values(Slot.ACTION)), step[2].wording.direction
     if wanted is Direction.STRAIGHT:
         return bool(actions & _AHEAD) and words.direction in (None, Direction.STRAIGHT)
@@ -218,7 +218,10 @@ def _yes_or_no(
     elif words.asked is not None and words.asked.predicate is Predicate.ARRIVED and not about_to_arrive(state, view):
         _deny_arrival(state)
     else:
-        asked = words.asked or contents.action(ActionValue.UNKNOWN)
+        goal = state.task.goal
+        arriving = not act.slots and goal is not None and view.standing and about_to_arrive(state, view)
+        place = Proposition.of(Predicate.ARRIVED, place=goal.name) if arriving and goal is not None else None
+        asked = words.asked or place or contents.action(ActionValue.UNKNOWN)
         unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
         yes = _short(Function.AFFIRMATIVE_ANSWER, asked)
         state.say_first(*unsure, yes, *(() if unsure else _addition(state, view, rng)))
@@ -228,11 +231,17 @@ def _asks_about_finished(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText
 ) -> bool:  # fmt: skip
     """Returns whether the car, which stands, asks if it has arrived where an errand was just done."""
-    place, at = state.task.finished
-    if not view.standing or view.time - at > JUST_DONE:
+    place = state.task.finished[0]
+    if not view.standing or not _has_just_finished(state, view, (place,)):
         return False
-    asks = words.asked is not None and words.asked.predicate is Predicate.ARRIVED
-    return asks and set(act.values(Slot.LANDMARK)) <= {place}
+    asks = words.asked is None or words.asked.predicate is Predicate.ARRIVED
+    return asks and act.slots <= {place}
+
+
+def _has_just_finished(state: ParticipantState, view: ParticipantView, landmarks: Collection[object]) -> bool:
+    """Returns whether the errand at one of some landmarks was done a moment ago."""
+    place, at = state.task.finished
+    return place in landmarks and view.time - at <= JUST_DONE
 
 
 def _offered_subgoal(
@@ -302,7 +311,7 @@ def _open_question(
     if state.task.goal is None:
         state.say_first(intend(Function.UNCERTAIN_ANSWER))
     elif words.order is not None and landmarks:
-        _name_order(state, rng)
+        _name_order(state, landmarks, rng)
     elif _correct(state, view, act, words):
         return
     elif GoalStatus.QUERIED in act.values(Slot.STATUS):
@@ -334,12 +343,13 @@ def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.
     state.say_only(answer, *more)
 
 
-def _name_order(state: ParticipantState, rng: np.random.Generator) -> None:
+def _name_order(state: ParticipantState, landmarks: Collection[SlotValue], rng: np.random.Generator) -> None:
     """Answers the question about the order of two tasks: the target is finished first."""
     goal = state.task.goal
     assert goal is not None
-    order = Proposition.of(Predicate.ORDER, place=goal.name)
-    state.say_first(intend(Function.ANSWER, order, elided=("place",), wording=Wording(topic="after")))
+    other = contents.first_name(name for name in landmarks if name is not goal.name)
+    order = Proposition.of(Predicate.ORDER, place=goal.name, then=other)
+    state.say_first(intend(Function.ANSWER, order, elided=("place", "then"), wording=Wording(topic="after")))
     if rng.random() < state.config.explains_order:
         state.speech = state.speech.with_second(_first(goal.name))
 
@@ -405,7 +415,8 @@ def _explanation(
     if GoalStatus.UNKNOWN in statuses and names_goal:
         describe(state, view, Function.INFORM, rng)
         return
-    if names_goal and not statuses and _CLAIMS_ARRIVAL.search(words.text.lower()) and _is_elsewhere(state, view):
+    claims = names_goal and not statuses and _CLAIMS_ARRIVAL.search(words.text.lower()) is not None
+    if claims and _is_elsewhere(state, view) and not _has_just_finished(state, view, landmarks):
         _deny_arrival(state)
         return
     if act.values(Slot.OBJECT):
