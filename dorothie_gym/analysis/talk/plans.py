@@ -71,6 +71,7 @@ def is_goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
 
     Statements of the Co-Wizard that agree with its recorded beliefs count as true: it may have misheard the place.
     Whether an open task is not the one to be done now cannot be told.
+    """
     place, own = said.get("place"), speaker is Role.CO_WIZARD
     if place is None:
         return world.goal_named(time) and not (own and world.believed_goal(time) is None)

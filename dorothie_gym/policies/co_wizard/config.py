@@ -180,7 +180,7 @@ class CoWizardStyle:
             reassures=within(0.3, 0.0, persona.certainty, rng),
             pace=int(rng.choice((30, 35))) if gentle else 40 if brisk else int(rng.choice((35, 40))),
             chats=within(0.1, 0.6, persona.humour, rng),
-            notices=0.0 if persona.ignores else within(0.4, 0.95, persona.attention, rng),
+            notices=0.0 if persona.ignores else within(0.55, 1.0, persona.attention, rng),
             recalls=within(0.1, 0.6, persona.attention, rng),
         )
 

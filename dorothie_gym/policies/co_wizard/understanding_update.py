@@ -54,6 +54,9 @@ STRAIGHT_ON_DISTANCE = 60.0
 SLOWER_DISTANCE = 20.0
 """Distance to a goal off the map that "slower" without a reason is taken to mean [m]."""
 
+NEAR = 100
+"""Distance up to which a place that is said to be ahead is approached slowly [m]."""
+
 ASKED_SPEED_CHANGE = 10
 """Change of the cruise speed for "faster" and "slower" without a number [km/h]."""
 
@@ -361,6 +364,10 @@ def _explanation(
     name = landmarks[0] if landmarks else None
     if _COMMANDS & set(act.values(Slot.ACTION)):
         _instruction(state, view, act, words, rng)  # "you should be turning left" counts as an instruction
+    elif words.distance is not None and name is not None and name is state.beliefs.goal and _is_near(state, words):
+        approach_stop(state, view, name, float(words.distance))
+        if rng.random() > state.style.silent:
+            state.say(_heard("told"))
     elif GoalStatus.COMPLETE in statuses:
         state.feel(Happening.DONE, view.time)
         complete(state, name)
@@ -379,6 +386,11 @@ def _explanation(
         hear_description(state, view, _named(act.values(Slot.STREET)), landmarks, rng)
     elif act.slots or not _senseless(state, view, act, words, asks=False):
         _statement(state, view, act, words, rng)
+
+
+def _is_near(state: CoWizardState, words: ParsedText) -> bool:
+    """Returns whether a place that the car is guided to is said to be near."""
+    return not state.beliefs.exact and words.distance is not None and words.distance <= NEAR
 
 
 def _statement(

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import SpeakerStyle, Wording, word_act
+from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, SpeakerStyle, Wording, word_act
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies.participant.orders import order
@@ -14,7 +14,7 @@ from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import stopping_distance
-from dorothie_gym.policies.speech import Remark
+from dorothie_gym.policies.speech import Remark, intend
 
 STOP_REPEAT = 5.0
 """Time after which the stop instruction is repeated [s]."""
@@ -28,7 +28,7 @@ BRAKING = 0.2
 GAIN_RANGE = (-2.0, 2.0)
 """Range of accelerations that are extrapolated [m/s^2]."""
 
-FURTHER = 5.0
+FURTHER = 3.5
 """Distance to the place up to which "a bit further" is said, and above which metres [m]."""
 
 SHORT_RESERVE = 1.0
@@ -80,7 +80,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
             state.say(replace(stop, text=state.guidance.stop_text))
         return True
     if close and not state.guidance.approach_announced and view.speed > config.slow_speed:
-        _announce_place(state, view, left)
+        _announce_place(state, view, left, rng)
     return close
 
 
@@ -90,14 +90,21 @@ def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
     return STOP_REPEAT if heeded else state.speech.delivery.seconds(state.guidance.stop_text) + REACTION
 
 
-def _announce_place(state: ParticipantState, view: ParticipantView, left: float) -> None:
+def _announce_place(
+    state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator
+) -> None:  # fmt: skip
     """Announces the place with its distance [m], or asks the car to slow down where the time is too short for that."""
     goal, speed = state.task.goal, max(view.speed, state.config.soon_speed)
     if goal is None:
         return
     if left > 3.5 * speed + 20.0:
-        wording = Wording(distance=max(left - view.speed * 3.0, 10.0))
-        words = order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording, place=goal.name, urgent=True)
+        distance = max(left - view.speed * 3.0, 10.0)  # when it has been said
+        if rng.random() < state.config.states_distance:
+            ahead = Proposition.of(Predicate.DISTANCE, place=goal.name, metres=10 * round(distance / 10.0))
+            words = intend(CommunicativeFunction.INFORM, ahead, wording=Wording(topic="ahead"), urgent=True)
+        else:
+            wording = Wording(distance=distance)
+            words = order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording, place=goal.name, urgent=True)
     elif left > 3.0 * speed + 12.0:
         words = order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, Wording(faster=False), urgent=True)
     else:

@@ -47,6 +47,8 @@ class ParticipantConfig(GuidanceConfig):
         run_up: least distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
+        omits_straight: least probability that driving straight across a junction is not announced.
+        states_distance: probability that a place ahead is announced by a statement, not by an instruction.
         way_round_cost: extra cost of each lane change and U-turn after failures [m].
         off_route: number of decisions off the route after which a new one is planned.
         missed_within: distance to the goal below which leaving the route counts as a miss [m].
@@ -105,6 +107,8 @@ class ParticipantConfig(GuidanceConfig):
     run_up: float = 45.0
     run_up_per_lane: float = 50.0
     lane_return_time: float = 30.0
+    omits_straight: float = 0.65
+    states_distance: float = 0.5
     way_round_cost: float = 400.0
     off_route: int = 3
     missed_within: float = 15.0
@@ -194,7 +198,7 @@ class ParticipantStyle:
             nods=within(0.35, 0.75, persona.politeness, rng),
             curious=within(0.02, 0.25, persona.attention, rng),
             puzzled=within(0.35, 0.0, persona.certainty, rng),
-            notices=0.0 if persona.ignores else within(0.5, 1.0, persona.attention, rng),
+            notices=0.0 if persona.ignores else within(0.6, 1.0, persona.attention, rng),
         )
 
     def in_mood(self, mood: Mood) -> ParticipantStyle:
