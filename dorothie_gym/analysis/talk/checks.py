@@ -165,15 +165,12 @@ def _is_about(answer: Proposition, question: Proposition) -> bool:
         if question.predicate is Predicate.BECAUSE:
             return effect == question.get("effect")
         return isinstance(effect, Proposition) and effect.predicate is question.predicate
-    if {question.predicate, answer.predicate} <= _DESTINATIONS and question.predicate is not Predicate.GOAL:
+    if answer.predicate is Predicate.GOAL and question.predicate in (Predicate.WILL, Predicate.TASK):
         return _is_open(question.get("action")) or _is_open(question.get("status"))  # "which way?" - "to KFC"
     if question.predicate is Predicate.ORDER:
         return answer.predicate is Predicate.ORDER  # either may be named first
     same = all(answer.get(name) in (None, value) for name, value in question.arguments if not _is_open(value))
     return answer.predicate is question.predicate and same
-
-
-_DESTINATIONS: Final = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.TASK})
 
 
 def _is_open(value: object) -> bool:
