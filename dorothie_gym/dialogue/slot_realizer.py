@@ -285,7 +285,7 @@ class SlotRealizer:
 
 
 _NAMES_PERSON = 0.6  # probability that a house or a person is called by name
-_ELSEWHERE = frozenset({GoalStatus.PENDING, GoalStatus.ABANDONED})  # of an errand that is not the present one
+_ELSEWHERE = frozenset({GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE})  # of other errands
 _INDEFINITE = re.compile(r"^(an?|some|another|the) ")
 _POSSESSED = re.compile(r"^(my|your|our|his|her|their|\w+'s) ")
 _NAMELESS = frozenset({"Unknown", "Queried"})

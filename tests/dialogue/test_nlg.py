@@ -273,3 +273,12 @@ def test_car_does_not_call_the_friends_of_its_rider_its_own():
     }
     assert "my friend" in said[Role.PARTICIPANT] and "your friend" not in said[Role.PARTICIPANT]
     assert "your friend" in said[Role.CO_WIZARD] and "my friend" not in said[Role.CO_WIZARD]
+
+
+def test_house_is_called_by_its_owner_only_if_it_is_the_present_destination():
+    scene = WordingContext(owner="Mateo")
+    later = DialogueAct.of(DialogueMove.EXPLAIN, LandmarkName.HOUSE, GoalStatus.PENDING)
+    for act, named in ((DialogueAct.of(DialogueMove.INSTRUCT, LandmarkName.HOUSE), True), (later, False)):
+        rng = np.random.default_rng(0)
+        texts = [word_acts([act], Role.PARTICIPANT, rng, scene=scene)[0].text for _ in range(40)]
+        assert any("Mateo's house" in text for text in texts) is named

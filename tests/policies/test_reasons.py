@@ -98,7 +98,9 @@ def test_car_rests_at_red_light_until_green(colour):
     talk = on_the_way()
     town = talk.env.town
     lit = [lane for lane in town.lanes if town.light(lane.id, 0.0) is not None]
-    lane, time = next((lane, time) for time in range(200) for lane in lit if town.light(lane.id, float(time)) is colour)
+    begin = int(view_of(talk).time) + 5  # by then the driver has reacted to what it was told
+    times = range(begin, begin + 200)
+    lane, time = next((lane, time) for time in times for lane in lit if town.light(lane.id, float(time)) is colour)
     talk.state.commands = replace(talk.state.commands, standing_since=time - 3.0)
     talk.state.route = talk.state.route.with_progress(None)
     talk.state.intentions = talk.state.intentions.directed(None)

@@ -88,3 +88,12 @@ def test_goal_right_behind_junction_needs_lane_change_before_it() -> None:
                 assert journey.needs_switch(town, beside, 1.0, crossing)
                 tried += 1
     assert tried
+
+
+def test_overrun_u_turn_does_not_count_as_the_last_leg_of_the_same_lane():
+    town = load_town("millbrook")
+    progress = RouteProgress.plan(town, (0, 20.0), (0, 15.0))
+    legs = [leg.lane for leg in progress.legs]
+    assert legs[0] == legs[-1] == 0 and len(legs) == 3, "round and back again, to a place just behind"
+    gone_on = progress.followed(town, 0, 80.0)
+    assert gone_on.astray == 1 and gone_on.leg == 0

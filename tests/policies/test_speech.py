@@ -1,9 +1,9 @@
 import numpy as np
 
-from dorothie_gym.dialogue import draw_style
-from dorothie_gym.ontology import DialogueMove, LandmarkName, Role
+from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, draw_style
+from dorothie_gym.ontology import DialogueMove, LandmarkName, ObjectClass, Role
 from dorothie_gym.policies.delivery import Delivery
-from dorothie_gym.policies.speech import SpeechState, remark
+from dorothie_gym.policies.speech import SpeechState, intend, remark
 
 RNG = np.random.default_rng(0)
 
@@ -69,3 +69,12 @@ def test_wording_depends_on_speaker_style():
         speakers = [SpeechState(role=Role.PARTICIPANT, style=style).plan(plan) for plan in plans]
         said.add(tuple(speaker.speak(0.0, 0.0, np.random.default_rng(3))[0] for speaker in speakers))
     assert len(said) > 6
+
+
+def test_statement_that_the_other_one_has_just_made_is_dropped():
+    crowd = intend(CommunicativeFunction.INFORM, Proposition.of(Predicate.CROWDED, object=ObjectClass.PEDESTRIAN))
+    slow = intend(CommunicativeFunction.REQUEST, Proposition.of(Predicate.WILL), joined=True)
+    state = SpeechState(role=Role.PARTICIPANT).plan(crowd, slow)
+    assert state.without_told(Proposition.of(Predicate.FAILED)).queue == state.queue
+    (left,) = state.without_told(Proposition.of(Predicate.CROWDED)).queue
+    assert left.act == slow.act and not left.joined

@@ -16,7 +16,7 @@ from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import ActionValue, GoalStatus, LandmarkName, ObjectClass, PhysicalAction, Role, StreetName
 from dorothie_gym.recording import FRAME_RATE, ActionRecord, EventType
 from dorothie_gym.recording.header import LandmarkRow
-from tests.analysis.builders import A, M, car, drive, human
+from tests.analysis.builders import M, car, drive, human
 from tests.benchmark.features.played import play
 
 P = Predicate

@@ -219,3 +219,16 @@ def test_template_printed_in_paper_is_read():
     assert len(second.items) == 1 and second.place in {"from Ikea", "from 7-Eleven"}
     assert third.action is None and third.person == "Annabel" and third.place == "at Annabel's"
     assert read_people(board.story) == ("Annabel",)
+
+
+@pytest.mark.parametrize(
+    ("line", "owner"),
+    [
+        ("Take Hanh to Emil's house", "Emil"),
+        ("Pick up Biscuit at your sister's house", "my sister"),
+        ("Take Leilani to her house", None),
+        ("Buy a lamp at Ikea for Mateo", None),
+    ],
+)
+def test_owner_of_the_house_is_read(line, owner):
+    assert read_purpose(line).owner == owner

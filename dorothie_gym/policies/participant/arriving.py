@@ -28,7 +28,7 @@ BRAKING = 0.2
 GAIN_RANGE = (-2.0, 2.0)
 """Range of accelerations that are extrapolated [m/s^2]."""
 
-FURTHER = 3.5
+FURTHER = 5.0
 """Distance to the place up to which "a bit further" is said, and above which metres [m]."""
 
 SHORT_RESERVE = 1.0

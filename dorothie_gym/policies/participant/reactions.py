@@ -9,7 +9,7 @@ import numpy as np
 from dorothie_gym.dialogue import ASKED, Predicate, Proposition, Wording, WordingContext
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import ActionValue, ObjectClass, PropKind, StreetName, WeatherParameter
+from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass, PropKind, StreetName, WeatherParameter
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.mood import Happening
@@ -57,13 +57,14 @@ def scene_of(state: ParticipantState, view: ParticipantView) -> WordingContext:
     """Returns the context that utterances may refer to: street, landmark nearby, and whether there is an exception."""
     landmark = nearest_landmark(view.raw, view.landmarks, *view.position)
     street = street_of(view.raw, state.town, view.lane)
-    purpose = purpose_of_target(state, view)
+    purpose, goal = purpose_of_target(state, view), state.task.goal
+    target = None if goal is None else goal.name
     return WordingContext(
         street=street if street is not StreetName.UNKNOWN else None,
         landmark=landmark.name if landmark is not None else None,
         exception=is_foggy(view.raw) or is_rainy(view.raw),
-        owner=None if purpose is None else purpose.owner,
-        friend=None if purpose is None else _first_name(purpose.person),
+        owner=purpose.owner if purpose is not None and target is LandmarkName.HOUSE else None,
+        friend=_first_name(purpose.person) if purpose is not None and target is LandmarkName.PERSON else None,
     )
 
 
