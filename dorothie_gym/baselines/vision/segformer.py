@@ -173,15 +173,21 @@ class SegFormer(nn.Module):
 
     def classes(self, outputs: SegFormerOutputs, size: tuple[int, int]) -> Tensor:
         """Returns the likeliest class of each pixel (B, h, w)."""
-        return enlarged(outputs.classes, size).argmax(1)
+        return enlarged(outputs.classes, size).max(1).indices  # equal to argmax, but faster on a CPU
 
     def depth(self, outputs: SegFormerOutputs, size: tuple[int, int]) -> Tensor:
         """Returns the depth of each pixel (B, h, w) [m]: the median of the bins, which minimises the expected error."""
+        places = [self._median_bins(features) for features in outputs.features.split(1)]  # all at once is slower
+        logarithm = math.log(NEAREST) + torch.cat(places) * self.bin_width
+        return enlarged(F.pixel_shuffle(logarithm, self.config.depth_detail), size)[:, 0].exp()
+
+    def _median_bins(self, features: Tensor) -> Tensor:
+        """Returns the medians of the bins (B, places of a cell, h / 4, w / 4), in bins from the nearest depth on."""
         config = self.config
-        scores = self.depth_head(outputs.features).float()
+        scores = self.depth_head(features.contiguous()).float()
         batch, _, height, width = scores.shape
         scores = scores.view(batch, config.bins, config.depth_detail**2, height, width)
-        share = (scores - scores.amax(1, keepdim=True)).exp_()
+        share = scores.sub_(scores.amax(1, keepdim=True)).exp_()
         size_of_block = math.gcd(config.bins, 16)  # the median is found in blocks of bins first, which is faster
         blocks = share.unflatten(1, (-1, size_of_block))
         ends = blocks.sum(2).cumsum(1)
@@ -191,9 +197,7 @@ class SegFormer(nn.Module):
         below, lower = _crossed(inside, half, before)
         upper = inside.gather(1, below)
         within = ((half - lower) / (upper - lower).clamp(min=1e-12)).clamp(0.0, 1.0)
-        place = (block * size_of_block + below + within)[:, 0]
-        logarithm = F.pixel_shuffle(math.log(NEAREST) + place * self.bin_width, config.depth_detail)
-        return enlarged(logarithm, size)[:, 0].exp()
+        return (block * size_of_block + below + within)[:, 0]
 
     def loss(self, pictures: Tensor, semantic: Tensor, depth: Tensor) -> Tensor:
         """Returns the mean loss of B pictures at some random places of each cell, the same in all cells.

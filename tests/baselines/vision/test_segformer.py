@@ -93,6 +93,16 @@ def test_depth_is_the_median_of_its_bins():
     assert torch.allclose(depth.log(), model.bin_centres[30].expand_as(depth), atol=1e-4)
 
 
+def test_predictions_of_a_picture_do_not_depend_on_those_beside_it():
+    torch.manual_seed(1)
+    model, rgb = SegFormer(TINY).eval(), session_frames(3).rgb
+    classes, depth = predict_pixels(model, rgb)
+    for k in range(3):
+        alone = predict_pixels(model, rgb[k : k + 1])
+        assert (alone[0][0] == classes[k]).mean() > 0.999
+        assert np.allclose(alone[1][0], depth[k], rtol=1e-3)
+
+
 def test_rare_classes_weigh_more_and_missing_ones_nothing():
     found = class_weights(torch.tensor([0.0, 900.0, 100.0]), 0.5)
     assert found[0] == 0.0 and found[2] == pytest.approx(3.0 * found[1])
