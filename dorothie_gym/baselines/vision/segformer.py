@@ -177,7 +177,7 @@ class SegFormer(nn.Module):
 
     def depth(self, outputs: SegFormerOutputs, size: tuple[int, int]) -> Tensor:
         """Returns the depth of each pixel (B, h, w) [m]: the median of the bins, which minimises the expected error."""
-        places = [self._median_bins(features) for features in outputs.features.split(1)]  # all at once is slower
+        places = [self._median_bins(features) for features in torch.split(outputs.features, 1)]  # all at once is slower
         logarithm = math.log(NEAREST) + torch.cat(places) * self.bin_width
         return enlarged(F.pixel_shuffle(logarithm, self.config.depth_detail), size)[:, 0].exp()
 
@@ -197,7 +197,8 @@ class SegFormer(nn.Module):
         below, lower = _crossed(inside, half, before)
         upper = inside.gather(1, below)
         within = ((half - lower) / (upper - lower).clamp(min=1e-12)).clamp(0.0, 1.0)
-        return (block * size_of_block + below + within)[:, 0]
+        median: Tensor = (block * size_of_block + below + within)[:, 0]
+        return median
 
     def loss(self, pictures: Tensor, semantic: Tensor, depth: Tensor) -> Tensor:
         """Returns the mean loss of B pictures at some random places of each cell, the same in all cells.
