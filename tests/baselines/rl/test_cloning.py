@@ -27,12 +27,12 @@ SMALL = {"n_steps": 16, "batch_size": 32, "n_epochs": 1}
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Fourteen sessions of the scripted roles, two of them held out."""
+    """Twenty-eight sessions of the scripted roles, two of them held out."""
     root = tmp_path_factory.mktemp("corpus")
     env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=300.0))
     policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
-    for seed in range(14):
-        fold = "train" if seed < 12 else "val/seen"
+    for seed in range(28):
+        fold = "train" if seed < 26 else "val/seen"
         play_session(env, policies, seed=seed, folder=root / fold / f"{seed:04}")
     return root
 
@@ -49,7 +49,7 @@ def test_cloning_generalises_to_held_out_sessions(corpus: Path) -> None:
 
 def test_warm_start_is_evaluated_before_training(corpus: Path, tmp_path: Path) -> None:
     small = tmp_path / "corpus"
-    for session in ("train/0000", "val/seen/0012"):
+    for session in ("train/0000", "val/seen/0026"):
         shutil.copytree(corpus / session, small / session)
     settings = TrainingSettings(
         algorithm="ppo", env=NAVIGATION, steps=32, environments=2, evaluate_every=32, episodes=1, network=(8,),
