@@ -212,8 +212,8 @@ def _is_left_to_ask(
     if key[1] in turn_lanes(state.town):
         return False  # the car needs time to change lanes
     if state.guidance.considered != key:
-        left = max(state.style.waits, state.config.omits_straight) if goes_straight else state.style.waits
-        state.guidance = state.guidance.with_consideration(key, bool(rng.random() < left))
+        chance = max(state.style.waits, state.config.omits_straight) if goes_straight else state.style.waits
+        state.guidance = state.guidance.with_consideration(key, bool(rng.random() < chance))
     if not state.guidance.left_to_ask or state.motion.standstill(view.time) > state.config.repeat_after:
         return False
     return distance > state.config.turn_late_distance or goes_straight
