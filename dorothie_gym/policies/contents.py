@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition
-from dorothie_gym.ontology import ActionValue, GoalStatus, LandmarkName, StreetName
+from dorothie_gym.ontology import ActionValue, DialogueAct, GoalStatus, LandmarkName, Slot, StreetName
 
 
 def destination(place: LandmarkName | None, street: StreetName | None = None) -> Proposition:
@@ -53,6 +53,13 @@ def action(
 def named(street: StreetName | None) -> StreetName | None:
     """Returns a street, or None for one whose name is unknown."""
     return None if street is StreetName.UNKNOWN else street
+
+
+def named_streets(act: DialogueAct) -> tuple[StreetName, ...]:
+    """Returns the streets that an act names, without "unknown" and "queried"."""
+    unnamed = (StreetName.UNKNOWN, StreetName.QUERIED)
+    values = act.values(Slot.STREET)
+    return tuple(name for name in values if isinstance(name, StreetName) and name not in unnamed)
 
 
 def arguments_of(content: Proposition, *kept: str) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import pytest
 from dorothie_gym.dialogue import Predicate
 from dorothie_gym.ontology import DialogueAct, DialogueMove, GoalStatus, LandmarkName, Role
 from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.co_wizard.story import arrival_reminder, kept_for_later, remember
+from dorothie_gym.policies.co_wizard.story import arrival_reminder, kept_for_later, note_owner, remember
 from dorothie_gym.policies.observation_parser import heard_utterance
 from tests.policies.said import with_words
 from tests.policies.test_acknowledgement import start
@@ -61,3 +61,21 @@ def test_errand_is_mentioned_on_arrival_and_when_it_is_put_off():
     later = kept_for_later(state, LandmarkName.COCO)
     assert GoalStatus.PENDING in later.act.slots and later.meaning[0].get("item") == "a mango smoothie"
     assert kept_for_later(state, LandmarkName.KFC).meaning[0].predicate is Predicate.TASK
+
+
+@pytest.mark.parametrize(
+    ("text", "owner"),
+    [
+        ("To Mateo's house on Duffield", "Mateo"),
+        ("go to Mrs. Tamm's house please", "Mrs. Tamm"),
+        ("my sister's house is next", "your sister"),
+        ("take me to the house on Beal", None),
+    ],
+)
+def test_owner_of_the_house_is_taken_up(text, owner):
+    state, view = start(recalls=0.0)
+    house = DialogueAct.of(DialogueMove.INSTRUCT, LandmarkName.HOUSE)
+    heard = heard_utterance(with_words(dict(view.raw), Role.PARTICIPANT, text, house), Role.PARTICIPANT)
+    assert heard is not None
+    note_owner(state, heard)
+    assert state.beliefs.owner == owner

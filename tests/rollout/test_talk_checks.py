@@ -128,6 +128,15 @@ def test_status_of_a_task_follows_the_record(world):
     assert not later and told(world, Proposition.of(P.GOAL, place=name_of(foreign)), event.time - 1.0) is False
 
 
+def test_goal_that_the_car_believes_in_counts_as_its_statement_only(world):
+    update = next(e for e in world.session.of_type(EventType.BELIEF_UPDATE) if e.data.get("landmarks"))
+    name = next(name for name in LandmarkName if name.label == update.data["landmarks"][0])
+    assert world.believed_goal(update.time) is name
+    first = world.session.of_type(EventType.BELIEF_UPDATE)[0]
+    assert world.believed_goal(first.time - 0.1) is None
+    assert told(world, Proposition.of(P.GOAL, negated=True), first.time - 0.1) is True, "it has no destination yet"
+
+
 def test_nearer_place_has_the_shorter_way(world):
     single = [row for row in world.session.header.landmarks if len(world.landmarks(name_of(row))) == 1]
     ways = sorted((world.way_to(20.0, row), name_of(row).value, name_of(row)) for row in single)

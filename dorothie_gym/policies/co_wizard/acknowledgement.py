@@ -49,6 +49,16 @@ def acknowledge(
         state.say(taken_on(state, wanted, rng), *more)
 
 
+def sign_of_hearing(topic: str) -> Remark:
+    """Returns the sign that something was heard.
+
+    Args:
+        topic: what it was: an order ("ordered"), news ("told"), an answer ("answered"), an errand done ("done"), or
+            small talk ("chat").
+    """
+    return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
+
+
 def taken_on(state: CoWizardState, wanted: Proposition, rng: np.random.Generator) -> Remark:
     """Returns an acceptance ("will do") of what is wanted, or the sign that it was heard ("okay"), by chance."""
     accepts = rng.random() < state.config.accepts
@@ -61,8 +71,8 @@ def _repeated(wanted: Proposition, wording: Wording, rng: np.random.Generator) -
     if rng.random() < 0.35:
         return (intend(Function.ACCEPT, wanted, wording=replace(wording, topic="taken")),)
     elided = contents.arguments_of(wanted)
-    heard = intend(Function.POSITIVE_FEEDBACK, wanted, elided=elided, wording=Wording(topic="ordered"))
-    return heard, intend(Function.INFORM, wanted, wording=wording, joined=True)
+    okay = intend(Function.POSITIVE_FEEDBACK, wanted, elided=elided, wording=Wording(topic="ordered"))
+    return okay, intend(Function.INFORM, wanted, wording=wording, joined=True)
 
 
 def plan_remark(

@@ -18,7 +18,7 @@ from dorothie_gym.ontology import (
     StreetName,
 )
 from dorothie_gym.policies import contents
-from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
+from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.story import kept_for_later
@@ -240,7 +240,7 @@ def hear_description(
     street = streets[0] if streets and rng.random() < state.style.echoes else None
     if street is None:
         asked = view.time - state.dialogue.asked_at < state.config.answer_time
-        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="answered" if asked else "told")))
+        state.say(sign_of_hearing("answered" if asked else "told"))
     else:
         state.say(intend(Function.POSITIVE_FEEDBACK, contents.located(goal, street), elided=("place",)))
     if rng.random() < state.style.reassures:

@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, Wording
+from dorothie_gym.dialogue import ParsedText, Predicate, Proposition, Wording
 from dorothie_gym.ontology import (
-    SPEED_STEP,
     ActionValue,
     DialogueAct,
     DialogueMove,
@@ -18,13 +17,12 @@ from dorothie_gym.ontology import (
     ObjectClass,
     Role,
     Slot,
-    SlotValue,
     StreetName,
 )
 from dorothie_gym.policies import contents
-from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark
+from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
-from dorothie_gym.policies.co_wizard.driving import junction_meant, place_ahead
+from dorothie_gym.policies.co_wizard.driving import junction_meant
 from dorothie_gym.policies.co_wizard.goals import (
     abandon,
     accept_offer,
@@ -36,11 +34,12 @@ from dorothie_gym.policies.co_wizard.goals import (
     postpone,
     set_goal,
 )
+from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, do_turn
 from dorothie_gym.policies.co_wizard.judgement import believes
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
 from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, is_garbled, note_contradiction
 from dorothie_gym.policies.co_wizard.repetition import note_order
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
+from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive
 from dorothie_gym.policies.co_wizard.story import note_owner, remember
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.mood import Happening
@@ -48,20 +47,8 @@ from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utter
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend, repeated
 
-STRAIGHT_ON_DISTANCE = 60.0
-"""Distance to a junction within which "go on" means straight across it [m]."""
-
-SLOWER_DISTANCE = 20.0
-"""Distance to a goal off the map that "slower" without a reason is taken to mean [m]."""
-
 NEAR = 100
 """Distance up to which a place that is said to be ahead is approached slowly [m]."""
-
-ASKED_SPEED_CHANGE = 10
-"""Change of the cruise speed for "faster" and "slower" without a number [km/h]."""
-
-SPEED_RANGE = (10, 60)
-"""Range of cruise speeds that the Co-Wizard accepts [km/h]."""
 
 _STEERING = frozenset(
     {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.START}
@@ -148,7 +135,7 @@ def _instruction(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     landmarks = tuple(name for name in act.values(Slot.LANDMARK) if name not in _UNNAMED)
-    actions = tuple(value for value in act.values(Slot.ACTION) if value in _OBEYED)
+    actions = tuple(value for value in act.values(Slot.ACTION) if isinstance(value, ActionValue) and value in OBEYED)
     streets = tuple(name for name in act.values(Slot.STREET) if isinstance(name, StreetName))
     if not actions and landmarks:
         _instructed_place(state, view, act, words, rng)
@@ -156,7 +143,7 @@ def _instruction(
         name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
         approach_stop(state, view, name, float(words.distance))
         if state.speech.idle and rng.random() > state.style.silent:
-            state.say(_heard("ordered"))
+            state.say(sign_of_hearing("ordered"))
     elif actions:
         _obey(state, view, act, actions, words, rng)
     elif streets:
@@ -173,7 +160,7 @@ def _senseless(
 ) -> bool:  # fmt: skip
     """Stops after words without sense where that is expected, or asks again; returns whether it did."""
     if is_garbled(words) and expects_stop(state, view, words):
-        _do_stop(state, view, act, words)
+        do_stop(state, view, act, words)
         return True
     if asks:
         state.say(intend(Function.NEGATIVE_FEEDBACK))
@@ -198,7 +185,7 @@ def _obey(
             state.route = state.route.with_progress(None)
     contradicts = note_contradiction(state, view, actions[0], words)
     for action in actions:
-        _OBEYED[action](state, view, act, words)
+        OBEYED[action](state, view, act, words)
     acknowledge(state, view, actions[0], words, rng)
     note_order(state, view, actions[0])
     if contradicts:
@@ -219,7 +206,7 @@ def _instructed_place(
         state.intentions = state.intentions.resumed()
         state.say(intend(Function.POSITIVE_FEEDBACK, contents.destination(landmarks[0])))
     else:
-        set_goal(state, view, landmarks[0], _named(streets), rng, sure=landmarks[0] not in words.guessed)
+        set_goal(state, view, landmarks[0], contents.named_streets(act), rng, sure=landmarks[0] not in words.guessed)
 
 
 def _abandoned_place(
@@ -236,7 +223,7 @@ def _abandoned_place(
         later = contents.errand(others[0], GoalStatus.PENDING)
         state.say(intend(Function.ACCEPT, later, elided=("status",), wording=wording))
     elif others:
-        set_goal(state, view, others[0], _named(act.values(Slot.STREET)), rng, dropped=dropped)
+        set_goal(state, view, others[0], contents.named_streets(act), rng, dropped=dropped)
     else:
         abandon(state, dropped)
         _accept_change(state, contents.errand(dropped, GoalStatus.ABANDONED), rng)
@@ -254,12 +241,6 @@ def _landmarks(act: DialogueAct) -> list[LandmarkName]:
     return [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
 
 
-def _named(values: tuple[SlotValue, ...]) -> tuple[StreetName, ...]:
-    """Returns the streets among slot values, without "unknown" and "queried"."""
-    unnamed = (StreetName.UNKNOWN, StreetName.QUERIED)
-    return tuple(name for name in values if isinstance(name, StreetName) and name not in unnamed)
-
-
 def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetName) -> None:
     if state.dialogue.detour_asked_at is not None:
         state.dialogue = state.dialogue.with_detour_question(None)
@@ -272,86 +253,6 @@ def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetN
     directive = Directive(direction=None, street=street, junction=-1 if junction is None else junction.junction)
     state.intentions = state.intentions.directed(directive).resumed()
     state.say(intend(Function.ACCEPT, contents.action(None, street=street), wording=Wording(topic="taken")))
-
-
-# --- instructed actions ---------------------------------------------------------------------------------------------
-
-
-def _do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    streets, junction = _named(act.values(Slot.STREET)), junction_meant(state, view)
-    directive = Directive(
-        direction=words.direction,
-        street=streets[0] if streets else StreetName.UNKNOWN,
-        skip=max((words.ordinal or 1) - 1, 0),
-        junction=-1 if junction is None else junction.junction,
-    )
-    state.intentions = state.intentions.turning(directive)
-
-
-def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    close = state.intentions.halted or state.intentions.creeping or view.standing
-    if close and (words.further or words.distance is not None):
-        distance = float(words.distance) if words.distance is not None else state.config.nudge_distance
-        state.intentions = state.intentions.nudged(place_ahead(state, view, distance))
-        return
-    choice = junction_meant(state, view)
-    state.intentions = state.intentions.proceeding()
-    if choice is not None and (words.direction is Direction.STRAIGHT or choice.distance < STRAIGHT_ON_DISTANCE):
-        straight = Directive(direction=Direction.STRAIGHT, junction=choice.junction)
-        state.intentions = state.intentions.directed(straight)
-
-
-def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    # a car that was stopped for a place off the map and now is to turn round has gone past it
-    guided = state.beliefs.goal is not None and not state.beliefs.exact
-    creeping = guided and view.time - state.dialogue.stop_instructed_at < state.config.recent_stop
-    state.intentions = state.intentions.turning_round(view.time + state.config.wish_time, creeping=creeping)
-    state.dialogue = state.dialogue.with_detour_question(None).after_u_turn_instruction(view.time)
-
-
-def _do_switch(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    wish = Wish.SWITCH_RIGHT if words.direction is Direction.RIGHT else Wish.SWITCH_LEFT
-    state.intentions = state.intentions.switching(wish, view.time + state.config.wish_time)
-
-
-def _do_stop(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    state.dialogue = state.dialogue.after_stop_instruction(view.time)
-    state.intentions = state.intentions.stopped()
-
-
-def _do_start(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    state.intentions = state.intentions.started()
-
-
-def _do_speed(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    if words.speed is None and words.faster is False and not state.beliefs.exact:
-        # without a reason given, the goal that is not on the map must be near
-        approach_stop(state, view, None, SLOWER_DISTANCE)
-        return
-    if words.speed is not None:
-        asked = words.speed
-    else:
-        asked = round(view.cruise) + (ASKED_SPEED_CHANGE if words.faster else -ASKED_SPEED_CHANGE)
-    low, high = SPEED_RANGE
-    asked = min(max(int(SPEED_STEP) * round(asked / int(SPEED_STEP)), low), high)
-    until = view.time + state.config.slow_time
-    state.intentions = state.intentions.with_asked_speed(asked, state.config.open_road_speed, until)
-
-
-def _do_lights(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    state.intentions = state.intentions.with_lights(words.lights is not False)
-
-
-_OBEYED: dict[ActionValue, Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText], None]] = {
-    ActionValue.J_TURN: _do_turn,
-    ActionValue.LANE_FOLLOW: _do_follow,
-    ActionValue.U_TURN: _do_u_turn,
-    ActionValue.LANE_SWITCH: _do_switch,
-    ActionValue.STOP: _do_stop,
-    ActionValue.START: _do_start,
-    ActionValue.SPEED_CHANGE: _do_speed,
-    ActionValue.LIGHT_CHANGE: _do_lights,
-}
 
 
 # --- other moves ----------------------------------------------------------------------------------------------------
@@ -367,23 +268,23 @@ def _explanation(
     elif words.distance is not None and name is not None and name is state.beliefs.goal and _is_near(state, words):
         approach_stop(state, view, name, float(words.distance))
         if rng.random() > state.style.silent:
-            state.say(_heard("told"))
+            state.say(sign_of_hearing("told"))
     elif GoalStatus.COMPLETE in statuses:
         state.feel(Happening.DONE, view.time)
         complete(state, name)
         if rng.random() < 0.5:
-            state.say(_heard("done"))
+            state.say(sign_of_hearing("done"))
     elif GoalStatus.ABANDONED in statuses:
         abandon(state, name)
         if name is None:
-            state.say(_heard("told"))
+            state.say(sign_of_hearing("told"))
         else:
             _accept_change(state, contents.errand(name, GoalStatus.ABANDONED), rng)
     elif name is not None and not statuses and (state.beliefs.goal is None or state.intentions.arrived):
         # with nowhere to go, a place that is mentioned may be the next one
-        set_goal(state, view, name, _named(act.values(Slot.STREET)), rng, sure=False)
+        set_goal(state, view, name, contents.named_streets(act), rng, sure=False)
     elif act.values(Slot.STREET):
-        hear_description(state, view, _named(act.values(Slot.STREET)), landmarks, rng)
+        hear_description(state, view, contents.named_streets(act), landmarks, rng)
     elif act.slots or not _senseless(state, view, act, words, asks=False):
         _statement(state, view, act, words, rng)
 
@@ -406,14 +307,9 @@ def _statement(
         state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
     elif GoalStatus.PENDING in statuses and name is not None:
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
-        state.say(_heard("told"))
+        state.say(sign_of_hearing("told"))
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
-        state.say(_heard("told"))
-
-
-def _heard(topic: str) -> Remark:
-    """Returns the sign that something was heard: an order ("ordered"), news ("told"), an answer, or an errand done."""
-    return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
+        state.say(sign_of_hearing("told"))
 
 
 def _reply(
@@ -429,18 +325,18 @@ def _reply(
         state.dialogue = state.dialogue.with_proposal(None)
         if not state.beliefs.exact:
             state.route = state.route.with_progress(None)
-        _do_turn(state, view, act, words)
+        do_turn(state, view, act, words)
         acknowledge(state, view, ActionValue.J_TURN, words, rng)
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         _reply_with_place(state, view, act, rng)
     elif view.time - state.dialogue.asked_at < state.config.answer_time and words.order is None and not act.slots:
         state.say(intend(Function.NEGATIVE_FEEDBACK))  # it does not answer the question
     elif rng.random() < 0.5:
-        state.say(_heard("answered"))
+        state.say(sign_of_hearing("answered"))
 
 
 def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
-    landmarks, streets, goal = _landmarks(act), _named(act.values(Slot.STREET)), state.beliefs.goal
+    landmarks, streets, goal = _landmarks(act), contents.named_streets(act), state.beliefs.goal
     if act.move is DialogueMove.CLARIFY and landmarks and goal is not landmarks[0]:
         set_goal(state, view, landmarks[0], streets, rng, corrected=True)
     elif (goal is None or state.intentions.arrived) and landmarks:
@@ -477,7 +373,7 @@ def _no(
     if state.intentions.arrived:
         doubt(state)
     if words.turns and not act.values(Slot.ACTION):
-        _do_turn(state, view, act, words)
+        do_turn(state, view, act, words)
 
 
 def _alignment(
@@ -506,7 +402,7 @@ def _check(
 
 def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Proposition:
     """Returns what the participant wants verified: a destination, a street, an action, or the present destination."""
-    places, streets, actions = _landmarks(act), _named(act.values(Slot.STREET)), act.values(Slot.ACTION)
+    places, streets, actions = _landmarks(act), contents.named_streets(act), act.values(Slot.ACTION)
     if places:
         return contents.destination(places[0])
     if streets:
@@ -540,7 +436,7 @@ def _small_talk(
         return
     if rng.random() < state.style.chats:
         replies = intend(Function.OTHER, wording=Wording(topic="reply"))
-        state.say(replies if rng.random() < 0.6 else _heard("chat"))
+        state.say(replies if rng.random() < 0.6 else sign_of_hearing("chat"))
 
 
 _REACTIONS: dict[

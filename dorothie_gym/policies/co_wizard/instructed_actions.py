@@ -1,0 +1,110 @@
+"""Actions that the participant asks for, taken into the driving goals of the Co-Wizard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final, TypeAlias
+
+from dorothie_gym.dialogue import Direction, ParsedText
+from dorothie_gym.ontology import SPEED_STEP, ActionValue, DialogueAct, StreetName
+from dorothie_gym.policies import contents
+from dorothie_gym.policies.co_wizard.driving import junction_meant, place_ahead
+from dorothie_gym.policies.co_wizard.goals import approach_stop
+from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+
+STRAIGHT_ON_DISTANCE = 60.0
+"""Distance to a junction within which "go on" means straight across it [m]."""
+
+SLOWER_DISTANCE = 20.0
+"""Distance to a goal off the map that "slower" without a reason is taken to mean [m]."""
+
+ASKED_SPEED_CHANGE = 10
+"""Change of the cruise speed for "faster" and "slower" without a number [km/h]."""
+
+SPEED_RANGE = (10, 60)
+"""Range of cruise speeds that the Co-Wizard accepts [km/h]."""
+
+Obey: TypeAlias = Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText], None]
+"""Reaction to an instruction: changes the state (working copy) by the observation, the act and its words."""
+
+
+def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    """Intends the turn that was asked for."""
+    streets, junction = contents.named_streets(act), junction_meant(state, view)
+    directive = Directive(
+        direction=words.direction,
+        street=streets[0] if streets else StreetName.UNKNOWN,
+        skip=max((words.ordinal or 1) - 1, 0),
+        junction=-1 if junction is None else junction.junction,
+    )
+    state.intentions = state.intentions.turning(directive)
+
+
+def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    close = state.intentions.halted or state.intentions.creeping or view.standing
+    if close and (words.further or words.distance is not None):
+        distance = float(words.distance) if words.distance is not None else state.config.nudge_distance
+        state.intentions = state.intentions.nudged(place_ahead(state, view, distance))
+        return
+    choice = junction_meant(state, view)
+    state.intentions = state.intentions.proceeding()
+    if choice is not None and (words.direction is Direction.STRAIGHT or choice.distance < STRAIGHT_ON_DISTANCE):
+        straight = Directive(direction=Direction.STRAIGHT, junction=choice.junction)
+        state.intentions = state.intentions.directed(straight)
+
+
+def _do_u_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    # a car that was stopped for a place off the map and now is to turn round has gone past it
+    guided = state.beliefs.goal is not None and not state.beliefs.exact
+    creeping = guided and view.time - state.dialogue.stop_instructed_at < state.config.recent_stop
+    state.intentions = state.intentions.turning_round(view.time + state.config.wish_time, creeping=creeping)
+    state.dialogue = state.dialogue.with_detour_question(None).after_u_turn_instruction(view.time)
+
+
+def _do_switch(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    wish = Wish.SWITCH_RIGHT if words.direction is Direction.RIGHT else Wish.SWITCH_LEFT
+    state.intentions = state.intentions.switching(wish, view.time + state.config.wish_time)
+
+
+def do_stop(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    """Intends to stop here."""
+    state.dialogue = state.dialogue.after_stop_instruction(view.time)
+    state.intentions = state.intentions.stopped()
+
+
+def _do_start(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    state.intentions = state.intentions.started()
+
+
+def _do_speed(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    if words.speed is None and words.faster is False and not state.beliefs.exact:
+        # without a reason given, the goal that is not on the map must be near
+        approach_stop(state, view, None, SLOWER_DISTANCE)
+        return
+    if words.speed is not None:
+        asked = words.speed
+    else:
+        asked = round(view.cruise) + (ASKED_SPEED_CHANGE if words.faster else -ASKED_SPEED_CHANGE)
+    low, high = SPEED_RANGE
+    asked = min(max(int(SPEED_STEP) * round(asked / int(SPEED_STEP)), low), high)
+    until = view.time + state.config.slow_time
+    state.intentions = state.intentions.with_asked_speed(asked, state.config.open_road_speed, until)
+
+
+def _do_lights(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
+    state.intentions = state.intentions.with_lights(words.lights is not False)
+
+
+OBEYED: Final[Mapping[ActionValue, Obey]] = MappingProxyType({
+    ActionValue.J_TURN: do_turn,
+    ActionValue.LANE_FOLLOW: _do_follow,
+    ActionValue.U_TURN: _do_u_turn,
+    ActionValue.LANE_SWITCH: _do_switch,
+    ActionValue.STOP: do_stop,
+    ActionValue.START: _do_start,
+    ActionValue.SPEED_CHANGE: _do_speed,
+    ActionValue.LIGHT_CHANGE: _do_lights,
+})  # fmt: skip
+"""What is done on an instruction, by the action that it names."""

@@ -1,0 +1,273 @@
+"""Answers of the participant to checks and yes/no questions of the car."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+import numpy as np
+
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, Wording
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    LandmarkName,
+    Slot,
+    SlotValue,
+    StreetName,
+)
+from dorothie_gym.policies import contents
+from dorothie_gym.policies.observation_parser import SeenSubgoal
+from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
+from dorothie_gym.policies.participant.goals import announcement, route_length, story_remark, switch_target
+from dorothie_gym.policies.participant.guidance import next_step, note_step
+from dorothie_gym.policies.participant.hints import hint
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.route_progress import first_new_street
+from dorothie_gym.policies.speech import Remark, intend
+
+_FREE = frozenset({ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START})
+"""Actions that are left to the car."""
+
+_WAYS = frozenset({ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH})
+"""Actions that determine the way."""
+
+_AHEAD = frozenset({ActionValue.LANE_FOLLOW, ActionValue.J_TURN})
+
+JUST_DONE = 12.0
+"""Time for which the last errand is what a car that asks whether it has arrived means [s]."""
+
+
+def check(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Confirms what the car wants verified, or corrects it."""
+    landmarks, streets = act.values(Slot.LANDMARK), act.values(Slot.STREET)
+    goal = state.task.goal
+    if goal is not None and landmarks:
+        right = landmarks == (goal.name,) and streets in ((), (goal.street,))
+        if not right:
+            again = intend(Function.REQUEST, contents.destination(goal.name, goal.street), joined=True)
+            state.say_first(denied(checked(state, act, words)), again)
+            return
+    elif act.values(Slot.ACTION) and not _fits(state, view, act, words, rng):
+        _refuse_with_step(state, view, act, words, rng)
+        return
+    if landmarks:
+        state.set_guiding(False)  # the car knows the place
+    wanted = checked(state, act, words)
+    state.say_first(_short(Function.CONFIRM, wanted), *addition(state, view, rng))
+
+
+def checked(state: ParticipantState, act: DialogueAct, words: ParsedText) -> Proposition:
+    """Returns what the car wants verified or proposes: a destination, an action, or the present destination."""
+    place = contents.first_name(act.values(Slot.LANDMARK))
+    street = next((value for value in act.values(Slot.STREET) if isinstance(value, StreetName)), None)
+    wanted = next((value for value in act.values(Slot.ACTION) if isinstance(value, ActionValue)), None)
+    if place is not None:
+        return contents.destination(place, street)
+    if wanted is not None or street is not None:
+        return contents.action(wanted, words if wanted is not None else None, street=street)
+    goal = state.task.goal
+    return contents.destination(None if goal is None else goal.name)
+
+
+def _short(function: Function, content: Proposition) -> Remark:
+    """Returns an answer whose content goes without saying: "yes", "that's it"."""
+    return intend(function, content, elided=contents.arguments_of(content))
+
+
+def denied(content: Proposition) -> Remark:
+    """Returns the answer that a content is wrong or not wanted: "no"."""
+    return _short(Function.NEGATIVE_ANSWER, content.opposite)
+
+
+def _fits(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> bool:
+    """Returns whether an action named by the car is the next step or the last instruction."""
+    step = next_step(state, view, DialogueMove.INSTRUCT, rng)
+    actions = set(act.values(Slot.ACTION))
+    if step is None or actions & _FREE:
+        return True
+    instructed = next((item for item in reversed(state.speech.said) if item.act.values(Slot.ACTION)), None)
+    lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
+    if instructed is not None and lately and actions & set(instructed.act.slots):
+        return words.direction is None or instructed.wording.direction in (None, words.direction)
+    meant, wanted = set(step[2].act.values(Slot.ACTION)), step[2].wording.direction
+    if wanted is Direction.STRAIGHT:
+        return bool(actions & _AHEAD) and words.direction in (None, Direction.STRAIGHT)
+    return bool(actions & meant) and (wanted is None or words.direction is wanted)
+
+
+def addition(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns a hint or reason to add to an answer, or nothing, by chance."""
+    if rng.random() >= state.style.reasons:
+        return ()
+    if state.guidance.guiding or rng.random() < 0.5:
+        return hint(state, view, rng)
+    return story_remark(state, view, rng)
+
+
+def _refuse_with_step(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Says no, and names the right step unless a stop instruction is under way."""
+    step = next_step(state, view, DialogueMove.INSTRUCT, rng)
+    refusal = denied(checked(state, act, words))
+    just_stopped = view.time - state.guidance.stopped_at < state.config.just_said
+    if step is None or just_stopped or (step[0][0] == "on" and step[1] < state.config.stop_distance):
+        state.say_first(refusal)
+        return
+    key, _, instead = step
+    note_step(state, view, key)
+    state.say_first(refusal, replace(instead, joined=True))
+
+
+def answer_yes_no(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Answers a question that wants a yes or a no."""
+    objects, landmarks = act.values(Slot.OBJECT), act.values(Slot.LANDMARK)
+    offered = _offered_subgoal(state, view, landmarks)
+    if _asks_about_finished(state, view, act, words):
+        there = Proposition.of(Predicate.ARRIVED, place=state.task.finished[0])
+        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, there))
+    elif offered is not None:
+        _answer_offer(state, view, offered)
+    elif act.values(Slot.STREET) and not landmarks and not act.values(Slot.ACTION):
+        _answer_street(state, view, act)
+    elif objects:
+        seen = any(thing.kind in objects for thing in view.objects)
+        sight = Proposition.of(Predicate.SEES, object=objects[0])
+        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, sight) if seen else denied(sight))
+    elif landmarks and state.task.goal is not None:
+        if state.task.goal.name in landmarks and is_elsewhere(state, view):
+            deny_arrival(state)
+        elif state.task.goal.name in landmarks:
+            state.say_first(_short(Function.AFFIRMATIVE_ANSWER, words.asked or checked(state, act, words)))
+        else:
+            again = announcement(state, view, rng)
+            state.say_first(denied(words.asked or checked(state, act, words)), replace(again, joined=True))
+    elif set(act.values(Slot.ACTION)) & _WAYS:
+        state.set_guiding(True)
+        _answer_proposal(state, view, act, words, rng)
+    elif not act.slots and _is_just_short(state, view):
+        refusal = denied(words.asked or checked(state, act, words))
+        state.say_only(refusal, replace(creep_instruction(state, view), joined=True))
+    elif words.asked is not None and words.asked.predicate is Predicate.ARRIVED and not about_to_arrive(state, view):
+        deny_arrival(state)
+    else:
+        goal = state.task.goal
+        arriving = not act.slots and goal is not None and view.standing and about_to_arrive(state, view)
+        place = Proposition.of(Predicate.ARRIVED, place=goal.name) if arriving and goal is not None else None
+        asked = words.asked or place or contents.action(ActionValue.UNKNOWN)
+        unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
+        yes = _short(Function.AFFIRMATIVE_ANSWER, asked)
+        state.say_first(*unsure, yes, *(() if unsure else addition(state, view, rng)))
+
+
+def _asks_about_finished(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText
+) -> bool:  # fmt: skip
+    """Returns whether the car, which stands, asks if it has arrived where an errand was just done."""
+    place = state.task.finished[0]
+    if not view.standing or not has_just_finished(state, view, (place,)):
+        return False
+    asks = words.asked is None or words.asked.predicate is Predicate.ARRIVED
+    return asks and act.slots <= {place}
+
+
+def has_just_finished(state: ParticipantState, view: ParticipantView, landmarks: Collection[object]) -> bool:
+    """Returns whether the errand at one of some landmarks was done a moment ago."""
+    place, at = state.task.finished
+    return place in landmarks and view.time - at <= JUST_DONE
+
+
+def _offered_subgoal(
+    state: ParticipantState, view: ParticipantView, landmarks: tuple[SlotValue, ...]
+) -> SeenSubgoal | None:
+    """Returns the subgoal, other than the target, that the car proposes to do first."""
+    if state.task.goal is None or state.task.goal.name in landmarks:
+        return None
+    for subgoal in view.subgoals:
+        landmark = view.landmark(subgoal.landmark)
+        if subgoal.open and subgoal.allowed and landmark is not None and landmark.name in landmarks:
+            return subgoal
+    return None
+
+
+def _answer_offer(state: ParticipantState, view: ParticipantView, offered: SeenSubgoal) -> None:
+    """Accepts a subgoal that is nearer than the target, and insists on the target otherwise."""
+    goal, progress = state.task.goal, state.route.progress
+    assert goal is not None
+    landmark = view.landmark(offered.landmark)
+    left = progress.left(view.station) if progress is not None else math.inf
+    if landmark is not None and route_length(state, view, landmark) < left:
+        switch_target(state, view, offered, landmark)
+        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, contents.destination(landmark.name)))
+        return
+    state.say_first(denied(contents.destination(None if landmark is None else landmark.name)), go_first(goal.name))
+
+
+def go_first(name: LandmarkName) -> Remark:
+    """Returns the instruction to go to a place first, as the rest of an answer."""
+    return intend(Function.REQUEST, contents.destination(name), wording=Wording(topic="first"), joined=True)
+
+
+def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
+    """Accepts a detour that is the participant's own, and insists on the own one otherwise."""
+    own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
+    proposed = contents.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
+    if own is None or own in act.values(Slot.STREET):
+        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, proposed))
+        return
+    over = contents.action(None, street=own)
+    state.say_first(denied(proposed), intend(Function.REQUEST, over, wording=Wording(topic="detour"), joined=True))
+
+
+def _answer_proposal(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Accepts the right way, and names it otherwise."""
+    if not _fits(state, view, act, words, rng):
+        _refuse_with_step(state, view, act, words, rng)
+        return
+    step = next_step(state, view, DialogueMove.INSTRUCT, rng)
+    if step is not None:
+        note_step(state, view, step[0])
+    proposed = checked(state, act, words)
+    first = (_short(Function.UNCERTAIN_ANSWER, proposed),) if rng.random() < state.config.unsure else ()
+    state.say_first(*first, _short(Function.AFFIRMATIVE_ANSWER, proposed), *addition(state, view, rng))
+
+
+# --- arrivals ---------------------------------------------------------------------------------------------------------
+
+
+def is_elsewhere(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car stands far from the target."""
+    progress = state.route.progress
+    far = progress is not None and progress.left(view.station) > state.config.elsewhere_distance
+    return view.standing and far
+
+
+def _is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car stands just before the target that it is guided to."""
+    progress = state.route.progress
+    if not state.guidance.guiding or not view.standing or progress is None:
+        return False
+    return about_to_arrive(state, view) and progress.left(view.station) > 0.0
+
+
+def deny_arrival(state: ParticipantState) -> None:
+    """Corrects a car that has mistaken another place for the target."""
+    if state.task.goal is None:
+        state.say_first(intend(Function.UNCERTAIN_ANSWER))
+        return
+    state.set_guiding(True)
+    away = Proposition.of(Predicate.ARRIVED, negated=True, place=state.task.goal.name)
+    state.say_first(intend(Function.NEGATIVE_ANSWER, away))
