@@ -269,6 +269,9 @@ def _explanation(
         approach_stop(state, view, name, float(words.distance))
         if rng.random() > state.style.silent:
             state.say(sign_of_hearing("told"))
+    elif _is_here(state, view, words):
+        do_stop(state, view, act, words)
+        acknowledge(state, view, ActionValue.STOP, words, rng)
     elif GoalStatus.COMPLETE in statuses:
         state.feel(Happening.DONE, view.time)
         complete(state, name)
@@ -287,6 +290,12 @@ def _explanation(
         hear_description(state, view, contents.named_streets(act), landmarks, rng)
     elif act.slots or not _senseless(state, view, act, words, asks=False):
         _statement(state, view, act, words, rng)
+
+
+def _is_here(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
+    """Returns whether a place that the car has not found by itself is said to be right here."""
+    here = words.told is not None and words.told.predicate is Predicate.ARRIVED and not words.told.negated
+    return here and not view.standing and not state.intentions.arrived and state.beliefs.goal is not None
 
 
 def _is_near(state: CoWizardState, words: ParsedText) -> bool:

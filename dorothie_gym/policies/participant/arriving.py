@@ -25,7 +25,7 @@ REACTION = 1.8
 BRAKING = 0.2
 """Loss of speed within a decision that shows that the car brakes [m/s]."""
 
-GAIN_RANGE = (-2.0, 2.0)
+GAIN_RANGE = (-2.0, 3.0)
 """Range of accelerations that are extrapolated [m/s^2]."""
 
 FURTHER = 5.0
@@ -45,6 +45,9 @@ STANDING_RANGE = 45.0
 
 PATIENT_TIME = 6.0
 """Standstill after which a car at the place, or one that is not guided, gets its next instruction [s]."""
+
+HERE = Wording(topic="here")
+"""Wording of the statement that the place is right here."""
 
 _STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
 _SHOUTING = SpeakerStyle(register=Register.BLUNT, chattiness=0.0, indirectness=0.0)
@@ -66,8 +69,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     if not state.guidance.guiding or view.time - state.guidance.nudged_at < config.nudge_time:
         return close  # a car that was sent on a little stops by itself
     if not state.guidance.stop_text:
-        text = word_act(_STOP, Role.PARTICIPANT, rng, Wording(here=True), style=state.speech.style)
-        state.guidance = state.guidance.with_stop_text(text)
+        _choose_stop_words(state, rng)
     if _room_to_stop(state, view, left)[0] < -config.late_stop:
         # there is only time for a shout
         shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(SHOUTS)]
@@ -75,13 +77,29 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
         state.guidance = state.guidance.with_stop_text(shortest)
     if _is_time_to_stop(state, view, left):
         if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > 0.0:
+            words, points_out = state.guidance.stop_text, state.guidance.points_out
             state.guidance = state.guidance.after_stopping(view.time)
-            stop = order(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
-            state.say(replace(stop, text=state.guidance.stop_text))
+            stop = _here(state) if points_out else order(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
+            state.say(replace(stop, text=words))
         return True
     if close and not state.guidance.approach_announced and view.speed > config.slow_speed:
         _announce_place(state, view, left, rng)
     return close
+
+
+def _choose_stop_words(state: ParticipantState, rng: np.random.Generator) -> None:
+    """Chooses the words to stop the car with: an instruction, or the statement that this is the place."""
+    points_out = not state.route.misses and rng.random() < state.style.points_out
+    act, wording = (_here(state).act, HERE) if points_out else (_STOP, Wording(here=True))
+    text = word_act(act, Role.PARTICIPANT, rng, wording, style=state.speech.style)
+    state.guidance = state.guidance.with_stop_text(text, points_out=points_out)
+
+
+def _here(state: ParticipantState) -> Remark:
+    """Returns the statement that the place is right here, which makes a guided car stop."""
+    place = None if state.task.goal is None else state.task.goal.name
+    here = Proposition.of(Predicate.CLOSE, place=place)
+    return intend(CommunicativeFunction.INFORM, here, elided=("place",), wording=HERE, urgent=True)
 
 
 def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
@@ -130,6 +148,14 @@ def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float
     return room <= (state.config.short_stop if state.route.misses else 0.0) or room < -after
 
 
+def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay: float) -> bool:
+    """Returns whether the car has just turned, or comes out of a turn within a delay [s], and drives slowly."""
+    lane = state.town.lanes[view.lane]
+    out = lane.length - view.station < delay * view.speed if lane.in_junction else view.station < BEHIND_CORNER
+    warned = state.guidance.slowed_early or state.guidance.approach_announced
+    return out and not warned and view.speed < state.config.soon_speed
+
+
 def _room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> tuple[float, float]:
     """Returns the distance before the place at which the car stops [m]: instructed now, and at the next decision.
 
@@ -139,11 +165,10 @@ def _room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -
     interval, config = state.clock.interval, state.config
     delay = math.ceil(state.speech.delivery.seconds(state.guidance.stop_text) / interval - 1e-6) * interval
     gain = min(max((view.speed - state.motion.speed) / interval, GAIN_RANGE[0]), GAIN_RANGE[1])
-    corner = state.town.lanes[view.lane].in_junction or view.station < BEHIND_CORNER
-    speeds_up = corner and not state.guidance.slowed_early and view.speed < config.soon_speed
-    if gain > config.start_pull or speeds_up:
+    if _is_about_to_speed_up(state, view, delay):
         gain = config.pull
-    now, top = view.speed, max(config.top_speed, view.speed)
+    slow = state.guidance.slowed_early or state.guidance.approach_announced
+    now, top = view.speed, max(config.soon_speed if slow else config.top_speed, view.speed)
     soon = min(max(now + gain * interval, 0.0), top)
     rooms = []
     for speed, ahead in ((now, left), (soon, left - (now + soon) / 2 * interval)):

@@ -60,8 +60,7 @@ class ParticipantConfig(GuidanceConfig):
         slow_speed: speed below which slowing down is not asked for [m/s].
         soon_speed: speed expected of a car that has just started or turned [m/s].
         short_stop: distance before the goal at which the car is stopped after a miss [m].
-        start_pull: acceleration above which a car has just started [m/s^2].
-        pull: acceleration expected of such a car [m/s^2].
+        pull: acceleration expected of a car that comes out of a turn [m/s^2].
         ready_time: standstill after which a car near the goal gets its next instruction [s].
         distance_reserve: distance by which spoken distances are shortened, because they are rounded to tens and the car
             rolls on [m].
@@ -107,7 +106,7 @@ class ParticipantConfig(GuidanceConfig):
     run_up: float = 45.0
     run_up_per_lane: float = 50.0
     lane_return_time: float = 30.0
-    omits_straight: float = 0.65
+    omits_straight: float = 0.85
     states_distance: float = 0.5
     way_round_cost: float = 400.0
     off_route: int = 3
@@ -120,7 +119,6 @@ class ParticipantConfig(GuidanceConfig):
     slow_speed: float = 5.0
     soon_speed: float = 8.0
     short_stop: float = 4.0
-    start_pull: float = 0.6
     pull: float = 3.0
     ready_time: float = 1.6
     distance_reserve: float = 8.0
@@ -161,6 +159,9 @@ class ParticipantStyle:
         curious: probability of a question why the car does something unexpected.
         notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
         puzzled: probability that words of the car said during an own utterance have to be repeated.
+        points_out: probability that a car is stopped by the statement that this is the place.
+        thanks: probability that an answer of the car is acknowledged.
+        verifies: probability that a destination is followed by the question whether the car knows it.
     """
 
     guides: float
@@ -177,6 +178,9 @@ class ParticipantStyle:
     curious: float = 0.0
     notices: float = 0.0
     puzzled: float = 0.0
+    points_out: float = 0.0
+    thanks: float = 0.0
+    verifies: float = 0.0
 
     @classmethod
     def of(cls, persona: Persona, rng: np.random.Generator) -> ParticipantStyle:
@@ -185,19 +189,22 @@ class ParticipantStyle:
         landmarks = persona.directions is Directions.LANDMARKS
         by_turns = persona.knowledge * persona.talkativeness > BACKSEAT
         return cls(
-            guides=0.2 if by_turns else 0.02,
-            names_goal=within(0.4, 1.0, persona.certainty, rng),
+            guides=0.15 if by_turns else 0.02,
+            names_goal=within(0.85, 1.0, persona.certainty, rng),
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
             hurries=within(0.95, 0.4, persona.patience, rng),
             patience=within(7.0, 14.0, persona.patience, rng),
-            chat=within(170.0, 80.0, (persona.talkativeness + persona.humour) / 2.0, rng),
+            chat=within(130.0, 60.0, (persona.talkativeness + persona.humour) / 2.0, rng),
             waits=within(0.4, 0.8, persona.patience, rng) + 0.15 * vague,
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
             reasons=within(0.05, 0.3, persona.talkativeness, rng) + 0.15 * landmarks,
             aligns=within(0.15, 0.0, persona.certainty, rng),
-            nods=within(0.25, 0.55, persona.politeness, rng),
+            nods=within(0.35, 0.7, persona.politeness, rng),
             curious=within(0.02, 0.25, persona.attention, rng),
             puzzled=within(0.35, 0.0, persona.certainty, rng),
+            points_out=within(0.25, 0.6, persona.politeness, rng) + 0.15 * landmarks,
+            thanks=within(0.25, 0.8, persona.politeness, rng),
+            verifies=within(0.25, 0.0, persona.certainty, rng),
             notices=0.0 if persona.ignores else within(0.55, 1.0, persona.attention, rng),
         )
 

@@ -304,6 +304,10 @@ def _say_announcement(
         state.say(intend(Function.INFORM, contents.errand(named[0].name, GoalStatus.PENDING), joined=True))
     elif rng.random() < state.style.aligns:
         state.say(intend(Function.FEEDBACK_ELICITATION, joined=True))
+    elif goal is not None and rng.random() < state.style.verifies:
+        known = Proposition.of(Predicate.KNOWS, place=goal.name)
+        wording = Wording(topic="knows_it")
+        state.say(intend(Function.PROPOSITIONAL_QUESTION, known, elided=("place",), wording=wording, joined=True))
 
 
 def announce_target(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:

@@ -47,6 +47,12 @@ from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, intend, repeate
 
 _ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 
+_QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
+
+_REPLIES = frozenset(
+    {DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM}
+)
+
 _POOR_VIEW = frozenset({Predicate.FAILED, Predicate.VISIBILITY})
 """What a car says that cannot see well."""
 
@@ -90,7 +96,9 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
             continue  # the question that follows is answered instead
         if answer is not None:
             answer(state, view, act, heard.words, rng)
-    if state.speech is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
+    if state.speech is before and _answers_question(state, heard):
+        _thank(state, view, rng)
+    elif state.speech is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
         # an utterance that takes up an instruction needs no acknowledgement of its own
         _nod(state, view, rng, _nod_to(view, heard), alone=heard.acts[0].move not in _ACKNOWLEDGEMENTS)
 
@@ -201,6 +209,19 @@ def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
     reason = ActionValue.STOP in said or (objects and view.standing)
     topic = "why" if reason else "seen" if objects or heard.words.told is not None else None
     return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
+
+
+def _answers_question(state: ParticipantState, heard: HeardUtterance) -> bool:
+    """Returns whether the car has answered the question that was asked last."""
+    last = state.speech.last
+    return last is not None and last.act.move in _QUESTIONS and heard.acts[0].move in _REPLIES
+
+
+def _thank(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
+    """Shows, by chance, that the answer of the car was heard."""
+    busy = not state.speech.idle or (state.guidance.guiding and about_to_arrive(state, view))
+    if not busy and rng.random() < state.style.thanks:
+        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="answered")), *addition(state, view, rng))
 
 
 def _nod(

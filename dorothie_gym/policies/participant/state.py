@@ -209,6 +209,7 @@ class GuidanceState:
         approach_announced: whether the car has been informed that the place is near.
         slowed_early: whether it has been asked to slow down because the place is easily missed.
         stop_text: words to stop the car with; empty until they are chosen.
+        points_out: whether these words only state that this is the place.
         stopped_at: time of the last stop instruction [s].
         nudged_at: time of the last instruction to drive on a little [s].
         considered: last step for which it was decided whether to wait for a question of the car.
@@ -227,6 +228,7 @@ class GuidanceState:
     approach_announced: bool = False
     slowed_early: bool = False
     stop_text: str = ""
+    points_out: bool = False
     stopped_at: float = -math.inf
     nudged_at: float = -math.inf
     considered: StepKey | None = None
@@ -283,7 +285,7 @@ class GuidanceState:
 
     def for_another_approach(self) -> GuidanceState:
         """Prepares another announcement of the approach."""
-        return replace(self, approach_announced=False, stop_text="")
+        return replace(self, approach_announced=False, stop_text="", points_out=False)
 
     def after_miss(self) -> GuidanceState:
         """Prepares another request to slow down."""
@@ -297,13 +299,13 @@ class GuidanceState:
         """Records a request to slow down before the place."""
         return replace(self, slowed_early=True)
 
-    def with_stop_text(self, text: str) -> GuidanceState:
-        """Sets the words to stop the car with."""
-        return replace(self, stop_text=text)
+    def with_stop_text(self, text: str, *, points_out: bool = False) -> GuidanceState:
+        """Sets the words to stop the car with, and whether they only state that this is the place."""
+        return replace(self, stop_text=text, points_out=points_out)
 
     def after_stopping(self, now: float) -> GuidanceState:
-        """Records an instruction to stop."""
-        return replace(self, stopped_at=now)
+        """Records an instruction to stop; if it has to be repeated, it is a plain one."""
+        return replace(self, stopped_at=now, stop_text="" if self.points_out else self.stop_text, points_out=False)
 
     def after_nudging(self, now: float) -> GuidanceState:
         """Records an instruction to drive on a little."""
