@@ -70,7 +70,8 @@ def is_goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
     """Returns whether a place is one of the open tasks; without a place, whether one has been named.
 
     Statements of the Co-Wizard that agree with its recorded beliefs count as true: it may have misheard the place.
-    Whether an open task is not the one to be done now cannot be told.
+    Whether an open task is not the one to be done now cannot be told, nor which of several places of a name is meant
+    by its street.
     """
     place, own = said.get("place"), speaker is Role.CO_WIZARD
     if place is None:
@@ -79,7 +80,10 @@ def is_goal(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
         return False
     open_here = bool(_OPEN & set(world.statuses(time, place)))
     if own:
-        return open_here or world.believed_goal(time + BELIEF_DELAY) is place
+        believed = world.believed_goal(time + BELIEF_DELAY) is place
+        return believed or (open_here and not said.negated)
+    if said.negated and said.get("street") is not None and len(world.landmarks(place)) > 1:
+        return None
     others = any(_OPEN & set(world.statuses(time, name)) for name in LandmarkName if name is not place)
     return None if open_here and others and said.negated else open_here
 

@@ -202,7 +202,17 @@ def _visibility(world: SessionWorld, said: Proposition, time: float, speaker: Ro
 
 def _arrived(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
     place = said.get("place")
-    return world.arrived_at(time, place) if isinstance(place, LandmarkName) else None
+    if not isinstance(place, LandmarkName):
+        return None
+    if speaker is Role.PARTICIPANT and len(world.landmarks(place)) > 1:
+        return None  # several houses: the car may stand at another one
+    return world.arrived_at(time, place)
+
+
+def _lights_on(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
+    """Whether the head lights are on; None if they have been switched since the question."""
+    now, before = world.lights_on(time), world.lights_on(time - _NOW)
+    return now if now is before else None
 
 
 def _because(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
@@ -251,7 +261,7 @@ _EVALUATORS: Final[dict[Predicate, Evaluator]] = {
     Predicate.VISIBILITY: _visibility,
     Predicate.ARRIVED: _arrived,
     Predicate.BECAUSE: _because,
-    Predicate.LIGHTS_ON: lambda world, said, time, speaker: world.lights_on(time),
+    Predicate.LIGHTS_ON: _lights_on,
     Predicate.STANDS: lambda world, said, time, speaker: world.stands(time),
     Predicate.FAILED: _failed,
     Predicate.WEATHER: _weather,
