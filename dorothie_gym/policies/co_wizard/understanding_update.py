@@ -109,9 +109,10 @@ def _in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     """Joins the answers to an utterance.
 
     A mere "okay" is dropped where something more is said for itself, and "what?" where a part of it was understood.
+    Plans come last.
     """
     understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
-    answers = understood or answers[:1]
+    answers = sorted(understood or answers[:1], key=_tells_plan)
     plain = [item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots for item in answers]
     leads = [following.joined for following in answers[1:]]
     kept = [
@@ -120,6 +121,11 @@ def _in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
         if not plain[k] or (k == 0 if all(plain) else k < len(leads) and leads[k])
     ]
     return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
+
+
+def _tells_plan(item: Remark) -> bool:
+    """Returns whether a remark tells a plan that nobody has asked for."""
+    return item.act.move is DialogueMove.EXPLAIN and any(said.predicate in _PLANS for said in item.meaning)
 
 
 def _mishears(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> bool:

@@ -107,7 +107,7 @@ class ParticipantConfig(GuidanceConfig):
     run_up_per_lane: float = 50.0
     lane_return_time: float = 30.0
     omits_straight: float = 0.85
-    states_distance: float = 0.5
+    states_distance: float = 0.75
     way_round_cost: float = 400.0
     off_route: int = 3
     missed_within: float = 15.0
@@ -202,7 +202,7 @@ class ParticipantStyle:
             nods=within(0.35, 0.7, persona.politeness, rng),
             curious=within(0.02, 0.25, persona.attention, rng),
             puzzled=within(0.35, 0.0, persona.certainty, rng),
-            points_out=within(0.25, 0.6, persona.politeness, rng) + 0.15 * landmarks,
+            points_out=within(0.4, 0.75, persona.politeness, rng) + 0.15 * landmarks,
             thanks=within(0.25, 0.8, persona.politeness, rng),
             verifies=within(0.25, 0.0, persona.certainty, rng),
             notices=0.0 if persona.ignores else within(0.55, 1.0, persona.attention, rng),
