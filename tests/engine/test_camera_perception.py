@@ -142,7 +142,7 @@ def test_fog_hides_distant_bodies() -> None:
 
 def test_a_hidden_landmark_is_observed_from_the_first_time_that_it_is_in_view() -> None:
     met = 0
-    for seed in (0, 9, 30, 32):
+    for seed in (9, 13, 30, 32):
         engine = SessionEngine(TOWN, config=CONFIG)
         first: dict[int, int] = {}
         for k, observations in enumerate(played(engine, seed=seed, decisions=56)):
