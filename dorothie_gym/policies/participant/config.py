@@ -192,9 +192,9 @@ class ParticipantStyle:
             guides=0.15 if by_turns else 0.02,
             names_goal=within(0.85, 1.0, persona.certainty, rng),
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
-            hurries=within(0.95, 0.4, persona.patience, rng),
+            hurries=within(0.75, 0.2, persona.patience, rng),
             patience=within(7.0, 14.0, persona.patience, rng),
-            chat=within(130.0, 60.0, (persona.talkativeness + persona.humour) / 2.0, rng),
+            chat=within(160.0, 75.0, (persona.talkativeness + persona.humour) / 2.0, rng),
             waits=within(0.4, 0.8, persona.patience, rng) + 0.15 * vague,
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
             reasons=within(0.05, 0.3, persona.talkativeness, rng) + 0.15 * landmarks,
@@ -204,7 +204,7 @@ class ParticipantStyle:
             puzzled=within(0.35, 0.0, persona.certainty, rng),
             points_out=within(0.4, 0.75, persona.politeness, rng) + 0.15 * landmarks,
             thanks=within(0.25, 0.8, persona.politeness, rng),
-            verifies=within(0.25, 0.0, persona.certainty, rng),
+            verifies=within(0.2, 0.0, persona.certainty, rng),
             notices=0.0 if persona.ignores else within(0.55, 1.0, persona.attention, rng),
         )
 
