@@ -19,7 +19,15 @@ from dorothie_gym.errors import SessionError, StoryboardError, TownError
 from dorothie_gym.input_files import checked, raising
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording import CorpusEntry, Difference, Session, SessionHeader, SessionWriter, first_difference
+from dorothie_gym.recording import (
+    CorpusEntry,
+    Difference,
+    EndReason,
+    Session,
+    SessionHeader,
+    SessionWriter,
+    first_difference,
+)
 from dorothie_gym.rollout.processes import run_tasks
 from dorothie_gym.spaces import ActionDict, Observation
 from dorothie_gym.tasks import StoryboardTemplate, load_template, template_names
@@ -55,6 +63,10 @@ def resimulate(session: Session, town: Town, *, storyboard: StoryboardTemplate |
             for actions in _decided_actions(engine, session):
                 _step(engine, session, actions)
                 recorder.record(actions)
+            reason = _broken_off(session)
+            if reason is not None and not engine.over:
+                engine.break_off(reason)
+                recorder.record_end()
             if engine.over:
                 writer.finish(engine.summary())
         return Session.load(Path(folder) / "again")
@@ -111,10 +123,16 @@ def _step(engine: SessionEngine, session: Session, actions: Actions) -> None:
         raise SessionError(f"{session.name}: decision at frame {frame}: {error}") from None
 
 
+def _broken_off(session: Session) -> EndReason | None:
+    """Returns the reason for which people broke the session off; None if it came to an end of its own or has none."""
+    given = (session.summary or {}).get("reason")
+    return next((reason for reason in EndReason if reason.breaks_off and reason.value == given), None)
+
+
 def _cycles(session: Session, config: EnvConfig) -> int | None:
     """Returns the number of decisions after which the session was truncated, where its configuration does not say."""
     summary = session.summary or {}
-    if not session.complete or summary.get("reason") != "out of time" or not len(session.trajectory):
+    if not session.complete or summary.get("reason") != EndReason.OUT_OF_TIME or not len(session.trajectory):
         return None
     return max(int(session.trajectory["frame"][-1]) // config.frames, 1)
 
