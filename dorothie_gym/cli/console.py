@@ -24,16 +24,21 @@ LOCAL = "127.0.0.1"
 PORT = 8023
 """Usual port."""
 
+TOWN = "brookside"
+"""Town if none is given: the smallest one."""
+
 _LIBRARIES = ("starlette", "uvicorn", "websockets")
 
 
 def console(
     town: Annotated[
-        str,
+        str | None,
         typer.Option(
-            metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).", autocompletion=complete_town
+            metavar="NAME|FILE",
+            help=f"A town's name, or a file (.xodr, .yaml); {TOWN} if none is given.",
+            autocompletion=complete_town,
         ),
-    ] = "brookside",
+    ] = None,
     storyboard: Annotated[
         str | None,
         typer.Option(
@@ -53,6 +58,13 @@ def console(
     ] = "",
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Record each session into a folder of its own in this folder.")
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Go on with the interrupted session of this folder: with its town, seed and roles, in a new folder.",
+        ),
     ] = None,
     max_seconds: Annotated[
         float | None, typer.Option(min=1.0, max=86400.0, help="End a session after this simulated time [s].")
@@ -82,7 +94,11 @@ def console(
     compile_first(pictures=pictures)
     with reporting_errors():
         config = _config(max_seconds, word_errors, absence, after_absence, while_away, pictures)
-        room = _room(town, storyboard, seed, roles, out, config)
+        if resume is None:
+            room = _room(town or TOWN, storyboard, seed, roles, out, config)
+        else:
+            out = out or resume.resolve().parent
+            room = _resumed_room(resume, town, storyboard, roles, out, config)
     listener = _listen(host, port)
     links = _links(room, host, listener.getsockname()[1])
     if as_json:
@@ -124,6 +140,28 @@ def _room(
     return room
 
 
+def _resumed_room(
+    folder: Path, town: str | None, storyboard: str | None, roles: str, out: Path, config: ConsoleConfig
+) -> Room:  # fmt: skip
+    from dorothie_gym.console.resuming import Resumed
+    from dorothie_gym.console.room import Room
+    from dorothie_gym.console.seating import parse_roles
+    from dorothie_gym.console.town_page import town_page
+    from dorothie_gym.rollout.replay import ReplaySources, begin_replay
+    from dorothie_gym.tasks import load_template
+
+    resumed = Resumed.load(folder)
+    session = resumed.session
+    template = None if storyboard is None else load_template(storyboard)
+    engine = begin_replay(session, ReplaySources(town=town).town_of(session), storyboard=template)
+    seed = engine.scenario.seed
+    room = Room(
+        engine, parse_roles(roles or resumed.roles), resumed.config(config), seed=seed, folder=out, resumed=resumed
+    )  # fmt: skip
+    town_page(engine.town)
+    return room
+
+
 def _listen(host: str, port: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -146,6 +184,11 @@ def _print_links(links: Facts, out: Path | None) -> None:
     screen = stdout()
     for name, link in links.items():
         screen.print(f"{name.replace('_', '-').capitalize():<13} {link}", soft_wrap=True)
+    if out is not None:
+        from dorothie_gym.console.resuming import interrupted_sessions
+
+        for folder in interrupted_sessions(out):
+            screen.print(f"{folder} was interrupted; --resume {folder} goes on with it.", soft_wrap=True)
     recorded = f"Sessions are recorded in {out}." if out is not None else "Nothing is recorded; --out DIR records."
     screen.print(f"{recorded} Ctrl-C ends the session and the server.", soft_wrap=True)
 

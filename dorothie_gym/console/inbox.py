@@ -168,6 +168,7 @@ class SeatInbox:
                 m.Goal: self._goal,
                 m.Status: self._status,
                 m.Mark: self._mark,
+                m.Other: self._other,
             },
             Role.AD_WIZARD: {
                 m.Weather: self._weather,
@@ -212,6 +213,9 @@ class SeatInbox:
             action=MentalAction.KNOWLEDGE_UPDATE, landmark=landmark, place=self._place(command.x, command.y)
         )
         _append(self._mental, command.n, mental)
+
+    def _other(self, command: m.Other, after: DialogueMove | None) -> None:
+        _append(self._mental, command.n, Mental(action=MentalAction.OTHER))
 
     def _weather(self, command: m.Weather, after: DialogueMove | None) -> None:
         parameter = parse_weather_parameter(command.parameter)

@@ -123,6 +123,10 @@ class Mark(_Command, frozen=True):
     y: _Metres
 
 
+class Other(_Command, frozen=True):
+    """Another change of what the Co-Wizard believes."""
+
+
 class Weather(_Command, frozen=True):
     """Weather parameter and its new value as a share of its range."""
 
@@ -196,13 +200,13 @@ class Announce(_Message, frozen=True):
 
 
 Incoming: TypeAlias = (
-    Join | Ping | View | Parse | Say | Correct | Drive | Plan | Goal | Status | Mark | Weather | Prop | Move | Remove
-    | Spawn | Fault | Task | Message | Control | Announce
+    Join | Ping | View | Parse | Say | Correct | Drive | Plan | Goal | Status | Mark | Other | Weather | Prop | Move
+    | Remove | Spawn | Fault | Task | Message | Control | Announce
 )  # fmt: skip
 """All messages of browsers."""
 
 Command: TypeAlias = (
-    Say | Drive | Plan | Goal | Status | Mark | Weather | Prop | Move | Remove | Spawn | Fault | Task | Message
+    Say | Drive | Plan | Goal | Status | Mark | Other | Weather | Prop | Move | Remove | Spawn | Fault | Task | Message
 )
 """Messages that are carried out in the session."""
 

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, TypeAlias
 
 from dorothie_gym.console import messages as m
 from dorothie_gym.console.config import AfterAbsence, ConsoleConfig, WhileAway
@@ -14,6 +14,7 @@ from dorothie_gym.console.connection import CloseCode, Connection, encode
 from dorothie_gym.console.inbox import SeatInbox
 from dorothie_gym.console.lane_lookup import lane_lookup
 from dorothie_gym.console.messages import MessageError
+from dorothie_gym.console.resuming import SEATS, Resumed
 from dorothie_gym.console.room_record import RoomRecord, free_folder
 from dorothie_gym.console.seat import EXPERIMENTER, SPECTATOR, Outgoing, PauseReason, RoomState, Seat
 from dorothie_gym.console.seat_frames import RoomStatus, SeatFrames
@@ -27,10 +28,8 @@ from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.recording import EndReason, SeatEventKind
 from dorothie_gym.rollout.play import with_personas
+from dorothie_gym.rollout.replay import recorded_actions
 from dorothie_gym.spaces import ActionMapping
-
-SEATS: Final = "seats"
-"""Field of a header with the planned players of a session with people, by role."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +66,7 @@ class Room:
         config: settings.
         seed: seed of the first session; each further one has the next number.
         folder: folder in which each session is recorded in a folder of its own; None records nothing.
+        resumed: interrupted session that the first one goes on with; the engine is then one of `begin_replay`.
 
     Attributes:
         engine: see above.
@@ -85,6 +85,7 @@ class Room:
         *,
         seed: int = 0,
         folder: Path | None = None,
+        resumed: Resumed | None = None,
     ) -> None:
         self.engine, self.config = engine, config
         self._plans, self._seed, self._folder = dict(plans), seed, folder
@@ -100,7 +101,7 @@ class Room:
         self._stopped_at = 0.0
         self._policies: dict[Role, AnyPolicy] = {}
         self._policy_states: dict[Role, Any] = {}
-        self._begin()
+        self._begin(resumed)
 
     def _make_seats(self) -> Iterator[Seat]:
         for role in AGENT_ROLES:
@@ -177,10 +178,11 @@ class Room:
 
     # --- sessions ---------------------------------------------------------------------------------------------------
 
-    def _begin(self) -> None:
-        """Begins a session, and its record."""
+    def _begin(self, resumed: Resumed | None = None) -> None:
+        """Begins a session, and its record; or plays an interrupted one again to where it was."""
         engine = self.engine
-        engine.reset(seed=self._seed)
+        if resumed is None:
+            engine.reset(seed=self._seed)
         self._policies, self._policy_states = {}, {}
         for role, plan in self._plans.items():
             if plan.occupancy is Occupancy.POLICY:
@@ -197,6 +199,21 @@ class Room:
             header = with_personas(engine.session_header(), self._policies, self._policy_states)
             header = replace(header, extra={**header.extra, SEATS: plan_labels(self._plans)})
             self.record = RoomRecord(engine, header, free_folder(self._folder, name))
+        if resumed is not None:
+            self._catch_up(resumed)
+
+    def _catch_up(self, resumed: Resumed) -> None:
+        """Plays the recorded decisions of an interrupted session; talk and record are then as they were."""
+        if self.record is not None:
+            self.record.copy(resumed.seat_events)
+        for actions in recorded_actions(self.engine, resumed.session):
+            self.engine.step(actions)
+            if self.record is not None:
+                self.record.record(actions)
+            self._frames.events += event_rows(self.engine.last_events)
+            self._hear()
+        if self.engine.over:
+            self._finish()
 
     def _finish(self, *, broken_off: bool = False) -> None:
         """Closes the record of a session that is over."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from dorothie_gym.engine.recorder import SessionRecorder
@@ -41,6 +41,11 @@ class RoomRecord:
     def note(self, kind: SeatEventKind, role: Role | None, data: Mapping[str, object]) -> None:
         """Records an event at the seats."""
         self._log.append(SeatEvent(frame=self._engine.session.world.frame, kind=kind, role=role, data=data))
+
+    def copy(self, events: Sequence[SeatEvent]) -> None:
+        """Records the events at the seats of an interrupted session that goes on."""
+        for event in events:
+            self._log.append(event)
 
     def finish(self, *, broken_off: bool) -> None:
         """Closes the record of a session that is over.

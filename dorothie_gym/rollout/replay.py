@@ -54,13 +54,13 @@ def resimulate(session: Session, town: Town, *, storyboard: StoryboardTemplate |
         SessionError: the session has no recorded actions, the seed gives another session in this town, or an action is
             malformed.
     """
-    engine = _begin(session, town, storyboard)
+    engine = begin_replay(session, town, storyboard=storyboard)
     with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
         # personas belong to the policies, which are not played
         header = replace(engine.session_header(), extra=session.header.extra)
         with SessionWriter(Path(folder) / "again", header) as writer:
             recorder = SessionRecorder(engine, writer)
-            for actions in _decided_actions(engine, session):
+            for actions in recorded_actions(engine, session):
                 _step(engine, session, actions)
                 recorder.record(actions)
             reason = _broken_off(session)
@@ -85,15 +85,24 @@ def watch_session(
     Raises:
         SessionError: see `resimulate`.
     """
-    engine = _begin(session, town, storyboard)
-    for actions in _decided_actions(engine, session):
+    engine = begin_replay(session, town, storyboard=storyboard)
+    for actions in recorded_actions(engine, session):
         observations = engine.observations.of()
         _step(engine, session, actions)
         yield observations, actions
 
 
-def _begin(session: Session, town: Town, storyboard: StoryboardTemplate | None) -> SessionEngine:
-    """Returns an engine in the state in which the session began."""
+def begin_replay(session: Session, town: Town, *, storyboard: StoryboardTemplate | None = None) -> SessionEngine:
+    """Returns an engine in the state in which a session began; `recorded_actions` then gives what it is stepped with.
+
+    Args:
+        session: session that this package has recorded, complete or interrupted.
+        town: town of the session.
+        storyboard: template of the storyboard, if it is not shipped.
+
+    Raises:
+        SessionError: see `resimulate`.
+    """
     if session.decisions is None:
         raise SessionError(f"{session.name}: what the roles decided was not recorded; it cannot be played again")
     if session.header.seed is None:
@@ -104,7 +113,7 @@ def _begin(session: Session, town: Town, storyboard: StoryboardTemplate | None) 
     return engine
 
 
-def _decided_actions(engine: SessionEngine, session: Session) -> Iterator[Actions]:
+def recorded_actions(engine: SessionEngine, session: Session) -> Iterator[Actions]:
     """Yields the recorded actions at each decision, as long as there is a recorded frame after it."""
     decided = {decision.frame: decision for decision in session.decisions or ()}
     idle = idle_actions(engine.limits)

@@ -81,7 +81,9 @@ export class CoWizardPage {
   notes(keys) {
     this.noteRows = h('ul', { class: 'notes' });
     keys.add('n', 'Go to the notes', () => this.noteRows.querySelector('button, select')?.focus());
-    return panel('Notes', { class: 'beliefs' }, this.noteRows);
+    const other = button('Other change of belief', { key: 'b', class: 'soft', run: () => this.link.command('other') });
+    keys.add('b', 'Note another change of what you believe', () => other.click());
+    return panel('Notes', { class: 'beliefs' }, this.noteRows, other);
   }
 
   setMode(mode) {
