@@ -26,7 +26,7 @@ from dorothie_gym.console.windscreen import Windscreen
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.recording import EndReason, SeatEventKind
+from dorothie_gym.recording import EndReason, SeatEvent, SeatEventKind
 from dorothie_gym.rollout.play import with_personas
 from dorothie_gym.rollout.replay import recorded_actions
 from dorothie_gym.spaces import ActionMapping
@@ -95,6 +95,7 @@ class Room:
         self.windscreen = Windscreen(config) if config.pictures else None
         self._frames = SeatFrames(engine, self.seats, config, self._places, self.windscreen)
         self.record: RoomRecord | None = None
+        self._early: list[SeatEvent] = []
         self._calls: deque[_Call] = deque()
         self._held = self._started = False
         self._why: PauseReason | None = None
@@ -194,18 +195,25 @@ class Room:
                 seat.inbox.clear()
         self._frames.events.clear()
         self._hear()
-        if self._folder is not None:
-            name = f"{engine.town.name}_{engine.scenario.storyboard.name}_{self._seed}"
-            header = with_personas(engine.session_header(), self._policies, self._policy_states)
-            header = replace(header, extra={**header.extra, SEATS: plan_labels(self._plans)})
-            self.record = RoomRecord(engine, header, free_folder(self._folder, name))
+        self.record, self._early = None, []
         if resumed is not None:
             self._catch_up(resumed)
 
+    def _open_record(self) -> None:
+        """Begins the record: when the session starts, so that one that nobody came to leaves nothing."""
+        if self._folder is None or self.record is not None:
+            return
+        engine = self.engine
+        name = f"{engine.town.name}_{engine.scenario.storyboard.name}_{self._seed}"
+        header = with_personas(engine.session_header(), self._policies, self._policy_states)
+        header = replace(header, extra={**header.extra, SEATS: plan_labels(self._plans)})
+        self.record = RoomRecord(engine, header, free_folder(self._folder, name))
+        self.record.note(self._early)
+
     def _catch_up(self, resumed: Resumed) -> None:
         """Plays the recorded decisions of an interrupted session; talk and record are then as they were."""
-        if self.record is not None:
-            self.record.copy(resumed.seat_events)
+        self._early = list(resumed.seat_events)
+        self._open_record()
         for actions in recorded_actions(self.engine, resumed.session):
             self.engine.step(actions)
             if self.record is not None:
@@ -241,6 +249,7 @@ class Room:
             return
         if self.state is RoomState.WAITING:
             if self._is_ready():
+                self._open_record()
                 self.state = RoomState.RUNNING
             return
         if self._mind_absences(now):
@@ -454,8 +463,13 @@ class Room:
         out += [Outgoing(each, encode({"k": "corrected", **data})) for each in seat.connections]
 
     def _note(self, kind: SeatEventKind, role: Role | None, data: Mapping[str, object]) -> None:
-        if self.record is not None and self.state is not RoomState.OVER:
-            self.record.note(kind, role, data)
+        event = SeatEvent(frame=self.engine.session.world.frame, kind=kind, role=role, data=data)
+        if self.state is RoomState.OVER:
+            return
+        if self.record is not None:
+            self.record.note((event,))
+        elif self.state is RoomState.WAITING:
+            self._early.append(event)
 
     def _status(self) -> RoomStatus:
         return RoomStatus(state=self.state, why=self._why, plans=self._plans, policies=frozenset(self._policies))

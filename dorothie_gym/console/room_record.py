@@ -7,8 +7,7 @@ from pathlib import Path
 
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import Role
-from dorothie_gym.recording import SeatEvent, SeatEventKind, SeatLogWriter, SessionHeader, SessionWriter
+from dorothie_gym.recording import SeatEvent, SeatLogWriter, SessionHeader, SessionWriter
 from dorothie_gym.spaces import ActionMapping
 
 
@@ -38,12 +37,8 @@ class RoomRecord:
         """Records a decision after the engine has played it."""
         self._recorder.record(actions)
 
-    def note(self, kind: SeatEventKind, role: Role | None, data: Mapping[str, object]) -> None:
-        """Records an event at the seats."""
-        self._log.append(SeatEvent(frame=self._engine.session.world.frame, kind=kind, role=role, data=data))
-
-    def copy(self, events: Sequence[SeatEvent]) -> None:
-        """Records the events at the seats of an interrupted session that goes on."""
+    def note(self, events: Sequence[SeatEvent]) -> None:
+        """Records events at the seats."""
         for event in events:
             self._log.append(event)
 

@@ -299,3 +299,11 @@ def test_nobody_there_stops_the_clock() -> None:
     stopped = table.time
     table.run(2.0)
     assert table.time == stopped and table.room.is_quiet
+
+
+def test_a_session_that_nobody_came_to_leaves_no_record(tmp_path: Path) -> None:
+    table = Table("participant=human,co_wizard=human", folder=tmp_path)
+    table.seat("participant")
+    table.run(1.0)
+    table.room.shut_down()
+    assert not list(tmp_path.iterdir())
