@@ -25,6 +25,7 @@ class CloseCode(enum.IntEnum):
     UNKNOWN_SEAT = 4404
     REPLACED = 4409
     TOO_FAST = 4429
+    FAILED = 4500
 
 
 @dataclass(frozen=True)

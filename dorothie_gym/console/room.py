@@ -75,6 +75,7 @@ class Room:
         state: state of the room.
         windscreen: pictures through the windscreen; None if there are none.
         record: record of the present session; None if it is not recorded.
+        failed: whether an error of the program ended the room.
     """
 
     def __init__(
@@ -95,6 +96,7 @@ class Room:
         self.windscreen = Windscreen(config) if config.pictures else None
         self._frames = SeatFrames(engine, self.seats, config, self._places, self.windscreen)
         self.record: RoomRecord | None = None
+        self.failed = False
         self._early: list[SeatEvent] = []
         self._calls: deque[_Call] = deque()
         self._held = self._started = False
@@ -161,13 +163,8 @@ class Room:
         """Gives the session up after an error of the program; its record stays as it was at the last decision."""
         if self.record is not None:
             self.record.close()
-        self.state = RoomState.OVER
-        notice = encode({"k": "failed"})
-        return [
-            Outgoing(connection, notice, code=CloseCode.RESTART)
-            for seat in self._all()
-            for connection in seat.connections
-        ]
+        self.state, self.failed = RoomState.OVER, True
+        return [Outgoing(each, code=CloseCode.FAILED) for seat in self._all() for each in seat.connections]
 
     def shut_down(self) -> list[Outgoing]:
         """Ends a session that is in progress because the program stops."""
@@ -266,7 +263,7 @@ class Room:
 
     def _is_ready(self) -> bool:
         roles = list(self._roles())
-        if any(seat.needs_person and not seat.present for seat in roles):
+        if any(seat.needs_person and not seat.present and not seat.taken_over for seat in roles):
             return False
         if not roles:
             return self._started or any(map(_is_present, self._all()))
@@ -438,6 +435,10 @@ class Room:
             raise MessageError("the session is over")
         if message.act == "start":
             self._started = True
+            for each in self._roles():
+                if each.needs_person and not each.present and not each.taken_over:
+                    each.taken_over = True
+                    self._take_over(each)
         elif message.act == "end":
             self._break_off(EndReason.ENDED)
         else:

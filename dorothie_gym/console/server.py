@@ -185,6 +185,9 @@ async def _join(console: Console, socket: WebSocket) -> tuple[Room, Seat] | None
     found = console.find(message.token) if isinstance(message, Join) else None
     if found is None:
         await socket.close(CloseCode.UNKNOWN_SEAT)
+    elif found[0].failed:
+        await socket.close(CloseCode.FAILED)
+        return None
     return found
 
 

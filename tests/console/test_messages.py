@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -84,3 +85,23 @@ class _Lazy:
 
 
 _TABLE: Table = _Lazy()  # type: ignore[assignment]  # behaves like one
+
+
+def test_ten_thousand_mutated_messages_are_read_or_refused() -> None:
+    rng = np.random.default_rng(0)
+    sound = [
+        b'{"k":"say","n":1,"text":"Left.","spans":[{"text":"Left.","move":"Instruct","slots":{"Action":["JTurn"]}}]}',
+        b'{"k":"drive","n":2,"action":"JTurn","angle":-84,"up":true}', b'{"k":"join","token":"abc"}',
+        b'{"k":"task","n":3,"change":"trigger","item":1,"message":"Hurry."}', b'{"k":"view","rate":10}',
+    ]  # fmt: skip
+    refused = 0
+    for k in range(10_000):
+        content = bytearray(sound[k % len(sound)])
+        for place in rng.integers(len(content), size=int(rng.integers(1, 6))):
+            content[place] = int(rng.integers(256))
+        try:
+            decode_message(bytes(content))
+        except MessageError as error:
+            refused += 1
+            assert len(str(error)) < 1000
+    assert 5_000 < refused < 10_000

@@ -267,6 +267,20 @@ def test_the_experimenter_pauses_writes_and_ends(tmp_path: Path) -> None:
     assert_replays(load(tmp_path), table)
 
 
+def test_the_experimenter_starts_without_waiting_for_people() -> None:
+    table = Table("participant=human,co_wizard=human")
+    experimenter = table.seat("experimenter")
+    table.run(1.0)
+    assert table.room.state is RoomState.WAITING
+    experimenter.send("control", act="start")
+    table.until(lambda: experimenter.talk)
+    co_wizard = table.seat("co_wizard")
+    table.run(1.0)
+    rows = {row["role"]: row["by"] for row in experimenter.state["seats"]}
+    assert rows == {"participant": "policy", "co_wizard": "person", "ad_wizard": "policy"}
+    assert co_wizard.said(), "the talk so far"
+
+
 def test_the_next_session_begins_at_the_same_seats(tmp_path: Path) -> None:
     table = Table("co_wizard=human", folder=tmp_path, max_seconds=2.0)
     co_wizard = table.seat("co_wizard")

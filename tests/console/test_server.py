@@ -132,3 +132,22 @@ def test_the_record_is_complete_when_the_server_stops(tmp_path: Path) -> None:
     session = Session.load(folder)
     assert session.complete and session.summary is not None and session.summary["reason"] == "technical"
     assert resimulate(session, table.room.engine.town).digest == session.digest
+
+
+def test_an_error_of_the_program_ends_its_room_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    table = Table("co_wizard=human", folder=tmp_path)
+    token = table.room.seats["co_wizard"].token
+    with Served(table.room) as running:
+        with running.connect(token) as socket:
+            for _ in range(5):
+                socket.recv(timeout=5)
+            monkeypatch.setattr(table.room.engine, "step", None)  # a fault that no message of a browser causes
+            assert closing_code(socket) == CloseCode.FAILED
+        with running.connect(token) as socket:
+            assert closing_code(socket) == CloseCode.FAILED
+        assert running.get("/seat")[0] == 200
+    assert "a session of the console failed" in caplog.text
+    (folder,) = tmp_path.iterdir()
+    assert not Session.load(folder).complete, "it can go on"

@@ -1,6 +1,6 @@
 // Connection to the server: joins a seat, merges changed fields into the state, connects again after a loss.
 
-const FINAL = { 4400: 'refused', 4404: 'unknown', 4409: 'replaced', 4429: 'too fast' };
+const FINAL = { 4400: 'refused', 4404: 'unknown', 4409: 'replaced', 4429: 'too fast', 4500: 'failed' };
 
 export class Link extends EventTarget {
   constructor(token) {

@@ -13,6 +13,7 @@ const REASONS = {
   arrived: 'The destination was reached.', 'out of time': 'The time is up.', left: 'The session ended because somebody left.', ended: 'The experimenter ended the session.', technical: 'The session ended for a technical reason.',
 };
 const FINAL = {
+  failed: 'The program failed. What was recorded ends at the last decision.',
   refused: 'The server refused the connection. Load the page again.', unknown: 'This link leads to no seat. It may be of an earlier server: ask for a new one.', 'too fast': 'This page sent too many messages. Load it again.',
 };
 
@@ -31,7 +32,6 @@ function start() {
     .on('refused', ({ reason }) => notice(reason, 'error'))
     .on('pong', ({ c }) => { net.textContent = `${Math.round(performance.now() - c)} ms`; })
     .on('lost', () => { net.textContent = 'reconnecting …'; document.body.classList.add('lost'); })
-    .on('failed', () => notice('The program failed; the record ends at the last decision.', 'error'))
     .on('final', why => finish(link, why));
   link.connect();
 }
