@@ -60,6 +60,7 @@ def _take(links: dict[str, str], chromium: str) -> None:
                 time.sleep(SECONDS)
         _work(pages)
         for seat, page in pages.items():
+            page.evaluate("document.querySelector('.net').remove()")  # the time to the server, which is this machine's
             _save(page.screenshot(), DOCS / f"console_{seat}.png")
         browser.close()
 
