@@ -33,7 +33,9 @@ UNCOMPILED = frozenset(
 )  # fmt: skip
 """Folders and files whose tests step no simulation."""
 
-SESSIONS = frozenset(["benchmark", "engine", "recording", "rendering", "rollout", "test_routing.py"])
+SESSIONS = frozenset(
+    ["benchmark", "console", "engine", "recording", "rendering", "rollout", "test_cli_console.py", "test_routing.py"]
+)
 """Folders and files whose tests step sessions; those of all others may step batches, too."""
 
 PICTURES = "camera", "picture", "video", "film"

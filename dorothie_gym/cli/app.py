@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 from dorothie_gym._startup import exit_on_signals
 from dorothie_gym._version import __version__
 from dorothie_gym.cli.bench import bench
+from dorothie_gym.cli.console import console
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.frames import frames
@@ -73,6 +74,7 @@ app = typer.Typer(
     pretty_exceptions_show_locals=False,
 )
 app.command()(run)
+app.command()(console)
 app.command(cls=PictureCommand)(towns)
 app.command()(storyboards)
 app.command()(envs)

@@ -25,7 +25,7 @@ from dorothie_gym.engine.view_arrays import RoleArrays
 from dorothie_gym.engine.view_steps import EVERYTHING
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, Role
-from dorothie_gym.recording import Event, EventType, SessionHeader
+from dorothie_gym.recording import EndReason, Event, EventType, SessionHeader
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEvent
 from dorothie_gym.sim.network.network import TownNetwork
@@ -214,6 +214,11 @@ class LiveSession:
         """Closes the session."""
         self._log.add(EventType.END, Role.AGENT, {"success": self.success, "reason": reason})
         self.over, self._end_reason = True, reason
+
+    def break_off(self, reason: EndReason) -> None:
+        """Closes the session between two decisions; the events are then those of the end only."""
+        self._log.clear()
+        self.end(reason.value)
 
     @property
     def success(self) -> bool:

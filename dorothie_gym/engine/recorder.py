@@ -211,6 +211,10 @@ class SessionRecorder:
         self._writer.add_decision(self._frame, compact(actions, self._engine.limits))
         self._append()
 
+    def record_end(self) -> None:
+        """Records the end of a session that was broken off after the last decision; errors as in `record`."""
+        self._writer.append(self._engine.last_events)
+
     def _append(self) -> None:
         frames, world = self._engine.last_frames, self._engine.session.world
         self._writer.append(self._engine.last_events, frames)

@@ -21,7 +21,7 @@ from dorothie_gym.engine.scenario import Scenario, draw_scenario, template_optio
 from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.recording import Event, SessionHeader
+from dorothie_gym.recording import EndReason, Event, SessionHeader
 from dorothie_gym.sim.infractions import WorldEvent
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.spaces import (
@@ -171,8 +171,26 @@ class SessionEngine(Restorable):
         terminated = session.task.done
         truncated = not terminated and self._out_of_time(session)
         if terminated or truncated:
-            session.end("arrived" if terminated else "out of time")
+            session.end(EndReason.ARRIVED.value if terminated else EndReason.OUT_OF_TIME.value)
         return StepOutcome(reward_terms=terms, terminated=terminated, truncated=truncated)
+
+    def break_off(self, reason: EndReason) -> None:
+        """Ends the session between two decisions, because people left it or the program stops.
+
+        The frames of the last decision are no longer those of `last_frames`: they have been recorded.
+
+        Raises:
+            ValueError: the reason is one of the engine itself.
+            RuntimeError: no session has begun, or it is over.
+        """
+        if not reason.breaks_off:
+            allowed = ", ".join(each.value for each in EndReason if each.breaks_off)
+            raise ValueError(
+                f"reason is {reason.value!r}, which the engine itself determines; it must be one of {allowed}"
+            )
+        if self.session.over:
+            raise RuntimeError("the session is over: call reset() first")
+        self.session.break_off(reason)
 
     def _out_of_time(self, session: LiveSession) -> bool:
         if self.max_cycles is not None:

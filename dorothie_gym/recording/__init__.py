@@ -20,6 +20,7 @@ from dorothie_gym.recording.corpus import (
 from dorothie_gym.recording.events import (
     INFRACTIONS,
     ActionRecord,
+    EndReason,
     Event,
     EventType,
     InfractionRecord,
@@ -49,6 +50,7 @@ from dorothie_gym.recording.points import (
     unpointed_events,
 )
 from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, ObjectKind, last_perceived
+from dorothie_gym.recording.seat_log import SeatEvent, SeatEventKind, SeatLogWriter, read_seat_log
 from dorothie_gym.recording.session import Session, session_state
 from dorothie_gym.recording.surroundings import (
     ACTOR_DTYPE,
@@ -96,6 +98,7 @@ __all__ = [
     "Decision",
     "DecisionPoint",
     "Difference",
+    "EndReason",
     "Event",
     "EventType",
     "Fold",
@@ -108,6 +111,9 @@ __all__ = [
     "PointView",
     "ReadReport",
     "SceneTable",
+    "SeatEvent",
+    "SeatEventKind",
+    "SeatLogWriter",
     "Session",
     "SessionError",
     "SessionHeader",
@@ -131,6 +137,7 @@ __all__ = [
     "load_sessions",
     "manifest_row",
     "nfd_points",
+    "read_seat_log",
     "read_session",
     "rfn_points",
     "rows_of",

@@ -56,9 +56,29 @@ class EventType(enum.StrEnum):
     WRONG_WAY = "WrongWay"
     """The car drives against the traffic: lane (that it is on), station, x, y [m]; key and other are null."""
     END = "End"
-    """End of the session: success (bool), reason."""
+    """End of the session: success (bool), reason (an `EndReason`, or that of another version or corpus)."""
     OTHER = "Other"
     """Type unknown to this version: its name is in `Event.extra`, and the data is kept unchanged."""
+
+
+class EndReason(enum.StrEnum):
+    """Reasons for the end of a session: those of the engine, and those of people who break it off."""
+
+    ARRIVED = "arrived"
+    """The destination, the last live subgoal, was reached."""
+    OUT_OF_TIME = "out of time"
+    """The time of the session was over."""
+    LEFT = "left"
+    """A person left and did not come back in time."""
+    ENDED = "ended"
+    """The experimenter ended the session."""
+    TECHNICAL = "technical"
+    """The program that ran the session failed or was stopped."""
+
+    @property
+    def breaks_off(self) -> bool:
+        """Whether people or the program ended the session between two decisions, and not the engine."""
+        return self not in (EndReason.ARRIVED, EndReason.OUT_OF_TIME)
 
 
 INFRACTIONS = (

@@ -15,6 +15,9 @@ EVENTS_FILE: Final = "events.jsonl"
 ACTIONS_FILE: Final = "actions.jsonl"
 """One decision of the roles per line; decisions without an action are left out."""
 
+SEATS_FILE: Final = "seats.jsonl"
+"""One event at the seats of people per line; absent from sessions without people."""
+
 FRAMES_FILE: Final = "frames.parquet"
 """One row per frame, written when the session ends."""
 
@@ -24,7 +27,7 @@ JOURNAL_FILE: Final = "frames.journal"
 PICTURES_FOLDER: Final = "pictures"
 """Optional pictures, `<frame>.png`."""
 
-SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE, JOURNAL_FILE)
+SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, SEATS_FILE, FRAMES_FILE, JOURNAL_FILE)
 
 MAX_EVENTS: Final = 200_000
 """Most events of a session; 15 minutes of three roles acting at 2 Hz give some 5,000."""

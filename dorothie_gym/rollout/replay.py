@@ -19,7 +19,15 @@ from dorothie_gym.errors import SessionError, StoryboardError, TownError
 from dorothie_gym.input_files import checked, raising
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording import CorpusEntry, Difference, Session, SessionHeader, SessionWriter, first_difference
+from dorothie_gym.recording import (
+    CorpusEntry,
+    Difference,
+    EndReason,
+    Session,
+    SessionHeader,
+    SessionWriter,
+    first_difference,
+)
 from dorothie_gym.rollout.processes import run_tasks
 from dorothie_gym.spaces import ActionDict, Observation
 from dorothie_gym.tasks import StoryboardTemplate, load_template, template_names
@@ -46,15 +54,19 @@ def resimulate(session: Session, town: Town, *, storyboard: StoryboardTemplate |
         SessionError: the session has no recorded actions, the seed gives another session in this town, or an action is
             malformed.
     """
-    engine = _begin(session, town, storyboard)
+    engine = begin_replay(session, town, storyboard=storyboard)
     with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
         # personas belong to the policies, which are not played
         header = replace(engine.session_header(), extra=session.header.extra)
         with SessionWriter(Path(folder) / "again", header) as writer:
             recorder = SessionRecorder(engine, writer)
-            for actions in _decided_actions(engine, session):
+            for actions in recorded_actions(engine, session):
                 _step(engine, session, actions)
                 recorder.record(actions)
+            reason = _broken_off(session)
+            if reason is not None and not engine.over:
+                engine.break_off(reason)
+                recorder.record_end()
             if engine.over:
                 writer.finish(engine.summary())
         return Session.load(Path(folder) / "again")
@@ -73,15 +85,24 @@ def watch_session(
     Raises:
         SessionError: see `resimulate`.
     """
-    engine = _begin(session, town, storyboard)
-    for actions in _decided_actions(engine, session):
+    engine = begin_replay(session, town, storyboard=storyboard)
+    for actions in recorded_actions(engine, session):
         observations = engine.observations.of()
         _step(engine, session, actions)
         yield observations, actions
 
 
-def _begin(session: Session, town: Town, storyboard: StoryboardTemplate | None) -> SessionEngine:
-    """Returns an engine in the state in which the session began."""
+def begin_replay(session: Session, town: Town, *, storyboard: StoryboardTemplate | None = None) -> SessionEngine:
+    """Returns an engine in the state in which a session began; `recorded_actions` then gives what it is stepped with.
+
+    Args:
+        session: session that this package has recorded, complete or interrupted.
+        town: town of the session.
+        storyboard: template of the storyboard, if it is not shipped.
+
+    Raises:
+        SessionError: see `resimulate`.
+    """
     if session.decisions is None:
         raise SessionError(f"{session.name}: what the roles decided was not recorded; it cannot be played again")
     if session.header.seed is None:
@@ -92,7 +113,7 @@ def _begin(session: Session, town: Town, storyboard: StoryboardTemplate | None) 
     return engine
 
 
-def _decided_actions(engine: SessionEngine, session: Session) -> Iterator[Actions]:
+def recorded_actions(engine: SessionEngine, session: Session) -> Iterator[Actions]:
     """Yields the recorded actions at each decision, as long as there is a recorded frame after it."""
     decided = {decision.frame: decision for decision in session.decisions or ()}
     idle = idle_actions(engine.limits)
@@ -111,10 +132,16 @@ def _step(engine: SessionEngine, session: Session, actions: Actions) -> None:
         raise SessionError(f"{session.name}: decision at frame {frame}: {error}") from None
 
 
+def _broken_off(session: Session) -> EndReason | None:
+    """Returns the reason for which people broke the session off; None if it came to an end of its own or has none."""
+    given = (session.summary or {}).get("reason")
+    return next((reason for reason in EndReason if reason.breaks_off and reason.value == given), None)
+
+
 def _cycles(session: Session, config: EnvConfig) -> int | None:
     """Returns the number of decisions after which the session was truncated, where its configuration does not say."""
     summary = session.summary or {}
-    if not session.complete or summary.get("reason") != "out of time" or not len(session.trajectory):
+    if not session.complete or summary.get("reason") != EndReason.OUT_OF_TIME or not len(session.trajectory):
         return None
     return max(int(session.trajectory["frame"][-1]) // config.frames, 1)
 

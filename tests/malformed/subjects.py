@@ -59,10 +59,15 @@ def _hub(folder: Path) -> None:
 
 
 def _native(folder: Path) -> None:
+    from dorothie_gym.ontology import Role
+    from dorothie_gym.recording import SeatEvent, SeatEventKind, SeatLogWriter
     from tests.recording.test_scene import record
 
     write(folder / "one", talk(), config={"world": {"vehicles": 3}, "rewards": {"time": -0.1}, "max_seconds": 60.0})
     record(folder / "two", finish=True)
+    with SeatLogWriter(folder / "two") as log:
+        log.append(SeatEvent(frame=3, kind=SeatEventKind.JOINED, role=Role.CO_WIZARD, data={"seconds": None}))
+        log.append(SeatEvent(frame=9, kind=SeatEventKind.PAUSED, data={"reason": "absence"}))
 
 
 def _read_sessions(folder: Path) -> None:
@@ -70,12 +75,13 @@ def _read_sessions(folder: Path) -> None:
     from dorothie_gym.benchmark import labels_of
     from dorothie_gym.benchmark.features import columns_of
     from dorothie_gym.errors import DorothieGymError
-    from dorothie_gym.recording import Corpus, Session
+    from dorothie_gym.recording import Corpus, Session, read_seat_log
 
     labels_of(folder, "all")
     for entry in Corpus.load(folder).entries:
         try:
             session = entry.load()
+            read_seat_log(entry.path)
         except DorothieGymError:
             continue
         session.check()

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.recorder import SessionRecorder, idle_actions
+from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.recording import Decision, Session, first_difference
+from dorothie_gym.recording import Decision, EndReason, Session, SessionWriter, first_difference
 from dorothie_gym.rollout import play_session, resimulate
 from dorothie_gym.wrappers.record_session import RecordSession
 
@@ -123,3 +125,31 @@ def test_what_cannot_be_played_again_is_refused(recorded: Session) -> None:
         hostile = (Decision(frame=0, actions={Role.PARTICIPANT: fields}),)
         with pytest.raises(SessionError, match=f"decision at frame 0.*{message}"):
             resimulate(dataclasses.replace(recorded, decisions=hostile), TOWN)
+
+
+@pytest.mark.parametrize("reason", [reason for reason in EndReason if reason.breaks_off])
+def test_sessions_that_people_break_off_replay_to_their_end(reason: EndReason, tmp_path: Path) -> None:
+    engine = SessionEngine("brookside")
+    engine.reset(seed=4)
+    with SessionWriter(tmp_path / "one", engine.session_header()) as writer:
+        recorder = SessionRecorder(engine, writer)
+        for _ in range(5):
+            actions = idle_actions(engine.limits)
+            engine.step(actions)
+            recorder.record(actions)
+        engine.break_off(reason)
+        recorder.record_end()
+        writer.finish(engine.summary())
+    session = Session.load(tmp_path / "one")
+    assert session.complete and session.events[-1].data["reason"] == reason.value
+    assert first_difference(session, resimulate(session, engine.town)) is None
+
+
+def test_only_people_and_the_program_break_a_session_off() -> None:
+    engine = SessionEngine("brookside")
+    engine.reset(seed=4)
+    with pytest.raises(ValueError, match="must be one of left, ended, technical"):
+        engine.break_off(EndReason.ARRIVED)
+    engine.break_off(EndReason.LEFT)
+    with pytest.raises(RuntimeError, match="over"):
+        engine.break_off(EndReason.LEFT)

@@ -18,7 +18,7 @@ from dorothie_gym.errors import RolloutError, short_repr
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import DialogueMove, ExceptionKind, ObjectClass
-from dorothie_gym.recording import FRAME_RATE, Event, EventType, Session
+from dorothie_gym.recording import FRAME_RATE, EndReason, Event, EventType, Session
 from dorothie_gym.rollout.closed_loop.task_progress import (
     TaskRecord,
     TaskRoutes,
@@ -240,9 +240,6 @@ TIMEOUT: Final = "timeout"
 HIT_BY_OTHERS: Final = "hit_by_others"
 """Name of the collisions that others caused; they are counted and have no penalty."""
 
-OUT_OF_TIME: Final = "out of time"
-"""Reason of the `End` event of a truncated session."""
-
 _RULES: Final = {
     EventType.RED_LIGHT: "red_light",
     EventType.STOP_SIGN: "stop_sign",
@@ -377,7 +374,7 @@ def count_infractions(session: Session) -> dict[str, int]:
         else:
             counts[_TOUCHED.get(each.other, "static") if each.other is not None else "static"] += 1
     ends = session.of_type(EventType.END)
-    counts[TIMEOUT] += sum(event.data.get("reason") == OUT_OF_TIME for event in ends)
+    counts[TIMEOUT] += sum(event.data.get("reason") == EndReason.OUT_OF_TIME for event in ends)
     return {name: count for name, count in sorted(counts.items()) if count}
 
 

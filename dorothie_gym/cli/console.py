@@ -1,0 +1,212 @@
+"""`dorothie-gym console`: sessions with people in browsers."""
+
+from __future__ import annotations
+
+import socket
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dorothie_gym.cli.completion import complete_storyboard, complete_town
+from dorothie_gym.cli.options import AsJson, WordErrors, needs
+from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stdout
+from dorothie_gym.cli.warm_up import compile_first
+
+if TYPE_CHECKING:
+    from dorothie_gym.console.config import ConsoleConfig
+    from dorothie_gym.console.room import Room
+
+LOCAL = "127.0.0.1"
+"""Address that is reached from this machine only."""
+
+PORT = 8023
+"""Usual port."""
+
+TOWN = "brookside"
+"""Town if none is given: the smallest one."""
+
+_LIBRARIES = ("starlette", "uvicorn", "websockets")
+
+
+def console(
+    town: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help=f"A town's name, or a file (.xodr, .yaml); {TOWN} if none is given.",
+            autocompletion=complete_town,
+        ),
+    ] = None,
+    storyboard: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="Name of a storyboard, or a file (.json); default: drawn.",
+            autocompletion=complete_storyboard,
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first session; the next one has the next seed.")] = 0,
+    roles: Annotated[
+        str,
+        typer.Option(
+            metavar="ROLE=PLAYER,...",
+            help="Who plays each role: human (the session waits for a person), open (a script plays until a person "
+            "sits down), or a policy by name or file. Roles that are not named are open.",
+        ),
+    ] = "",
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Record each session into a folder of its own in this folder.")
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Go on with the interrupted session of this folder: with its town, seed and roles, in a new folder.",
+        ),
+    ] = None,
+    max_seconds: Annotated[
+        float | None, typer.Option(min=1.0, max=86400.0, help="End a session after this simulated time [s].")
+    ] = None,
+    word_errors: WordErrors = None,
+    absence: Annotated[
+        float, typer.Option(min=0.0, max=86400.0, help="Time that a person who must play has to come back [s].")
+    ] = 60.0,
+    after_absence: Annotated[
+        str, typer.Option(metavar="end|script|wait", help="What happens after that time.")
+    ] = "end",
+    while_away: Annotated[
+        str, typer.Option(metavar="pause|continue", help="What the session does while that person is away.")
+    ] = "pause",
+    pictures: Annotated[bool, typer.Option(help="Let participant and Co-Wizard look through the windscreen.")] = True,
+    host: Annotated[str, typer.Option(help="Address to listen at; by default only this machine reaches it.")] = LOCAL,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes a free one.")] = PORT,
+    as_json: AsJson = False,
+) -> None:
+    """Play sessions with people in browsers, in real time: prints a link for each seat.
+
+    Each link holds a secret and leads to one seat. A second browser at the seat of a role takes it over.
+    """
+    for library in _LIBRARIES:
+        if find_spec(library) is None:
+            fail(f"console {needs('console')}: {library} is not installed; run: pip install 'dorothie-gym[console]'")
+    compile_first(pictures=pictures)
+    with reporting_errors():
+        config = _config(max_seconds, word_errors, absence, after_absence, while_away, pictures)
+        if resume is None:
+            room = _room(town or TOWN, storyboard, seed, roles, out, config)
+        else:
+            out = out or resume.resolve().parent
+            room = _resumed_room(resume, town, storyboard, roles, out, config)
+    listener = _listen(host, port)
+    links = _links(room, host, listener.getsockname()[1])
+    if as_json:
+        print_json({"links": links, "recorded": None if out is None else str(out)})
+    else:
+        _print_links(links, out)
+    _serve(room, listener)
+
+
+def _config(
+    max_seconds: float | None, word_errors: float | None, absence: float, after: str, away: str, pictures: bool
+) -> ConsoleConfig:  # fmt: skip
+    from dorothie_gym.console.config import AbsenceRules, AfterAbsence, ConsoleConfig, WhileAway
+
+    for name, value, choices in (("--after-absence", after, AfterAbsence), ("--while-away", away, WhileAway)):
+        if value not in list(map(str, choices)):
+            fail(f"{name} is {value!r}; it must be {' or '.join(map(str, choices))}")
+    usual = ConsoleConfig()
+    return ConsoleConfig(
+        max_seconds=usual.max_seconds if max_seconds is None else max_seconds,
+        word_error_rate=usual.word_error_rate if word_errors is None else word_errors,
+        pictures=pictures,
+        absence=AbsenceRules(while_away=WhileAway(away), seconds=absence, then=AfterAbsence(after)),
+    )
+
+
+def _room(
+    town: str, storyboard: str | None, seed: int, roles: str, out: Path | None, config: ConsoleConfig
+) -> Room:  # fmt: skip
+    from dorothie_gym.console.room import Room
+    from dorothie_gym.console.seating import parse_roles
+    from dorothie_gym.console.town_page import town_page
+    from dorothie_gym.engine.session_engine import SessionEngine
+
+    plans = parse_roles(roles)
+    engine = SessionEngine(town, storyboard, config=config.environment())
+    room = Room(engine, plans, config, seed=seed, folder=out)
+    town_page(engine.town)  # the first browser is served at once
+    return room
+
+
+def _resumed_room(
+    folder: Path, town: str | None, storyboard: str | None, roles: str, out: Path, config: ConsoleConfig
+) -> Room:  # fmt: skip
+    from dorothie_gym.console.resuming import Resumed
+    from dorothie_gym.console.room import Room
+    from dorothie_gym.console.seating import parse_roles
+    from dorothie_gym.console.town_page import town_page
+    from dorothie_gym.rollout.replay import ReplaySources, begin_replay
+    from dorothie_gym.tasks import load_template
+
+    resumed = Resumed.load(folder)
+    session = resumed.session
+    template = None if storyboard is None else load_template(storyboard)
+    engine = begin_replay(session, ReplaySources(town=town).town_of(session), storyboard=template)
+    seed = engine.scenario.seed
+    room = Room(
+        engine, parse_roles(roles or resumed.roles), resumed.config(config), seed=seed, folder=out, resumed=resumed
+    )  # fmt: skip
+    town_page(engine.town)
+    return room
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+        listener.listen(128)  # links work from now on
+    except OSError as error:
+        listener.close()
+        fail(f"{host}:{port} cannot be used ({error.strerror}); give another --port, or 0 for a free one")
+    return listener
+
+
+def _links(room: Room, host: str, port: int) -> dict[str, str]:
+    """Returns the link of each seat; its secret is behind the #, which browsers do not send and servers do not log."""
+    shown = f"[{host}]" if ":" in host else host
+    return {name: f"http://{shown}:{port}/seat#{seat.token}" for name, seat in room.seats.items()}
+
+
+def _print_links(links: Facts, out: Path | None) -> None:
+    screen = stdout()
+    for name, link in links.items():
+        screen.print(f"{name.replace('_', '-').capitalize():<13} {link}", soft_wrap=True)
+    if out is not None:
+        from dorothie_gym.console.resuming import interrupted_sessions
+
+        for folder in interrupted_sessions(out):
+            screen.print(f"{folder} was interrupted; --resume {folder} goes on with it.", soft_wrap=True)
+    recorded = f"Sessions are recorded in {out}." if out is not None else "Nothing is recorded; --out DIR records."
+    screen.print(f"{recorded} Ctrl-C ends the session and the server.", soft_wrap=True)
+
+
+def _serve(room: Room, listener: socket.socket) -> None:
+    import uvicorn
+
+    from dorothie_gym.console.messages import MAX_BYTES
+    from dorothie_gym.console.server import Console
+
+    config = uvicorn.Config(
+        Console([room]).app(),
+        log_level="warning",
+        access_log=False,
+        ws="websockets-sansio",
+        ws_max_size=2 * MAX_BYTES,
+        ws_per_message_deflate=False,
+        server_header=False,
+        timeout_graceful_shutdown=2,
+    )
+    uvicorn.Server(config).run(sockets=[listener])

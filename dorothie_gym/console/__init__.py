@@ -1,0 +1,1 @@
+"""Browser console: seats for people in sessions that run in real time."""

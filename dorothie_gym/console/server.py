@@ -1,0 +1,248 @@
+"""Web server of the console: pages, maps of towns, and the websocket of the seats."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Final
+from urllib.parse import urlsplit
+
+from starlette.applications import Starlette
+from starlette.datastructures import MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from dorothie_gym.console.connection import CloseCode, Closing, Connection, encode
+from dorothie_gym.console.messages import Join, MessageError, decode_message
+from dorothie_gym.console.pace import run_room
+from dorothie_gym.console.room import Room
+from dorothie_gym.console.seat import Seat
+from dorothie_gym.console.town_page import town_page
+
+logger = logging.getLogger(__name__)
+
+STATIC: Final = Path(__file__).parent / "static"
+
+JOIN_SECONDS: Final = 10.0
+"""Time for the first message of a connection [s]."""
+
+MOST_CONNECTIONS: Final = 500
+"""Most open websockets; more are refused."""
+
+THREADS: Final = 4
+"""Threads for the ticks of all rooms; they share one core, as Python code holds a lock."""
+
+HEADERS: Final = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), geolocation=(), payment=()",
+    "Cache-Control": "no-cache",
+}
+"""Headers of every answer: nothing from other hosts, no inline scripts, no frames, no referrer."""
+
+
+class Console:
+    """Rooms of a server and the seats of their links.
+
+    Args:
+        rooms: rooms of the server.
+
+    Attributes:
+        rooms: see above.
+        connections: number of open websockets.
+    """
+
+    def __init__(self, rooms: Sequence[Room]) -> None:
+        self.rooms = list(rooms)
+        self.connections = 0
+        self._seats = {seat.token: (room, seat) for room in self.rooms for seat in room.seats.values()}
+
+    def find(self, token: str) -> tuple[Room, Seat] | None:
+        """Returns the room and the seat of a token; None for an unknown one."""
+        return self._seats.get(token)
+
+    def town_page(self, name: str) -> bytes | None:
+        """Returns the map of a town in which a session takes place; None for others."""
+        towns = (room.engine.town for room in self.rooms)
+        return next((town_page(town) for town in towns if town.name == name), None)
+
+    def app(self) -> Starlette:
+        """Returns the application, which plays the sessions while it runs."""
+
+        async def index(request: Request) -> Response:
+            return FileResponse(STATIC / "index.html")
+
+        async def root(request: Request) -> Response:
+            return RedirectResponse("/seat")
+
+        async def town(request: Request) -> Response:
+            page = await asyncio.to_thread(self.town_page, request.path_params["name"])
+            if page is None:
+                raise HTTPException(404)
+            return Response(page, media_type="application/json", headers={"Content-Encoding": "gzip"})
+
+        async def websocket(socket: WebSocket) -> None:
+            await _serve(self, socket)
+
+        routes = [
+            Route("/", root),
+            Route("/seat", index),
+            Route("/towns/{name}.json", town),
+            WebSocketRoute("/ws", websocket),
+            Mount("/static", StaticFiles(directory=STATIC)),
+        ]
+        return Starlette(routes=routes, lifespan=self._lifespan, middleware=[Middleware(SecurityHeaders)])
+
+    @contextlib.asynccontextmanager
+    async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
+        with (
+            ThreadPoolExecutor(THREADS, thread_name_prefix="tick") as threads,
+            ThreadPoolExecutor(1, thread_name_prefix="scene") as builders,
+        ):
+            tasks = [asyncio.create_task(run_room(room, threads, builders)) for room in self.rooms]
+            try:
+                yield
+            finally:
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+        for room in self.rooms:
+            room.shut_down()
+
+
+class SecurityHeaders:
+    """Adds `HEADERS` to every answer.
+
+    Args:
+        app: the application.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handles a request."""
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers if scope["type"] == "http" else send)
+
+
+# --- websocket --------------------------------------------------------------------------------------------------------
+
+
+def is_same_origin(socket: WebSocket) -> bool:
+    """Returns whether a websocket was opened by a page of this server, or by a program without an origin."""
+    origin = socket.headers.get("origin")
+    return origin is None or urlsplit(origin).netloc.lower() == socket.headers.get("host", "").lower()
+
+
+async def _serve(console: Console, socket: WebSocket) -> None:
+    """Serves one websocket from its first message to its end."""
+    if not is_same_origin(socket) or console.connections >= MOST_CONNECTIONS:
+        await socket.close(CloseCode.REFUSED)
+        return
+    await socket.accept()
+    console.connections += 1
+    try:
+        found = await _join(console, socket)
+        if found is not None:
+            await _talk(*found, socket)
+    except WebSocketDisconnect:
+        logger.debug("a connection ended before it had a seat")
+    finally:
+        console.connections -= 1
+
+
+async def _join(console: Console, socket: WebSocket) -> tuple[Room, Seat] | None:
+    """Returns room and seat of the first message, or closes the websocket."""
+    try:
+        message = decode_message(await asyncio.wait_for(_text(socket), JOIN_SECONDS))
+    except (MessageError, TimeoutError):
+        await socket.close(CloseCode.REFUSED)
+        return None
+    found = console.find(message.token) if isinstance(message, Join) else None
+    if found is None:
+        await socket.close(CloseCode.UNKNOWN_SEAT)
+    elif found[0].failed:
+        await socket.close(CloseCode.FAILED)
+        return None
+    return found
+
+
+async def _talk(room: Room, seat: Seat, socket: WebSocket) -> None:
+    connection = Connection()
+    room.join(seat, connection)
+    sender = asyncio.create_task(_send(connection, socket))
+    try:
+        await _receive(room, seat, connection, socket)
+        await sender  # closes the websocket
+    except WebSocketDisconnect:
+        logger.debug("a connection of %s ended", seat.name)
+    finally:
+        room.leave(seat, connection)
+        sender.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await sender
+
+
+async def _receive(room: Room, seat: Seat, connection: Connection, socket: WebSocket) -> None:
+    """Passes messages on to the room, until the browser leaves or sends too many."""
+    clock = asyncio.get_running_loop().time
+    while True:
+        text = await _text(socket)
+        if not connection.admits(clock()):
+            connection.close(CloseCode.TOO_FAST)
+            return
+        try:
+            room.receive(seat, connection, decode_message(text))
+        except MessageError as error:
+            connection.send(encode({"k": "refused", "n": None, "reason": str(error)}))
+
+
+async def _send(connection: Connection, socket: WebSocket) -> None:
+    """Sends what a connection has, until it is closed."""
+    while True:
+        item = await connection.next()
+        try:
+            if isinstance(item, Closing):
+                await socket.close(item.code)
+                return
+            if isinstance(item, bytes):
+                await socket.send_bytes(item)
+            else:
+                await socket.send_text(item)
+        except (WebSocketDisconnect, RuntimeError):
+            return  # the browser has gone; the receiver notes it
+
+
+async def _text(socket: WebSocket) -> str:
+    """Returns the next text; raises `MessageError` for bytes, and `WebSocketDisconnect` at the end."""
+    message = await socket.receive()
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(message.get("code", 1000))
+    text = message.get("text")
+    if text is None:
+        raise MessageError("messages are texts in JSON")
+    return str(text)
