@@ -1,6 +1,6 @@
-"""Writes the transcripts that the recogniser's language model is made of: distinct utterances of generated sessions.
+"""Writes the transcripts that the recogniser's language model is made of: utterances of generated sessions.
 
-    dorothie-gym generate --sessions 240 --seed 21001 --word-errors 0 --out CORPUS
+    dorothie-gym generate --sessions 240 --seed 21001 --out CORPUS
     python benchmarks/speech_transcripts.py CORPUS
 
 Sessions that measure recognition have other seeds (`dorothie-gym bench speech`).
