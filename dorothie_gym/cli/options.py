@@ -129,6 +129,14 @@ def env_config(
 
     if speech and word_errors is not None:
         fail("--word-errors is for simulated recognition; leave it out with --speech, where speech is recognised")
+    if speech:
+        from dorothie_gym.errors import SpeechError
+        from dorothie_gym.speech.extras import check_installed
+
+        try:
+            check_installed()
+        except SpeechError as error:
+            fail(str(error))
 
     usual = EnvConfig()
     return EnvConfig(

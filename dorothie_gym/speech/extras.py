@@ -3,9 +3,21 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 from types import ModuleType
+from typing import Final
 
 from dorothie_gym.errors import SpeechError
+
+PACKAGES: Final = ("hibari", "pocketsphinx", "soundfile")
+"""Modules of the extra that the default synthesiser, the default recogniser and recordings need."""
+
+
+def check_installed() -> None:
+    """Raises `SpeechError` if a package that spoken sessions need is not installed; imports none."""
+    missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
+    if missing:
+        raise SpeechError(f"speech needs {', '.join(missing)}: pip install 'dorothie-gym[speech]'")
 
 
 def speech_module(name: str, *, extra: str = "speech") -> ModuleType:
