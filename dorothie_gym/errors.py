@@ -22,6 +22,8 @@ DorothieGymError
 ├── CheckpointError      a training checkpoint is damaged or of another run
 ├── EncoderError         an encoder is unknown, or its package or weights are missing
 ├── PhraseFileError      a data file of the dialogue package is malformed
+├── AudioError           audio is damaged, too long or of an unsupported form
+├── SpeechError          speech cannot be synthesised or recognised: a package, voice, model or server is missing
 ├── CacheError           the cache folder cannot be written
 └── ProcessError         a worker process failed
     └── BenchmarkProcessError   a measuring process ended early
@@ -164,6 +166,14 @@ class EncoderError(DorothieGymError, RuntimeError):
 
 class PhraseFileError(DorothieGymError, ValueError):
     """A data file of the dialogue package is malformed; the message names the file and the line."""
+
+
+class AudioError(DorothieGymError, ValueError):
+    """Audio is damaged, too long or of an unsupported form; the message names the file and the fault."""
+
+
+class SpeechError(DorothieGymError, RuntimeError):
+    """Speech cannot be synthesised or recognised here; the message names what is missing and how to get it."""
 
 
 class CacheError(DorothieGymError, RuntimeError):

@@ -103,6 +103,25 @@ class TestRun:
         heard = [(move.text, move.recognised) for move in Session.load("back").moves()]
         assert heard == [(move.text, move.recognised) for move in moves]
 
+    def test_spoken_session_survives_replay_and_conversion(self) -> None:
+        loaded("run", "--seed", 3, "--max-seconds", 25, "--speech", "--out", "s", "--json")
+        session = Session.load("s")
+        assert session.header.config["channel"] == "speech"
+        assert len(session.audio) == len(session.all_moves) > 0
+        assert call("replay", "s", "--check").exit_code == 0
+        assert call("convert", "s", "sdn", "--to", "sdn").exit_code == 0
+        assert len(list(Path("sdn/utterance").iterdir())) == len(session.utterances())
+        result = call("run", "--speech", "--word-errors", 0.1)
+        assert result.exit_code == 2 and "leave it out with --speech" in result.stderr
+
+    def test_speech_without_its_extra_is_reported(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        from dorothie_gym.speech import extras
+
+        monkeypatch.setattr(extras, "PACKAGES", ("no_such_voice",))
+        result = call("run", "--speech")
+        assert result.exit_code == 2
+        assert "speech needs no_such_voice: pip install 'dorothie-gym[speech]'" in result.stderr
+
     def test_perception_by_the_camera_survives_replay(self) -> None:
         loaded("run", "--seed", 3, "--max-seconds", 30, "--perception", "camera", "--out", "s", "--json")
         assert Session.load("s").header.config["perception"] == "camera"

@@ -25,6 +25,7 @@ from dorothie_gym.policies import policy_loader
 from dorothie_gym.recording import Task
 from dorothie_gym.rollout.closed_loop import METRICS, RecoverySeconds
 from dorothie_gym.sim.weather import Weather
+from dorothie_gym.speech import CabinState, signal_to_noise
 from dorothie_gym.tasks import bind, load_template
 from tests.recording.builders import write
 from tests.recording.dialogues import talk
@@ -83,6 +84,21 @@ def test_the_talk_of_its_page_is_worded_misheard_and_read() -> None:
     exec(compile(example("talk.md", "python"), "talk.md", "exec"), names)
     assert "left" in str(names["text"])
     assert names["understood"]
+
+
+def test_speech_of_its_page_is_recognised() -> None:
+    text = example("speech.md", "python")
+    names: dict[str, Any] = {}
+    exec(compile(text, "speech.md", "exec"), names)
+    assert f"# {names['heard'].text}\n" in text
+    assert text.endswith(f"# {names['understand_speech'](names['heard']).text}\n")
+
+
+def test_speech_page_states_the_noise_of_the_car() -> None:
+    text = (DOCS / "speech.md").read_text(encoding="utf-8")
+    states = CabinState(), CabinState(speed=50 / 3.6), CabinState(speed=50 / 3.6, rain=100.0)
+    parked, driving, raining = (round(signal_to_noise(state)) for state in states)
+    assert f"is {parked} dB in a parked car, {driving} dB at 50 km/h, and {raining} dB at 50 km/h" in text
 
 
 def test_the_phrases_of_the_talk_page_are_grammar() -> None:

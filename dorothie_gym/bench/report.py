@@ -268,6 +268,28 @@ def camera_report(figures: Figures) -> Report:
     )
 
 
+def speech_report(figures: Figures) -> Report:
+    """Returns the summary of `bench.speech.measure`."""
+    conditions = (("wer_clean", "without noise"), ("wer_20db", "pink noise, 20 dB"), ("wer_10db", "pink noise, 10 dB"))
+    rows = [Measurement(label=label, value=100.0 * figures[name]) for name, label in conditions]
+    return Report(
+        title="Speech",
+        setting=f"{_count(figures['spans'], 'span')} of {_count(figures['sessions'], 'session')}, "
+        f"{figures['synthesizer']} and {figures['recognizer']}; one core",
+        headline=f"word error rate {figures['wer_clean']:.1%} without noise",
+        unit="word errors [percent]",
+        rows=tuple(rows),
+        notes=(
+            f"slot values understood: F1 {figures['slots_f1']:.3f}, names {figures['names']:.1%}",
+            f"moves understood: {figures['moves']:.1%}, and {figures['moves_written']:.1%} from the written words",
+            f"recognition: {number(figures['recognition_rtf'])} s per second of audio",
+            f"synthesis: {number(figures['synthesis_milliseconds'])} ms per span",
+        ),
+        machine=machine_line(figures["machine"]),
+        logarithmic=False,
+    )
+
+
 def _rate(row: Figures) -> float:
     return float(1000.0 / row["milliseconds"])
 

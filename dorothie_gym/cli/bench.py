@@ -1,4 +1,4 @@
-"""`dorothie-gym bench world|env|vector|camera|rl|train|import`: speed measurements, each with its reference."""
+"""`dorothie-gym bench world|env|vector|camera|rl|speech|train|import`: measurements, each with its reference."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Measure: TypeAlias = "Callable[[Progress], Figures]"
 """Measurement; takes a callback for its progress."""
 
-SIMULATING: Final = ("world", "env", "vector", "camera", "rl")
+SIMULATING: Final = ("world", "env", "vector", "camera", "rl", "speech")
 """Measurements of the simulation, which is compiled first."""
 
 
@@ -44,7 +44,7 @@ class BenchCommand(PictureCommand):
 
 bench = typer.Typer(
     help="Measure speeds, each with a reference in the same run: world, environment of three agents, "
-    "batches of worlds, camera, training, and import time.",
+    "batches of worlds, camera, speech, training, and import time.",
     no_args_is_help=True,
 )
 
@@ -230,6 +230,25 @@ def rl(
             fail(str(error))
 
     _bench("rl", measured, picture, as_json, pictures=observation == "camera")
+
+
+@bench.command(cls=BenchCommand)
+def speech(
+    sessions: Annotated[int, typer.Option(min=1, max=1000, help="Number of sessions whose talk is spoken.")] = 6,
+    spans: Annotated[int, typer.Option(min=1, max=100_000, help="Number of spans that are drawn from them.")] = 150,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the sessions, as of a corpus.")] = 31000,
+    synthesizer: Annotated[str, typer.Option(metavar="NAME", help="hibari or flite.")] = "hibari",
+    picture: Picture = None,
+    as_json: AsJson = False,
+) -> None:
+    """Word errors, understanding and times of synthesis and recognition on the talk of unseen sessions."""
+
+    def measured(progress: Progress) -> Figures:
+        from dorothie_gym.bench.speech import measure
+
+        return measure(sessions=sessions, spans=spans, seed=seed, synthesizer=synthesizer, progress=progress)
+
+    _bench("speech", measured, picture, as_json)
 
 
 @bench.command("import", cls=BenchCommand)

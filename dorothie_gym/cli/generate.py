@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import AsJson, MaxSeconds, Perception, Players, Ray, WordErrors, env_config
+from dorothie_gym.cli.options import AsJson, MaxSeconds, Perception, Players, Ray, Speech, WordErrors, env_config
 from dorothie_gym.cli.output import (
     FAILED,
     Facts,
@@ -35,6 +35,7 @@ def generate(
     max_seconds: MaxSeconds = None,
     word_errors: WordErrors = None,
     perception: Perception = PerceptionModel.SYMBOLIC,
+    speech: Speech = False,
     ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:
@@ -46,7 +47,7 @@ def generate(
         from dorothie_gym.errors import ProcessError
         from dorothie_gym.rollout import generate_corpus
 
-        config = env_config(max_seconds, word_errors, perception)
+        config = env_config(max_seconds, word_errors, perception, speech)
         try:
             compile_first(pictures=perception is PerceptionModel.CAMERA)
             begun = time.perf_counter()
@@ -61,7 +62,7 @@ def generate(
                     on_session=on_session,
                 )
         except KeyboardInterrupt:
-            _exit_interrupted(out, sessions, seed, max_seconds, word_errors, perception)
+            _exit_interrupted(out, sessions, seed, max_seconds, word_errors, perception, speech)
         except ProcessError as error:
             fail(str(error), FAILED)
     facts = _facts(made, seed, time.perf_counter() - begun)
@@ -84,6 +85,7 @@ def _exit_interrupted(
     max_seconds: float | None,
     word_errors: float | None,
     perception: PerceptionModel,
+    speech: bool,
 ) -> None:
     from dorothie_gym.rollout import finished_sessions
 
@@ -95,6 +97,8 @@ def _exit_interrupted(
         command += f" --word-errors {word_errors:g}"
     if perception is not PerceptionModel.SYMBOLIC:
         command += f" --perception {perception}"
+    if speech:
+        command += " --speech"
     exit_interrupted(f"Interrupted with {done} of {sessions} sessions finished; resume with: {command}")
 
 

@@ -91,6 +91,14 @@ Perception = Annotated[
     ),
 ]
 
+Speech = Annotated[
+    bool,
+    typer.Option(
+        "--speech",
+        help=f"Speak: talk is synthesised, mixed with the noise of the car, and recognised ({needs('speech')}).",
+    ),
+]
+
 View = Annotated[
     RenderView, typer.Option(help="What the video shows: the map, the windscreen (camera), or both side by side.")
 ]
@@ -105,7 +113,8 @@ Ray = Annotated[
 
 
 def env_config(
-    max_seconds: float | None, word_errors: float | None, perception: PerceptionModel = PerceptionModel.SYMBOLIC
+    max_seconds: float | None, word_errors: float | None, perception: PerceptionModel = PerceptionModel.SYMBOLIC,
+    speech: bool = False,
 ) -> EnvConfig:  # fmt: skip
     """Returns the engine settings of a command line.
 
@@ -113,14 +122,28 @@ def env_config(
         max_seconds: simulated time after which a session is truncated [s]; None keeps the default.
         word_errors: word error rate of the speech recogniser; None keeps the default.
         perception: what participant and Co-Wizard see.
+        speech: whether they speak; a word error rate is then refused.
     """
+    from dorothie_gym.engine.channel_kind import ChannelKind
     from dorothie_gym.engine.config import EnvConfig
+
+    if speech and word_errors is not None:
+        fail("--word-errors is for simulated recognition; leave it out with --speech, where speech is recognised")
+    if speech:
+        from dorothie_gym.errors import SpeechError
+        from dorothie_gym.speech.extras import check_installed
+
+        try:
+            check_installed()
+        except SpeechError as error:
+            fail(str(error))
 
     usual = EnvConfig()
     return EnvConfig(
         max_seconds=usual.max_seconds if max_seconds is None else max_seconds,
         word_error_rate=usual.word_error_rate if word_errors is None else word_errors,
         perception=perception,
+        channel=ChannelKind.SPEECH if speech else ChannelKind.TEXT,
     )
 
 

@@ -20,6 +20,7 @@ from dorothie_gym.cli.options import (
     Perception,
     Players,
     Ray,
+    Speech,
     WordErrors,
     env_config,
     find_cast,
@@ -63,6 +64,7 @@ def rollout(
     max_seconds: MaxSeconds = None,
     word_errors: WordErrors = None,
     perception: Perception = PerceptionModel.SYMBOLIC,
+    speech: Speech = False,
     ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:
@@ -78,7 +80,7 @@ def rollout(
             chosen = parse_towns(towns)
         except ValueError as error:
             fail(str(error))
-        config = env_config(max_seconds, word_errors, perception)
+        config = env_config(max_seconds, word_errors, perception, speech)
         settings = RolloutSettings(cast=cast, towns=chosen, sessions=sessions, seed=seed, config=config)
         result = _play(settings, out, workers or available_processors(), ray, quiet=as_json)
     if as_json:

@@ -18,6 +18,7 @@ from dorothie_gym.cli.options import (
     CoWizard,
     Participant,
     Perception,
+    Speech,
     View,
     WordErrors,
     env_config,
@@ -63,6 +64,7 @@ class _Plan:
     max_seconds: float | None
     word_errors: float | None
     perception: PerceptionModel
+    speech: bool
     speed: float | None
 
 
@@ -100,6 +102,7 @@ def run(
     ] = None,
     word_errors: WordErrors = None,
     perception: Perception = PerceptionModel.SYMBOLIC,
+    speech: Speech = False,
     speed: Annotated[
         float | None,
         typer.Option(
@@ -129,6 +132,7 @@ def run(
         max_seconds=max_seconds,
         word_errors=word_errors,
         perception=perception,
+        speech=speech,
         speed=speed,
     )
     _check_outputs(plan)
@@ -159,7 +163,7 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
     cast = find_cast(*plan.players)
     filmed = plan.video is not None and plan.view is not RenderView.MAP
     compile_first(pictures=filmed or plan.perception is PerceptionModel.CAMERA)
-    config = env_config(plan.max_seconds, plan.word_errors, plan.perception)
+    config = env_config(plan.max_seconds, plan.word_errors, plan.perception, plan.speech)
     engine = SessionEngine(plan.town, plan.storyboard, config=config)
     engine.reset(seed=plan.seed)
     try:

@@ -234,7 +234,26 @@ def _vocabulary_by_sound() -> Mapping[str, tuple[str, ...]]:
     return {sound: tuple(listed) for sound, listed in found.items()}
 
 
-_UNCLASSIFIED = DialogueAct(move=DialogueMove.IRRELEVANT)
+UNCLASSIFIED = DialogueAct(move=DialogueMove.IRRELEVANT)
+"""Act of a misrecognised span for listeners that classify transcripts themselves."""
+
+
+class OpenMoves:
+    """Last moves of the speakers that await an answer."""
+
+    def __init__(self) -> None:
+        self._open: dict[Role, tuple[DialogueMove, float]] = {}
+
+    def answered_by(self, utterance: Utterance) -> DialogueMove | None:
+        """Returns the last unanswered move of another speaker, and marks it as answered."""
+        waiting = [(end, move) for role, (move, end) in self._open.items() if role is not utterance.speaker]
+        self._open = {role: opened for role, opened in self._open.items() if role is utterance.speaker}
+        end, move = max(waiting, default=(-np.inf, None))
+        return move if utterance.start - end < ANSWER_TIMEOUT else None
+
+    def note(self, utterance: Utterance) -> None:
+        """Notes the last move of an utterance, which awaits an answer."""
+        self._open[utterance.speaker] = (utterance.spans[-1].act.move, utterance.end)
 
 
 class Recogniser:
@@ -254,7 +273,7 @@ class Recogniser:
                 observe transcripts only and classify these themselves.
         """
         self._channel, self._rng, self._classify = channel, rng, classify
-        self._open: dict[Role, tuple[DialogueMove, float]] = {}
+        self._open = OpenMoves()
 
     def hear(self, utterance: Utterance) -> Utterance:
         """Returns the recognised utterance: the same spans with transcripts and matching acts.
@@ -264,20 +283,13 @@ class Recogniser:
         """
         if self._channel.rate == 0:
             return utterance
-        after = self._answered_by(utterance)
+        after = self._open.answered_by(utterance)
         spans = []
         for place, span in enumerate(utterance.spans):
             text = self._channel.transcribe(span.text, self._rng)
             act = span.act
             if not same_words(text, span.text):
-                act = guess_act(text, after if place == 0 else None) if self._classify else _UNCLASSIFIED
+                act = guess_act(text, after if place == 0 else None) if self._classify else UNCLASSIFIED
             spans.append(Span(text, act))
-        self._open[utterance.speaker] = (utterance.spans[-1].act.move, utterance.end)
+        self._open.note(utterance)
         return replace(utterance, spans=tuple(spans))
-
-    def _answered_by(self, utterance: Utterance) -> DialogueMove | None:
-        """Returns the last unanswered move of another speaker, and marks it as answered."""
-        waiting = [(end, move) for role, (move, end) in self._open.items() if role is not utterance.speaker]
-        self._open = {role: opened for role, opened in self._open.items() if role is utterance.speaker}
-        end, move = max(waiting, default=(-np.inf, None))
-        return move if utterance.start - end < ANSWER_TIMEOUT else None

@@ -127,7 +127,9 @@ class Conversation:
         self.max_spans = max_spans
         self._air: dict[Role, Utterance] = {}
 
-    def say(self, speaker: Role, span: Span, now: float, onset: float = 0.0, pace: float = 1.0) -> str | None:
+    def say(
+        self, speaker: Role, span: Span, now: float, onset: float = 0.0, pace: float = 1.0, seconds: float | None = None
+    ) -> str | None:  # fmt: skip
         """Starts an utterance, or appends a span to the current one of the speaker.
 
         Args:
@@ -136,11 +138,13 @@ class Conversation:
             now: time of the decision [s].
             onset: time until the first word of an utterance that starts [s].
             pace: speaking rate relative to that of the conversation.
+            seconds: duration of the span [s]; None estimates it from the words.
 
         Returns:
             None on success, otherwise the reason for the refusal.
         """
-        seconds = speech_seconds(span.text, pace * self.words_per_second)
+        if seconds is None:
+            seconds = speech_seconds(span.text, pace * self.words_per_second)
         current = self._air.get(speaker)
         if current is None:
             self._air[speaker] = Utterance(speaker, (span,), now + onset, now + onset + seconds)
@@ -150,6 +154,11 @@ class Conversation:
         end = max(current.end, now) + seconds
         self._air[speaker] = replace(current, spans=(*current.spans, span), end=end)
         return None
+
+    def has_room(self, speaker: Role) -> bool:
+        """Returns whether a speaker can begin an utterance, or a further span of the present one."""
+        current = self._air.get(speaker)
+        return current is None or len(current.spans) < self.max_spans
 
     def deliver(self, now: float) -> list[Utterance]:
         """Removes and returns the utterances that are over at `now`.

@@ -10,6 +10,7 @@ from typing import TypeAlias
 from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.copying import shared
 from dorothie_gym.dialogue import USUAL_WORD_ERROR_RATE, WORDS_PER_SECOND
+from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.ontology import Role
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
@@ -106,6 +107,9 @@ class EnvConfig:
         perception: what the participant and the Co-Wizard see. With `PerceptionModel.CAMERA` they observe the objects
             that a picture shows, and the Co-Wizard also the hidden landmarks that have been in view. The car's own
             safety functions stay as they are.
+        channel: what carries the words between participant and Co-Wizard. With `ChannelKind.SPEECH` they are
+            synthesised, mixed with the noise of the car and recognised; `word_error_rate` is then not used, and
+            utterances take as long as their audio. Needs the extra `speech`.
     """
 
     decision_frequency: float = 2.0
@@ -117,6 +121,7 @@ class EnvConfig:
     rewards: RewardWeights = field(default_factory=RewardWeights)
     camera: CameraConfig | None = None
     perception: PerceptionModel = PerceptionModel.SYMBOLIC
+    channel: ChannelKind = ChannelKind.TEXT
 
     def __post_init__(self) -> None:
         frames = FRAME_RATE / self.decision_frequency if self.decision_frequency > 0 else 0.5
@@ -136,6 +141,9 @@ class EnvConfig:
         if self.perception not in (models := list(map(str, PerceptionModel))):
             raise ValueError(f"EnvConfig.perception is {self.perception!r}; it must be {' or '.join(models)}")
         object.__setattr__(self, "perception", PerceptionModel(self.perception))
+        if self.channel not in (kinds := list(map(str, ChannelKind))):
+            raise ValueError(f"EnvConfig.channel is {self.channel!r}; it must be {' or '.join(kinds)}")
+        object.__setattr__(self, "channel", ChannelKind(self.channel))
 
     @property
     def frames(self) -> int:
@@ -145,9 +153,13 @@ class EnvConfig:
     def record(self) -> dict[str, object]:
         """Returns the settings in JSON types, for records.
 
-        They lack the camera, which changes nothing in a session, and the usual perception, so that records are equal to
-        those of versions without a choice.
+        They lack the camera, which changes nothing in a session, and the usual perception and channel, so that records
+        are equal to those of versions without a choice.
         """
         settings = asdict(self)
-        del settings["camera"], settings["perception"]
-        return settings if self.perception is EnvConfig.perception else {**settings, "perception": str(self.perception)}
+        del settings["camera"]
+        for name in ("perception", "channel"):
+            value = settings.pop(name)
+            if value is not getattr(EnvConfig, name):
+                settings[name] = str(value)
+        return settings

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -21,11 +22,16 @@ from dorothie_gym.dialogue import (
     guess_spans,
     word_act,
 )
+from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.ontology import AGENT_ROLES, DialogueAct, GoalStatus, LandmarkName, Role
 from dorothie_gym.spaces import Speech, plain_text
 from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
+
+if TYPE_CHECKING:
+    from dorothie_gym.engine.spoken_dialogue import SpokenDialogue
+    from dorothie_gym.speech import CabinState, Samples
 
 SpanRecord: TypeAlias = dict[str, object]
 """Event data of one span."""
@@ -67,6 +73,7 @@ class DialogueChannel:
         words: np.random.SeedSequence,
         ears: np.random.SeedSequence,
         styles: np.random.SeedSequence,
+        voices: np.random.SeedSequence,
     ) -> None:
         """Begins without an utterance.
 
@@ -77,6 +84,10 @@ class DialogueChannel:
             words: seed of the wording of acts without words.
             ears: seed of the recognition errors.
             styles: seed of the speakers' styles.
+            voices: seed of voices and noise, if the channel is speech.
+
+        Raises:
+            SpeechError: the channel is speech and the extra `speech` is not installed.
         """
         storyboard = scenario.storyboard
         self.said: list[Utterance] = []
@@ -85,6 +96,14 @@ class DialogueChannel:
         self._annotator = Annotator(storyboard.landmarks[subgoal.landmark].name for subgoal in storyboard.subgoals)
         self._seeds = words, ears, styles
         self._rate = config.word_error_rate
+        self._spoken: SpokenDialogue | None = None
+        if config.channel is ChannelKind.SPEECH:
+            from dorothie_gym.engine.spoken_dialogue import SpokenDialogue
+
+            self._misheard = True
+            self._spoken = SpokenDialogue(
+                voices, words_per_second=config.words_per_second, classify=config.observe_acts
+            )
 
     # made when the first utterance needs them: there are sessions without words
 
@@ -116,17 +135,43 @@ class DialogueChannel:
         """Starts or continues an utterance at a time [s]; returns the reason of a refusal."""
         text = speech.text.strip() or self._worded(speech.act, role)
         span = Span(text, speech.act, speech.meaning)
-        return self._conversation.say(role, span, now, speech.onset, speech.pace)
+        if self._spoken is None:
+            return self._conversation.say(role, span, now, speech.onset, speech.pace)
+        return self._say_aloud(self._spoken, role, span, speech, now)
+
+    def _say_aloud(
+        self, spoken: SpokenDialogue, role: Role, span: Span, speech: Speech, now: float
+    ) -> str | None:  # fmt: skip
+        if not self._conversation.has_room(role):
+            return self._conversation.say(role, span, now)  # refuses
+        samples = spoken.speak(role, span.text, speech.pace)
+        reason = self._conversation.say(role, span, now, speech.onset, seconds=spoken.seconds(samples))
+        utterance = self._conversation.in_air(role)
+        assert utterance is not None
+        spoken.begin(role, samples, utterance.end)
+        return reason
 
     def note(self, landmark: LandmarkName, status: GoalStatus) -> None:
         """Updates the annotation with a change of a subgoal's status, which ends transactions."""
         self._annotator.note(landmark, status)
 
-    def deliver(self, now: float) -> list[DeliveredUtterance]:
-        """Returns the utterances that are over at a time [s], in the order in which they started."""
-        delivered = [self._hear(utterance) for utterance in self._conversation.deliver(now)]
+    def deliver(self, now: float, cabin: Callable[[], CabinState]) -> list[DeliveredUtterance]:
+        """Returns the utterances that are over at a time [s], in the order in which they started.
+
+        Args:
+            now: the time [s].
+            cabin: returns the state of the car, for the noise.
+        """
+        if self._spoken is not None:
+            self._spoken.recordings = {}
+        delivered = [self._hear(utterance, cabin) for utterance in self._conversation.deliver(now)]
         self._annotator.tick(now)
         return delivered
+
+    @property
+    def recordings(self) -> Mapping[str, Samples]:
+        """Audio of the spans that were delivered last, by file name; none if the channel is text."""
+        return {} if self._spoken is None else self._spoken.recordings
 
     @property
     def in_progress(self) -> list[Utterance]:
@@ -142,8 +187,11 @@ class DialogueChannel:
         """Returns words for an act, in the style of the speaker."""
         return plain_text(word_act(act, role, self._words, style=self._styles[role]), UTTERANCE_LENGTH)
 
-    def _hear(self, utterance: Utterance) -> DeliveredUtterance:
-        heard = self._recogniser.hear(utterance)
+    def _hear(self, utterance: Utterance, cabin: Callable[[], CabinState]) -> DeliveredUtterance:
+        if self._spoken is None:
+            heard = self._recogniser.hear(utterance)
+        else:
+            heard = self._spoken.hear(utterance, len(self.said), cabin())
         # The Co-Wizard understands its own utterances as spoken, and those of the participant as recognised.
         understood = self._understood(utterance if utterance.speaker is Role.CO_WIZARD else heard)
         records = self._records(utterance, heard)
@@ -173,6 +221,7 @@ class DialogueChannel:
                 "transaction": transaction,
                 "start": round(utterance.start, 3),
                 "end": round(utterance.end, 3),
+                **({} if self._spoken is None else {"audio": self._spoken.audio_name(len(self.said), place)}),
             }
-            for span, exchange in zip(utterance.spans, exchanges, strict=True)
+            for place, (span, exchange) in enumerate(zip(utterance.spans, exchanges, strict=True))
         )

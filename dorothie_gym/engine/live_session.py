@@ -24,7 +24,7 @@ from dorothie_gym.engine.session_views import SessionViews
 from dorothie_gym.engine.view_arrays import RoleArrays
 from dorothie_gym.engine.view_steps import EVERYTHING
 from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES, NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, Role
+from dorothie_gym.ontology import AGENT_ROLES, NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, Role, WeatherParameter
 from dorothie_gym.recording import EndReason, Event, EventType, SessionHeader
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEvent
@@ -45,14 +45,15 @@ from dorothie_gym.tasks import TaskState
 
 if TYPE_CHECKING:
     from dorothie_gym.camera.first_person_camera import CameraFrame
+    from dorothie_gym.speech import CabinState, Samples
 
 _INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
 
 def session_seeds(scenario: Scenario) -> list[np.random.SeedSequence]:
-    """Returns the seeds of a session: of the world, of words, of the recogniser, and of styles."""
+    """Returns the seeds of a session: of the world, of words, of the recogniser, of styles, and of voices."""
     # A new subsystem takes a further child at the end: the seeds of the others stay as they are.
-    return np.random.SeedSequence([scenario.seed, 1]).spawn(4)
+    return np.random.SeedSequence([scenario.seed, 1]).spawn(5)
 
 
 def world_seed_of(scenario: Scenario) -> np.random.SeedSequence:
@@ -109,7 +110,7 @@ class LiveSession:
             arrays: arrays of the world of a session that has begun, by `session_seeds` and `start_world`.
         """
         self.scenario, self.config, self.limits = scenario, config, limits
-        world_seed, word_seed, ear_seed, style_seed = session_seeds(scenario)
+        world_seed, word_seed, ear_seed, style_seed, voice_seed = session_seeds(scenario)
         self.world = World(
             town, config.world, seed=world_seed, departure=scenario.departure, network=network, arrays=arrays
         )  # fmt: skip
@@ -117,7 +118,13 @@ class LiveSession:
         self.beliefs = BeliefTracker(town, scenario)
         self._exceptions = ExceptionExecutor(self.world, self.task, limits.props)
         self._dialogue = DialogueChannel(
-            scenario, config, limits.spans, words=word_seed, ears=ear_seed, styles=style_seed
+            scenario,
+            config,
+            limits.spans,
+            words=word_seed,
+            ears=ear_seed,
+            styles=style_seed,
+            voices=voice_seed,
         )
         self._log = EventLog(self.world)
         self._subgoals = SubgoalTracker(scenario, self.task, self._dialogue, self._log)
@@ -246,6 +253,11 @@ class LiveSession:
         return self._dialogue.in_progress
 
     @property
+    def recordings(self) -> Mapping[str, Samples]:
+        """Audio of the spans that were over at the last decision, at 16 kHz, by file name; none without speech."""
+        return self._dialogue.recordings
+
+    @property
     def infractions(self) -> Mapping[str, int]:
         """Number of infractions so far by kind, collisions of any cause included."""
         if self._infractions is None:
@@ -336,7 +348,7 @@ class LiveSession:
         said: dict[Role, Utterance] = {}
         heard: dict[Role, Utterance] = {}
         now = self.world.time
-        for utterance in self._dialogue.deliver(now):
+        for utterance in self._dialogue.deliver(now, self._cabin):
             speaker = utterance.said.speaker
             said[speaker], heard[speaker] = utterance.said, utterance.heard
             self.beliefs.hear(speaker, utterance.understood)
@@ -345,6 +357,17 @@ class LiveSession:
             for data in utterance.records:
                 self._log.add(EventType.DIALOGUE_MOVE, speaker, data, flagged=True)
         return DeliveredMessages(said=said, heard=heard, message=message, speaking=self._dialogue.speaking(now))
+
+    def _cabin(self) -> CabinState:
+        """Returns what makes noise in the car."""
+        from dorothie_gym.speech import CabinState
+
+        weather = self.world.weather.values
+        return CabinState(
+            speed=abs(float(self.world.car.speed)),
+            rain=weather[WeatherParameter.PRECIPITATION],
+            wind=weather[WeatherParameter.WIND_INTENSITY],
+        )
 
     def _ego_position(self) -> tuple[float, float]:
         x, y = self.world.car.position.tolist()

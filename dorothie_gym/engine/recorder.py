@@ -218,6 +218,11 @@ class SessionRecorder:
     def _append(self) -> None:
         frames, world = self._engine.last_frames, self._engine.session.world
         self._writer.append(self._engine.last_events, frames)
+        if recordings := self._engine.last_recordings:
+            from dorothie_gym.speech import encode_flac  # sessions of text do not load it
+
+            for name, samples in recordings.items():
+                self._writer.add_audio(name, encode_flac(samples))
         self._frame = world.frame
         if len(frames) and frames[-1, 0] == world.frame:
             self._writer.add_actors(world.frame, actors_around(world))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -35,6 +35,9 @@ from dorothie_gym.spaces import (
 from dorothie_gym.spaces.fields import dict_space
 from dorothie_gym.spaces.observations import camera_perception_fields
 from dorothie_gym.tasks import StoryboardTemplate
+
+if TYPE_CHECKING:
+    from dorothie_gym.speech import Samples
 
 
 class StepOutcome(NamedTuple):
@@ -266,6 +269,11 @@ class SessionEngine(Restorable):
     def last_events(self) -> tuple[Event, ...]:
         """Events of the last decision."""
         return tuple(self.session.events)
+
+    @property
+    def last_recordings(self) -> Mapping[str, Samples]:
+        """Audio of the spans that were over at the last decision, at 16 kHz, by file name; none without speech."""
+        return self.session.recordings
 
     @property
     def last_frames(self) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.pictures import OBSERVERS, picture_spaces
@@ -102,6 +103,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         """
         if config is not None and config.perception is PerceptionModel.CAMERA:
             raise ValueError('config.perception is "camera"; batches do not perceive by it: make single environments')
+        if config is not None and config.channel is ChannelKind.SPEECH:
+            raise ValueError('config.channel is "speech"; batches do not speak: make single environments')
         super().__init__(num_envs, town, config or EnvConfig(), render_mode, threads, autoreset_mode)
         rate = self.config.decision_frequency
         self.metadata = {**self.metadata, "render_fps": metadata_at(rate)["render_fps"]}

@@ -22,8 +22,8 @@ class EventType(enum.StrEnum):
     """One dialogue act: utterance (number), text (of the whole utterance), span (words of this act), move, slots
     ({slot label: [value labels]}), exchange (number or null), start and end [s]; if known, transaction
     (number), recognised (words that a speech recogniser returned for the whole utterance), fluent (words of this act
-    without hesitations, restarts and withdrawn names, where it has any) and meaning (the propositions of the span, see
-    `dialogue.propositions`)."""
+    without hesitations, restarts and withdrawn names, where it has any), meaning (the propositions of the span, see
+    `dialogue.propositions`) and audio (name of the file with this act's audio)."""
     PHYSICAL_ACTION = "PhysicalAction"
     """Effective action of the Co-Wizard: action (label), angle (degrees, positive left, or null), up (or
     null)."""

@@ -27,6 +27,9 @@ JOURNAL_FILE: Final = "frames.journal"
 PICTURES_FOLDER: Final = "pictures"
 """Optional pictures, `<frame>.png`."""
 
+AUDIO_FOLDER: Final = "utterance"
+"""Optional audio of dialogue moves, as their field `audio` names it; the folder of SDN's layout."""
+
 SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, SEATS_FILE, FRAMES_FILE, JOURNAL_FILE)
 
 MAX_EVENTS: Final = 200_000

@@ -37,6 +37,7 @@ from dorothie_gym.recording.events import (
 )
 from dorothie_gym.recording.file_names import (
     ACTIONS_FILE,
+    AUDIO_FOLDER,
     EVENTS_FILE,
     FRAMES_FILE,
     HEADER_FILE,
@@ -78,6 +79,7 @@ class Session:
         name: name of its folder, or of its town, storyboard and seed.
         scene: recorded surroundings of the car.
         pictures: paths of the pictures by frame.
+        audio: paths of the audio of dialogue moves by the name in their field `audio`.
         decisions: actions of the roles, from which the session can be simulated again; None if not recorded.
         report: findings of the reader.
     """
@@ -90,6 +92,7 @@ class Session:
     name: str = ""
     scene: Surroundings = field(default_factory=Surroundings)
     pictures: Mapping[int, Path] = field(default_factory=dict)
+    audio: Mapping[str, Path] = field(default_factory=dict)
     decisions: tuple[Decision, ...] | None = None
     report: ReadReport = field(default_factory=ReadReport)
 
@@ -135,12 +138,13 @@ class Session:
             name=folder.resolve().name,
             scene=scene,
             pictures=_pictures(folder / PICTURES_FOLDER),
+            audio=_audio(folder / AUDIO_FOLDER),
             decisions=decisions,
             report=report,
         )
 
     def save(self, path: Path | str) -> Path:
-        """Writes the session into a new folder, which appears when it is complete; pictures are copied.
+        """Writes the session into a new folder, which appears when it is complete; pictures and audio are copied.
 
         A session without an outcome is written as an interrupted one.
 
@@ -161,6 +165,10 @@ class Session:
                 (part / PICTURES_FOLDER).mkdir()
                 for frame, picture in self.pictures.items():
                     shutil.copyfile(picture, part / PICTURES_FOLDER / picture_name(frame))
+            if self.audio:
+                (part / AUDIO_FOLDER).mkdir()
+                for name, audio in self.audio.items():
+                    shutil.copyfile(audio, part / AUDIO_FOLDER / name)
             outcome = self.summary if self.complete else None
             SessionFile(
                 header=self.header, outcome=outcome, events=len(self.events), frames=len(self.trajectory)
@@ -175,7 +183,7 @@ class Session:
     def digest(self) -> str:
         """SHA-256 of header, outcome, events, decisions and all numbers of the frames, in hexadecimal digits.
 
-        It does not depend on name, pictures, reader's report, or on the libraries that compressed the files.
+        It does not depend on name, pictures, audio, reader's report, or on the libraries that compressed the files.
         """
         return _digest(self)
 
@@ -322,6 +330,13 @@ def _pictures(folder: Path) -> Mapping[int, Path]:
         return MappingProxyType({})
     found = {int(path.stem): path for path in folder.glob("*.png") if path.stem.isdecimal() and len(path.stem) <= 10}
     return MappingProxyType(dict(sorted(found.items())))
+
+
+def _audio(folder: Path) -> Mapping[str, Path]:
+    """Returns the audio files by name."""
+    if not folder.is_dir():
+        return MappingProxyType({})
+    return MappingProxyType({path.name: path for path in sorted(folder.glob("*.flac"))})
 
 
 @contextmanager

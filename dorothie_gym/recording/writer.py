@@ -19,6 +19,7 @@ from dorothie_gym.recording.action_log import Decision, encode_decision
 from dorothie_gym.recording.events import Event, encode_event
 from dorothie_gym.recording.file_names import (
     ACTIONS_FILE,
+    AUDIO_FOLDER,
     EVENTS_FILE,
     FRAMES_FILE,
     HEADER_FILE,
@@ -26,6 +27,7 @@ from dorothie_gym.recording.file_names import (
     MAX_FRAME,
     PICTURES_FOLDER,
     SESSION_FILES,
+    safe_name,
 )
 from dorothie_gym.recording.frames import ACTORS, CAR, LIGHTS, WEATHER, encode_block, read_journal, write_frames
 from dorothie_gym.recording.header import SessionHeader
@@ -150,6 +152,21 @@ class SessionWriter:
         pictures.mkdir(exist_ok=True)
         write_atomically(pictures / picture_name(frame), png)
 
+    def add_audio(self, name: str, flac: bytes) -> None:
+        """Writes the audio (FLAC) of a dialogue move, whose field `audio` has the name.
+
+        Raises:
+            SessionError: it is no FLAC, or the name is that of another kind of file.
+        """
+        self._check_open("no audio can be added")
+        if not flac.startswith(b"fLaC"):
+            raise SessionError(f"{self.folder}: the audio {name!r} is no FLAC")
+        if safe_name(name) != name or not name.endswith(".flac"):
+            raise SessionError(f"{self.folder}: {name!r} is no name of a FLAC file")
+        folder = self.folder / AUDIO_FOLDER
+        folder.mkdir(exist_ok=True)
+        write_atomically(folder / name, flac)
+
     def finish(self, outcome: Mapping[str, object]) -> None:
         """Writes the outcome, which completes the session, and closes it.
 
@@ -197,8 +214,9 @@ class SessionWriter:
         # The header goes first: from then on, whenever the process dies, the folder holds no session with parts of two.
         for name in present:
             (self.folder / name).unlink()
-        if overwrite and (self.folder / PICTURES_FOLDER).is_dir():
-            shutil.rmtree(self.folder / PICTURES_FOLDER)
+        for name in (PICTURES_FOLDER, AUDIO_FOLDER):
+            if overwrite and (self.folder / name).is_dir():
+                shutil.rmtree(self.folder / name)
 
     def _check_open(self, consequence: str) -> None:
         if self._events.closed:

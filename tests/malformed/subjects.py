@@ -399,8 +399,22 @@ def _unpack(folder: Path) -> None:
     town_arrays(TownNetwork(town))
 
 
+def _audio(folder: Path) -> None:
+    from dorothie_gym.speech import encode_flac
+
+    tone = np.sin(np.arange(4000) * 0.2).astype(np.float32)
+    (folder / "speech.flac").write_bytes(encode_flac(tone))
+
+
+def _read_audio(folder: Path) -> None:
+    from dorothie_gym.speech import read_audio
+
+    read_audio(folder / "speech.flac")
+
+
 SUBJECTS: Final = MappingProxyType(
     {
+        "audio": Subject(_audio, _read_audio),
         "native": Subject(_native, _read_sessions),
         "release": Subject(_release, _read_sessions),
         "sample": Subject(_sample, _read_sessions),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Container, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Final
@@ -11,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.errors import OntologyError
+from dorothie_gym.files import write_atomically
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import (
@@ -24,7 +26,7 @@ from dorothie_gym.ontology import (
     parse_prop,
 )
 from dorothie_gym.recording.events import Event, EventType
-from dorothie_gym.recording.file_names import EVENTS_FILE
+from dorothie_gym.recording.file_names import AUDIO_FOLDER, EVENTS_FILE
 from dorothie_gym.recording.header import LandmarkRow, SessionHeader
 from dorothie_gym.recording.json_io import canonical
 from dorothie_gym.recording.sdn.event_log import FOREIGN, LEFT, RIGHT
@@ -55,6 +57,8 @@ _BELIEFS: Final = {
     MentalAction.KNOWLEDGE_UPDATE: ("LandmarkUpdate", "Location"),
     MentalAction.OTHER: ("Other", None),
 }
+_OF_SPAN: Final = re.compile(r"utterance_\d+_\d+\.flac")
+"""Name of the audio of one span; the layout has one file for an utterance."""
 _PLAN_CLOSED: Final = ("Complete", "Abandoned")
 
 
@@ -156,7 +160,27 @@ def _said(data: Mapping[str, object]) -> dict[str, object]:
 
 
 def _file(data: Mapping[str, object]) -> str:
-    return str(data.get("audio") or f"utterance_{data['utterance']}.flac")
+    name = data.get("audio")
+    whole = f"utterance_{data['utterance']}.flac"
+    return whole if name is None or _OF_SPAN.fullmatch(str(name)) else str(name)
+
+
+def _write_audio(folder: Path, session: Session) -> None:
+    """Writes the audio of each utterance, joined from that of its spans; those of which a file is missing are left out.
+
+    Raises:
+        AudioError: a file is damaged.
+        SpeechError: the extra `speech` is not installed.
+    """
+    from dorothie_gym.speech import encode_flac, read_audio
+
+    folder.mkdir()
+    for utterance in session.utterances():
+        events = [session.events[move.index].data for move in utterance.moves]
+        paths = [session.audio.get(str(data.get("audio"))) for data in events]
+        found = [read_audio(path) for path in paths if path is not None]
+        if len(found) == len(paths):
+            write_atomically(folder / _file(events[0]), encode_flac(np.concatenate(found)))
 
 
 def _physical(data: Mapping[str, object]) -> dict[str, object]:
@@ -255,6 +279,8 @@ def write_sdn(session: Session, path: Path | str, *, maps: Path | str | None = N
 
     Raises:
         SessionError: a file or folder of that name exists, or the session holds other types than JSON's.
+        AudioError: a file with audio is damaged.
+        SpeechError: the session has audio, and the extra `speech` is not installed.
         OSError: the folder cannot be written.
     """
     town = find_town(session.header.town, None if maps is None else Path(maps))
@@ -267,6 +293,8 @@ def write_sdn(session: Session, path: Path | str, *, maps: Path | str | None = N
         _write(folder / PLACES_FILE, "\n".join(_place_lines(session, town, first)))
         _write(folder / AD_WIZARD_FILE, "\n".join(ad_wizard_lines(session, first)))
         write_scene(folder / SCENE_FILE, session)
+        if session.audio:
+            _write_audio(folder / AUDIO_FOLDER, session)
     return Path(path)
 
 

@@ -75,6 +75,8 @@ class LeaderboardEntry:
             others.append(f"word errors {100 * rate:g} %")
         if perception := settings["config"].get("perception"):
             others.append(f"perception {perception}")
+        if channel := settings["config"].get("channel"):
+            others.append(f"channel {channel}")
         if self.shortened:
             others.append(f"sessions of at most {self.time_limit:g} s")
         return f"{name} ({', '.join(others)})" if others else name

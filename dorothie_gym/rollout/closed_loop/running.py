@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.files import write_atomically
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
@@ -121,6 +122,8 @@ def command_of(settings: Mapping[str, Any]) -> str:
             words += [option, f"{config[name]:g}"]
     if perception := config.get("perception"):
         words += ["--perception", perception]
+    if config.get("channel") == ChannelKind.SPEECH:
+        words += ["--speech"]
     return shlex.join(words)
 
 

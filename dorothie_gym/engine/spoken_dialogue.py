@@ -1,0 +1,167 @@
+"""Spoken dialogue of a session: synthesis, noise in the car, crosstalk, and recognition of what is said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from dorothie_gym.copying import shared
+from dorothie_gym.dialogue import SHORTEST_SPAN, Span, Utterance
+from dorothie_gym.dialogue.asr_channel import UNCLASSIFIED, OpenMoves
+from dorothie_gym.ontology import DialogueMove, Role
+from dorothie_gym.speech import (
+    SAMPLE_RATE,
+    CabinState,
+    Recognition,
+    Samples,
+    Voice,
+    cabin_noise,
+    find_recognizer,
+    find_synthesizer,
+    mixed,
+    readable,
+    say,
+    signal_to_noise,
+    spoken_words,
+    understand_speech,
+)
+
+VOICE_RATE: Final = 3.6
+"""Speaking rate of the synthesised voice [words/s], by which the rate of a session is divided; measured on 150 spans of
+sessions, without silence around them (`dorothie-gym bench speech`)."""
+
+PITCHES: Final = {Role.PARTICIPANT: (0.86, 0.97), Role.CO_WIZARD: (0.92, 0.96)}
+"""Ranges from which the pitch of a speaker's voice is drawn; set by hand. Above 1, the recogniser fails on short words:
+"stop" is recognised 8 times of 8 at 0.9, 3 to 5 times at 1, and never at 1.1."""
+
+CROSSTALK: Final = -15.0
+"""Level of the other speaker's voice at a speaker's microphone, where both talk [dB]; set by hand."""
+
+MARGIN: Final = 0.2
+"""Time before and behind a span in which the recogniser hears noise only [s]."""
+
+
+@shared
+@dataclass(frozen=True, eq=False)
+class SpokenSpan:
+    """Audio of a span.
+
+    Attributes:
+        start: time of its first sample [s of the session].
+        samples: the voice alone at 16 kHz (n,), float32.
+    """
+
+    start: float
+    samples: Samples
+
+
+class SpokenDialogue:
+    """Voices of a session and what is recognised of them.
+
+    Attributes:
+        recordings: audio of the spans that were delivered last, with noise, at 16 kHz, by file name.
+    """
+
+    def __init__(self, seed: np.random.SeedSequence, *, words_per_second: float, classify: bool) -> None:
+        """Begins without an utterance.
+
+        Args:
+            seed: seed of voices and noise.
+            words_per_second: speaking rate of the session [words/s].
+            classify: as of `dialogue.Recogniser`.
+
+        Raises:
+            SpeechError: the extra `speech` is not installed.
+        """
+        find_synthesizer()  # reported before the first word
+        find_recognizer()
+        self._rng = np.random.default_rng(seed)
+        self._voices = {role: Voice(pitch=round(self._rng.uniform(*PITCHES[role]), 2)) for role in PITCHES}
+        self._rate = words_per_second / VOICE_RATE
+        self._classify = classify
+        self._open = OpenMoves()
+        self._spans: dict[Role, list[SpokenSpan]] = {role: [] for role in PITCHES}
+        self._over: dict[Role, list[SpokenSpan]] = {role: [] for role in PITCHES}
+        self.recordings: dict[str, Samples] = {}
+
+    def speak(self, role: Role, text: str, pace: float) -> Samples:
+        """Returns a text as a role says it, at 16 kHz, with silence behind it up to `SHORTEST_SPAN`.
+
+        Args:
+            role: the speaker.
+            text: the text.
+            pace: speaking rate relative to that of the session.
+        """
+        seed = int(self._rng.integers(2**31))
+        samples = say(find_synthesizer(), text, self._voices[role], rate=pace * self._rate, seed=seed)
+        silence = max(round(SHORTEST_SPAN * SAMPLE_RATE) - len(samples), 0)
+        return np.concatenate([samples, np.zeros(silence, dtype=np.float32)])
+
+    def begin(self, role: Role, samples: Samples, end: float) -> None:
+        """Notes a span that a role has begun and that ends at a time [s]."""
+        self._spans[role].append(SpokenSpan(end - len(samples) / SAMPLE_RATE, samples))
+
+    @staticmethod
+    def seconds(samples: Samples) -> float:
+        """Returns the duration of audio [s]."""
+        return len(samples) / SAMPLE_RATE
+
+    @staticmethod
+    def audio_name(utterance: int, span: int) -> str:
+        """Returns the name of the file with the audio of a span; spans are counted from 0."""
+        return f"utterance_{utterance}_{span}.flac"
+
+    def hear(self, utterance: Utterance, number: int, cabin: CabinState) -> Utterance:
+        """Returns what is recognised of an utterance that is over, and keeps its audio in `recordings`.
+
+        The act of a span of which every word is right is that of the speaker; else it is read from the words.
+
+        Args:
+            utterance: spoken utterance; calls follow the order of utterance ends.
+            number: number of the utterance in the session.
+            cabin: state of the car at its end.
+        """
+        role = utterance.speaker
+        spoken, self._spans[role] = self._spans[role], []
+        after = self._open.answered_by(utterance)
+        spans = []
+        for place, (span, audio) in enumerate(zip(utterance.spans, spoken, strict=True)):
+            heard = self._recognised(role, audio, cabin, self.audio_name(number, place))
+            spans.append(self._read(span, heard, after if place == 0 else None))
+        self._over[role] = spoken
+        self._open.note(utterance)
+        return replace(utterance, spans=tuple(spans))
+
+    def _recognised(self, role: Role, audio: SpokenSpan, cabin: CabinState, name: str) -> Recognition:
+        margin = round(MARGIN * SAMPLE_RATE)
+        voice = np.zeros(len(audio.samples) + 2 * margin, dtype=np.float32)
+        voice[margin:-margin] = audio.samples + self._crosstalk(role, audio)
+        mixture = mixed(voice, cabin_noise(cabin, len(voice), self._rng), signal_to_noise(cabin))
+        self.recordings[name] = mixture[margin:-margin]
+        return find_recognizer().recognize(mixture, SAMPLE_RATE)
+
+    def _crosstalk(self, role: Role, audio: SpokenSpan) -> Samples:
+        """Returns what the other speaker says meanwhile, as loud as it is at this speaker's microphone."""
+        found = np.zeros(len(audio.samples), dtype=np.float32)
+        for other in self._spans:
+            if other is not role:
+                for span in (*self._over[other], *self._spans[other]):
+                    _add(found, span.samples, round((span.start - audio.start) * SAMPLE_RATE))
+        return found * np.float32(10.0 ** (CROSSTALK / 20.0))
+
+    def _read(self, span: Span, heard: Recognition, after: DialogueMove | None) -> Span:
+        if heard.text.split() == spoken_words(span.text):
+            return Span(readable(heard.text), span.act)
+        if not self._classify:
+            return Span(readable(heard.text), UNCLASSIFIED)
+        found = understand_speech(heard, after)
+        return Span(found.text, found.act)
+
+
+def _add(target: Samples, samples: Samples, offset: int) -> None:
+    """Adds samples to others from an offset on, which may be negative or beyond the end."""
+    first, last = max(offset, 0), min(offset + len(samples), len(target))
+    if first < last:
+        target[first:last] += samples[first - offset : last - offset]

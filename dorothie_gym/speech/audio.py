@@ -1,0 +1,151 @@
+"""Mono audio as float32 samples: checks, conversion of the sample rate, and FLAC and WAV files."""
+
+from __future__ import annotations
+
+import functools
+import io
+from math import gcd
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.errors import AudioError, short_repr
+from dorothie_gym.input_files import raising, read_file
+from dorothie_gym.speech.extras import speech_module
+
+Samples: TypeAlias = NDArray[np.float32]
+"""Mono audio (n,), float32, full scale is 1."""
+
+SAMPLE_RATE: Final = 16000
+"""Sample rate of recognisers and recordings [Hz]; telephone wideband, that of most speech corpora and models."""
+
+LOWEST_RATE: Final = 8000
+HIGHEST_RATE: Final = 96000
+"""Sample rates that are converted [Hz]."""
+
+LONGEST: Final = 60.0
+"""Longest audio that is recognised or read at once [s]; the longest span has 160 characters, some 12 s."""
+
+_LARGEST_FILE: Final = 4 * round(LONGEST) * HIGHEST_RATE * 2
+"""Largest audio file that is opened [bytes]: `LONGEST` of stereo in 32 bits at the highest rate."""
+
+
+def checked_samples(samples: NDArray[np.generic], sample_rate: int, where: str = "audio") -> Samples:
+    """Returns audio as float32 samples within full scale.
+
+    Args:
+        samples: (n,) floating-point numbers, full scale is 1, or integers, full scale is that of their type. Several
+            channels (n, c) are averaged.
+        sample_rate: their rate [Hz].
+        where: name of the audio for messages.
+
+    Raises:
+        AudioError: the audio is empty, too long, not finite, or of another form, or the rate is not supported.
+    """
+    if not LOWEST_RATE <= sample_rate <= HIGHEST_RATE:
+        raise AudioError(
+            f"{where}: has {short_repr(sample_rate)} samples per second; {LOWEST_RATE} to {HIGHEST_RATE} are supported"
+        )
+    values = np.asarray(samples)
+    if values.ndim not in (1, 2) or 0 in values.shape:
+        raise AudioError(f"{where}: has the shape {values.shape}; it must be (samples,) or (samples, channels)")
+    if len(values) > LONGEST * sample_rate:
+        seconds = len(values) / sample_rate
+        raise AudioError(f"{where}: is {seconds:.0f} s long; at most {LONGEST:.0f} s are taken at once, so cut it")
+    if np.issubdtype(values.dtype, np.signedinteger):
+        values = values / -float(np.iinfo(values.dtype).min)
+    elif not np.issubdtype(values.dtype, np.floating):
+        raise AudioError(f"{where}: holds {values.dtype}; it must hold floating-point numbers or signed integers")
+    if values.ndim == 2:
+        values = values.mean(axis=1)
+    if not np.isfinite(values).all():
+        raise AudioError(f"{where}: holds samples that are no finite numbers")
+    return np.clip(values, -1.0, 1.0).astype(np.float32)
+
+
+def trimmed(samples: Samples, sample_rate: int, margin: float = 0.05) -> Samples:
+    """Returns audio without the silence before and behind it: what is more than 40 dB below its loudest 10 ms.
+
+    Args:
+        samples: (n,) float32.
+        sample_rate: their rate [Hz].
+        margin: silence that is kept on both sides [s].
+    """
+    step = sample_rate // 100
+    blocks = len(samples) // step
+    if not blocks:
+        return samples
+    energy = np.square(samples[: blocks * step].reshape(blocks, step)).mean(axis=1)
+    loud = np.flatnonzero(energy > 1e-4 * energy.max())
+    if not len(loud):
+        return samples
+    first, last = int(loud[0]) * step - round(margin * sample_rate), (int(loud[-1]) + 1) * step
+    return samples[max(first, 0) : last + round(margin * sample_rate)]
+
+
+def resample(samples: Samples, sample_rate: int, wanted: int = SAMPLE_RATE) -> Samples:
+    """Returns audio at another rate, by a polyphase filter (`scipy.signal.resample_poly`).
+
+    Args:
+        samples: (n,) float32.
+        sample_rate: their rate [Hz].
+        wanted: rate of the result [Hz].
+    """
+    if sample_rate == wanted:
+        return samples
+    from scipy.signal import resample_poly
+
+    divisor = gcd(sample_rate, wanted)
+    return np.asarray(resample_poly(samples, wanted // divisor, sample_rate // divisor), dtype=np.float32)
+
+
+def to_pcm(samples: Samples) -> NDArray[np.int16]:
+    """Returns samples as 16-bit integers (n,)."""
+    return np.asarray(np.rint(np.clip(samples, -1.0, 1.0) * 32767.0), dtype=np.int16)
+
+
+def encode_flac(samples: Samples, sample_rate: int = SAMPLE_RATE) -> bytes:
+    """Returns audio as a FLAC file of 16 bits; equal samples give equal bytes.
+
+    Raises:
+        SpeechError: the extra `speech` is not installed.
+    """
+    buffer = io.BytesIO()
+    _soundfile().write(buffer, to_pcm(samples), sample_rate, format="FLAC", subtype="PCM_16")
+    return buffer.getvalue()
+
+
+def read_audio(path: Path | str, sample_rate: int = SAMPLE_RATE) -> Samples:
+    """Returns the audio of a FLAC or WAV file at a rate; several channels are averaged.
+
+    Args:
+        path: the file.
+        sample_rate: rate of the result [Hz].
+
+    Raises:
+        AudioError: the file is missing or damaged, longer than `LONGEST`, or of an unsupported rate.
+        SpeechError: the extra `speech` is not installed.
+    """
+    soundfile, path = _soundfile(), Path(path)
+    try:
+        with raising(AudioError):
+            content = read_file(path, _LARGEST_FILE)
+    except OSError as error:
+        raise AudioError(f"{path}: cannot be read: {error.strerror}") from error
+    try:
+        with soundfile.SoundFile(io.BytesIO(content)) as file:
+            if file.frames > LONGEST * file.samplerate:
+                raise AudioError(
+                    f"{path}: is {file.frames / file.samplerate:.0f} s long; at most {LONGEST:.0f} s are read at once"
+                )
+            rate, samples = int(file.samplerate), file.read(dtype="float32", always_2d=True)
+    except soundfile.LibsndfileError as error:
+        raise AudioError(f"{path}: cannot be read as audio: {str(error).splitlines()[0]}") from error
+    return resample(checked_samples(samples, rate, str(path)), rate, sample_rate)
+
+
+@functools.cache
+def _soundfile() -> Any:
+    return speech_module("soundfile")

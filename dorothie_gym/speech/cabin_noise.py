@@ -1,0 +1,195 @@
+"""Noise inside the car: level and spectrum of road, airflow, rain and other talk, and the signal-to-noise ratio.
+
+Levels follow published laws of growth; their reference points, like those of rain and talk, are set by hand to ordinary
+values of a passenger car.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.copying import shared
+from dorothie_gym.speech.audio import SAMPLE_RATE, Samples
+
+_IDLE: Final = 42.0
+"""Level of a car with a running engine at a standstill [dB(A)]."""
+
+_ROAD: Final = (57.0, 50.0 / 3.6, 30.0)
+"""Level of tyres and drive train [dB(A)] at a speed [m/s], and its growth by a factor of ten of speed [dB]: tyre noise
+grows with 30 log10 of speed, the usual regression (Sandberg and Ejsmont, Tyre/Road Noise Reference Book, 2002)."""
+
+_AIR: Final = (62.0, 100.0 / 3.6, 60.0)
+"""Likewise of the airflow: sound of forces on bodies grows with the sixth power of velocity (Curle, Proceedings of the
+Royal Society A 231, 1955)."""
+
+_STRONGEST_WIND: Final = 15.0
+"""Velocity of the wind at 100 percent [m/s], a gale's beginning."""
+
+_RAIN: Final = 60.0
+"""Level of the heaviest rain on the roof [dB(A)]; half the rain is 3 dB less."""
+
+_TALK: Final = 56.0
+"""Level of one other talker at the back of the car, away from the microphone [dB(A)]."""
+
+_SPEECH: Final = 65.0
+"""Level of speech of normal effort at half a metre from the lips [dB]: 62.35 dB at a metre by ANSI S3.5-1997, which
+would be 68 dB in a free field; less for the usual position of the microphone beside the speaker."""
+
+_LOMBARD: Final = (45.0, 0.6)
+"""Level of noise [dB(A)] from which speakers raise their voices, and by how much for each further dB (Pearsons, Bennett
+and Fidell, Speech Levels in Various Noise Environments, EPA-600/1-77-025, 1977)."""
+
+LONG_TERM_SLOPE: Final = -9.0
+"""Slope of speech above 500 Hz [dB per octave], roughly that of Byrne et al., JASA 96, 1994."""
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
+class CabinState:
+    """State of the world that makes noise in the car.
+
+    Attributes:
+        speed: speed of the car [m/s], not negative.
+        rain: rain [percent], 0 to 100.
+        wind: wind [percent], 0 to 100.
+        talkers: number of other people who talk, not negative.
+
+    Raises:
+        ValueError: a field is out of its range.
+    """
+
+    speed: float = 0.0
+    rain: float = 0.0
+    wind: float = 0.0
+    talkers: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.speed < 200.0:
+            raise ValueError(f"CabinState.speed is {self.speed}; it must be in 0..200 m/s")
+        for name, value in (("rain", self.rain), ("wind", self.wind)):
+            if not 0.0 <= value <= 100.0:
+                raise ValueError(f"CabinState.{name} is {value}; it must be in 0..100 percent")
+        if not 0 <= self.talkers <= 100:
+            raise ValueError(f"CabinState.talkers is {self.talkers}; it must be in 0..100")
+
+
+def noise_levels(state: CabinState) -> dict[str, float]:
+    """Returns the levels of the sources that sound [dB(A)], by name: "idle", "road", "air", "rain", "talk"."""
+    found = {"idle": _IDLE}
+    airflow = state.speed + _STRONGEST_WIND * state.wind / 100.0
+    for name, velocity, (level, reference, growth) in (("road", state.speed, _ROAD), ("air", airflow, _AIR)):
+        if velocity > 1.0:
+            found[name] = level + growth * math.log10(velocity / reference)
+    if state.rain > 0.0:
+        found["rain"] = _RAIN + 10.0 * math.log10(state.rain / 100.0)
+    if state.talkers:
+        found["talk"] = _TALK + 10.0 * math.log10(state.talkers)
+    return found
+
+
+def noise_level(state: CabinState) -> float:
+    """Returns the level of all noise together [dB(A)]."""
+    return 10.0 * math.log10(sum(10.0 ** (level / 10.0) for level in noise_levels(state).values()))
+
+
+def signal_to_noise(state: CabinState) -> float:
+    """Returns the ratio of speech to noise at the microphone [dB], both A-weighted; speakers raise their voices."""
+    noise = noise_level(state)
+    threshold, slope = _LOMBARD
+    return _SPEECH + slope * max(noise - threshold, 0.0) - noise
+
+
+def cabin_noise(state: CabinState, length: int, rng: np.random.Generator) -> Samples:
+    """Returns noise of a state at 16 kHz, of an A-weighted power of 1.
+
+    Args:
+        state: state of the car.
+        length: number of samples.
+        rng: source of randomness.
+    """
+    if length < 1:
+        return np.empty(0, dtype=np.float32)
+    frequencies = np.asarray(np.fft.rfftfreq(length, 1.0 / SAMPLE_RATE), dtype=np.float64)
+    total: NDArray[np.float64] = np.zeros(length)
+    for name, level in noise_levels(state).items():
+        source = np.fft.irfft(_shape(name, frequencies) * np.fft.rfft(rng.standard_normal(length)), length)
+        if name == "talk":
+            source *= _syllables(length, state.talkers, rng)
+        total += source * 10.0 ** (level / 20.0) / max(_weighted_rms(source), 1e-12)
+    return (total / max(_weighted_rms(total), 1e-12)).astype(np.float32)
+
+
+def mixed(speech: Samples, noise: Samples, ratio: float) -> Samples:
+    """Returns speech with noise of an A-weighted ratio; louder than full scale is scaled down, not clipped.
+
+    Args:
+        speech: samples at 16 kHz (n,), float32.
+        noise: samples at 16 kHz (n,) or longer.
+        ratio: level of speech above that of noise [dB], where there is speech: pauses do not count.
+    """
+    if len(noise) < len(speech):
+        raise ValueError(f"noise has {len(noise)} samples for {len(speech)} of speech; make it as long")
+    noise = noise[: len(speech)]
+    loudness, quiet = active_rms(speech), _weighted_rms(noise)
+    if loudness == 0.0 or quiet == 0.0:
+        return speech
+    result = speech + noise * np.float32(loudness / quiet * 10.0 ** (-ratio / 20.0))
+    return np.asarray(result / max(1.0, float(np.abs(result).max())), dtype=np.float32)
+
+
+def active_rms(speech: Samples) -> float:
+    """Returns the A-weighted root mean square of speech in blocks of 20 ms within 30 dB of the loudest."""
+    weighted = _weighted(speech)
+    step = SAMPLE_RATE // 50
+    blocks = len(weighted) // step
+    if not blocks:
+        return float(np.sqrt(np.mean(np.square(weighted)))) if len(weighted) else 0.0
+    power = np.square(weighted[: blocks * step].reshape(blocks, step)).mean(axis=1)
+    return float(np.sqrt(power[power >= 1e-3 * power.max()].mean()))
+
+
+def pink_noise(length: int, rng: np.random.Generator) -> Samples:
+    """Returns noise with equal power in each octave, of a root mean square of 1, as tests of recognisers use it."""
+    spectrum = np.fft.rfft(rng.standard_normal(length))
+    noise = np.fft.irfft(spectrum / np.sqrt(np.maximum(np.arange(len(spectrum)), 1.0)), length)
+    return np.asarray(noise / np.sqrt(np.mean(np.square(noise))), dtype=np.float32)
+
+
+def _shape(name: str, frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the amplitude of a source by frequency [Hz]: corner frequency and slope are set by hand."""
+    corner, slope = {
+        "idle": (60.0, -9.0), "road": (150.0, -9.0), "air": (300.0, -6.0), "rain": (2000.0, -3.0),
+        "talk": (500.0, LONG_TERM_SLOPE),
+    }[name]  # fmt: skip
+    octaves = np.log2(np.maximum(frequencies, 1.0) / corner)
+    shape = 10.0 ** (slope * np.maximum(octaves, 0.0) / 20.0)
+    return np.where(frequencies < 30.0, 0.0, shape)
+
+
+def _syllables(length: int, talkers: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Returns an envelope with the rhythm of syllables, some 4 Hz, the shallower the more people talk.
+
+    Noise of the spectrum and modulation of speech is usual in audiology (Dreschler et al., Audiology 40, 2001).
+    """
+    times = np.arange(length) / SAMPLE_RATE
+    beats = sum(np.sin(2.0 * np.pi * (rng.uniform(3.0, 5.0) * times + rng.uniform())) for _ in range(talkers))
+    return np.asarray(1.0 + 0.9 * beats / talkers)
+
+
+def _weighted(samples: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Returns samples at 16 kHz with A-weighting (IEC 61672-1)."""
+    spectrum = np.fft.rfft(np.asarray(samples, dtype=np.float64))
+    squared = np.square(np.fft.rfftfreq(len(samples), 1.0 / SAMPLE_RATE))
+    gain = 12194.0**2 * squared**2 / (
+        (squared + 20.6**2) * np.sqrt((squared + 107.7**2) * (squared + 737.9**2)) * (squared + 12194.0**2)
+    )  # fmt: skip
+    return np.fft.irfft(spectrum * gain * 10.0 ** (2.0 / 20.0), len(samples))
+
+
+def _weighted_rms(samples: NDArray[np.floating]) -> float:
+    return float(np.sqrt(np.mean(np.square(_weighted(samples)))))

@@ -1,0 +1,108 @@
+"""Speech recognition: protocol of the recognisers, their results, and the choice of one by name."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from dorothie_gym.copying import shared
+from dorothie_gym.errors import SpeechError, did_you_mean
+from dorothie_gym.speech.audio import Samples
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
+class RecognizedWord:
+    """Word in recognised speech.
+
+    Attributes:
+        text: the word as it is spoken, in lower case.
+        start: start in the audio [s].
+        end: end in the audio [s].
+        confidence: posterior probability in [0, 1]; NaN if the recogniser gives none.
+    """
+
+    text: str
+    start: float
+    end: float
+    confidence: float
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
+class Hypothesis:
+    """Possible words of an audio.
+
+    Attributes:
+        text: spoken words in lower case, without punctuation.
+        weight: share of the probability of all hypotheses, in [0, 1].
+    """
+
+    text: str
+    weight: float
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
+class Recognition:
+    """Result of the recognition of an audio.
+
+    Attributes:
+        text: spoken words in lower case, without punctuation; empty if nothing was recognised.
+        words: the words with times and confidences; empty if the recogniser gives none.
+        hypotheses: distinct hypotheses, the most probable first; empty if nothing was recognised.
+    """
+
+    text: str
+    words: tuple[RecognizedWord, ...] = ()
+    hypotheses: tuple[Hypothesis, ...] = ()
+
+
+class Recognizer(Protocol):
+    """Speech recogniser; equal arguments give equal results, whatever was recognised before."""
+
+    def recognize(self, samples: Samples, sample_rate: int, *, hints: Sequence[str] = ()) -> Recognition:
+        """Returns the words of an audio.
+
+        Args:
+            samples: mono audio (n,), float32, full scale is 1.
+            sample_rate: their rate [Hz], 8,000 to 96,000; other rates than the recogniser's are converted.
+            hints: names that may be spoken, such as those on a map. Recognisers prefer them, and may ignore them.
+
+        Raises:
+            AudioError: the audio is empty, longer than a minute, not finite, or of an unsupported rate.
+            SpeechError: a server or model failed.
+        """
+        ...
+
+
+def single_hypothesis(text: str) -> Recognition:
+    """Returns the result of a recogniser that gives words only."""
+    return Recognition(text=text, hypotheses=(Hypothesis(text=text, weight=1.0),) if text else ())
+
+
+def _pocketsphinx() -> Recognizer:
+    from dorothie_gym.speech.sphinx_recognizer import SphinxRecognizer
+
+    return SphinxRecognizer()
+
+
+_RECOGNIZERS: Final[Mapping[str, Callable[[], Recognizer]]] = {"pocketsphinx": _pocketsphinx}
+
+RECOGNIZER_NAMES: Final = tuple(_RECOGNIZERS)
+"""Names of the recognisers that need no settings; the first is the default."""
+
+
+@functools.cache
+def find_recognizer(name: str = RECOGNIZER_NAMES[0]) -> Recognizer:
+    """Returns a recogniser by name, the same one for every call of a process.
+
+    Raises:
+        SpeechError: there is none of that name, or a package is missing.
+    """
+    if name not in _RECOGNIZERS:
+        known = ", ".join(RECOGNIZER_NAMES)
+        raise SpeechError(f"no recogniser {name!r}: {did_you_mean(name, RECOGNIZER_NAMES)}choose one of {known}")
+    return _RECOGNIZERS[name]()
