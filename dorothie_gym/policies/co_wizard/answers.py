@@ -95,7 +95,7 @@ def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
     state.say(judged(state, view, Proposition.of(Predicate.LIGHTS_ON)))
     if not view.lights:
         on = Proposition.of(Predicate.WILL, action=ActionValue.LIGHT_CHANGE)
-        state.say(intend(Function.INFORM, on, wording=Wording(lights=True), joined=True))
+        state.say(intend(Function.INFORM, on, wording=Wording(lights=True, topic="own_lights"), joined=True))
 
 
 def _more(

@@ -290,7 +290,7 @@ def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
     elif dark:
         state.intentions = state.intentions.with_lights(True)
         content = contents.action(ActionValue.LIGHT_CHANGE)
-        state.say(intend(Function.INFORM, content, wording=Wording(lights=True), joined=True))
+        state.say(intend(Function.INFORM, content, wording=Wording(lights=True, topic="own_lights"), joined=True))
 
 
 def _look_around(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
