@@ -104,7 +104,7 @@ def test_a_shadow_of_a_landmark_would_be_found(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("dorothie_gym.camera.town_scene.build_landmarks", unnamed)
     env = DuoWizardEnv("brookside", config=SYMBOLIC)
     with pytest.raises(AssertionError, match=r"the picture \w+ of participant differs"):
-        check_hidden_landmarks(env, play_scripted, 0, 60)
+        check_hidden_landmarks(env, play_scripted, 1, 60)
 
 
 def plant_clairvoyance(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,12 +27,12 @@ PARTICIPANT, CO_WIZARD, AD_WIZARD = range(3)
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Four sessions of the scripted roles, one of them held out."""
+    """Six sessions of the scripted roles, one of them held out."""
     root = tmp_path_factory.mktemp("corpus")
-    env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=120.0))
+    env = DuoWizardEnv("brookside", config=EnvConfig(max_seconds=150.0))
     policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
-    for seed in range(4):
-        play_session(env, policies, seed=seed, folder=root / ("train" if seed < 3 else "val/seen") / f"{seed:04}")
+    for seed in range(6):
+        play_session(env, policies, seed=seed, folder=root / ("train" if seed < 5 else "val/seen") / f"{seed:04}")
     return root
 
 
@@ -82,7 +82,7 @@ def test_cloned_actor_is_frozen_at_first(corpus: Path, tmp_path: Path) -> None:
 def test_progress_of_reading_a_corpus_is_reported(corpus: Path) -> None:
     reported: list[tuple[str, int, int]] = []
     read_demonstrations(corpus, "train", lambda *so_far: reported.append(so_far))
-    assert reported == [("Sessions of train", k, 3) for k in range(3)]
+    assert reported == [("Sessions of train", k, 5) for k in range(5)]
 
 
 def test_corpus_without_sessions_is_reported(tmp_path: Path) -> None:
