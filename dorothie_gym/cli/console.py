@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.completion import complete_storyboard, complete_town
-from dorothie_gym.cli.options import AsJson, WordErrors, needs
+from dorothie_gym.cli.completion import complete_town
+from dorothie_gym.cli.options import AsJson, Storyboard, WordErrors, needs
 from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stdout
 from dorothie_gym.cli.warm_up import compile_first
 
@@ -39,14 +39,7 @@ def console(
             autocompletion=complete_town,
         ),
     ] = None,
-    storyboard: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="Name of a storyboard, or a file (.json); default: drawn.",
-            autocompletion=complete_storyboard,
-        ),
-    ] = None,
+    storyboard: Storyboard = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first session; the next one has the next seed.")] = 0,
     roles: Annotated[
         str,

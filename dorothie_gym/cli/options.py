@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 from typer.core import TyperCommand
 
-from dorothie_gym.cli.completion import complete_policy, complete_town
+from dorothie_gym.cli.completion import complete_policy, complete_storyboard, complete_town
 from dorothie_gym.cli.output import fail
 from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.render_view import RenderView
@@ -36,6 +36,15 @@ SessionTown = Annotated[
         metavar="NAME|FILE",
         help="Town of the session, if it is not shipped (.xodr, .yaml).",
         autocompletion=complete_town,
+    ),
+]
+
+Storyboard = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="Name of a storyboard, or a file (.json); default: drawn.",
+        autocompletion=complete_storyboard,
     ),
 ]
 

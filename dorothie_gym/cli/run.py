@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.completion import complete_storyboard, complete_town
+from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import (
     AdWizard,
     AsJson,
@@ -19,6 +19,7 @@ from dorothie_gym.cli.options import (
     Participant,
     Perception,
     Speech,
+    Storyboard,
     View,
     WordErrors,
     env_config,
@@ -75,14 +76,7 @@ def run(
             metavar="NAME|FILE", help="A town's name, or a file (.xodr, .yaml).", autocompletion=complete_town
         ),
     ] = "brookside",
-    storyboard: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="Name of a storyboard, or a file (.json); default: drawn.",
-            autocompletion=complete_storyboard,
-        ),
-    ] = None,
+    storyboard: Storyboard = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed; equal seeds give equal sessions.")] = 0,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Record the session into this new folder.")] = None,
     picture: Annotated[

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition
-from dorothie_gym.ontology import ActionValue, DialogueAct, GoalStatus, LandmarkName, Slot, StreetName
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, Slot, StreetName
+
+QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
+"""Moves that ask for an answer about the drive."""
 
 
 def destination(place: LandmarkName | None, street: StreetName | None = None) -> Proposition:

@@ -5,19 +5,13 @@ Needs the extra `speech`; the packages are imported when a synthesiser or recogn
 
 from dorothie_gym.errors import AudioError, SpeechError
 from dorothie_gym.speech.audio import SAMPLE_RATE, Samples, checked_samples, encode_flac, read_audio, resample
+from dorothie_gym.speech.backends import RECOGNIZER_NAMES, SYNTHESIZER_NAMES, find_recognizer, find_synthesizer
 from dorothie_gym.speech.cabin_noise import CabinState, cabin_noise, mixed, pink_noise, signal_to_noise
 from dorothie_gym.speech.http_speech import HttpRecognizer, HttpSynthesizer
-from dorothie_gym.speech.recognizer import (
-    RECOGNIZER_NAMES,
-    Hypothesis,
-    Recognition,
-    RecognizedWord,
-    Recognizer,
-    find_recognizer,
-)
+from dorothie_gym.speech.recognizer import Hypothesis, Recognition, RecognizedWord, Recognizer
 from dorothie_gym.speech.spoken_form import spoken_words, written_form
 from dorothie_gym.speech.spoken_understanding import INAUDIBLE, SpokenUnderstanding, readable, understand_speech
-from dorothie_gym.speech.synthesizer import SYNTHESIZER_NAMES, Synthesizer, Voice, find_synthesizer, say
+from dorothie_gym.speech.synthesizer import Synthesizer, Voice, say
 from dorothie_gym.speech.whisper_recognizer import WhisperRecognizer
 
 __all__ = [

@@ -67,3 +67,13 @@ class HibariSynthesizer:
 def _as_word(text: str) -> str:
     """Returns a text with capitals that form a word in lower case: hibari spells "IKEA", but reads "Ikea"."""
     return _CAPITALS.sub(lambda found: found[0].capitalize(), text)
+
+
+@functools.cache
+def hibari() -> HibariSynthesizer:
+    """Returns the synthesiser, the same one for every call of a process: loading its voice takes time.
+
+    Raises:
+        SpeechError: the extra `speech` is not installed.
+    """
+    return HibariSynthesizer()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Protocol
 
 from dorothie_gym.copying import shared
-from dorothie_gym.errors import SpeechError, did_you_mean
 from dorothie_gym.speech.audio import Samples
 
 
@@ -81,28 +79,3 @@ class Recognizer(Protocol):
 def single_hypothesis(text: str) -> Recognition:
     """Returns the result of a recogniser that gives words only."""
     return Recognition(text=text, hypotheses=(Hypothesis(text=text, weight=1.0),) if text else ())
-
-
-def _pocketsphinx() -> Recognizer:
-    from dorothie_gym.speech.sphinx_recognizer import SphinxRecognizer
-
-    return SphinxRecognizer()
-
-
-_RECOGNIZERS: Final[Mapping[str, Callable[[], Recognizer]]] = {"pocketsphinx": _pocketsphinx}
-
-RECOGNIZER_NAMES: Final = tuple(_RECOGNIZERS)
-"""Names of the recognisers that need no settings; the first is the default."""
-
-
-@functools.cache
-def find_recognizer(name: str = RECOGNIZER_NAMES[0]) -> Recognizer:
-    """Returns a recogniser by name, the same one for every call of a process.
-
-    Raises:
-        SpeechError: there is none of that name, or a package is missing.
-    """
-    if name not in _RECOGNIZERS:
-        known = ", ".join(RECOGNIZER_NAMES)
-        raise SpeechError(f"no recogniser {name!r}: {did_you_mean(name, RECOGNIZER_NAMES)}choose one of {known}")
-    return _RECOGNIZERS[name]()

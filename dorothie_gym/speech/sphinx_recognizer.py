@@ -13,6 +13,7 @@ import numpy as np
 
 from dorothie_gym.speech.audio import SAMPLE_RATE, Samples, checked_samples, resample, to_pcm
 from dorothie_gym.speech.extras import speech_module
+from dorothie_gym.speech.hibari_synthesizer import hibari
 from dorothie_gym.speech.language import SpokenLanguage, load_language
 from dorothie_gym.speech.recognizer import Hypothesis, Recognition, RecognizedWord
 from dorothie_gym.speech.spoken_form import spoken_words
@@ -135,9 +136,4 @@ def _bare(word: str) -> str:
 
 
 def _phonemes(text: str) -> str:
-    from dorothie_gym.speech.hibari_synthesizer import HibariSynthesizer
-    from dorothie_gym.speech.synthesizer import find_synthesizer
-
-    speaker = find_synthesizer("hibari")
-    assert isinstance(speaker, HibariSynthesizer)
-    return speaker.phonemes(text)
+    return hibari().phonemes(text)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -121,34 +120,3 @@ def say(
         return samples
     shift = round(100 * voice.pitch)
     return np.asarray(resample_poly(samples, 100 * sample_rate, shift * synthesizer.sample_rate), dtype=np.float32)
-
-
-def _hibari() -> Synthesizer:
-    from dorothie_gym.speech.hibari_synthesizer import HibariSynthesizer
-
-    return HibariSynthesizer()
-
-
-def _flite() -> Synthesizer:
-    from dorothie_gym.speech.flite_synthesizer import FliteSynthesizer
-
-    return FliteSynthesizer()
-
-
-_SYNTHESIZERS: Final[Mapping[str, Callable[[], Synthesizer]]] = {"hibari": _hibari, "flite": _flite}
-
-SYNTHESIZER_NAMES: Final = tuple(_SYNTHESIZERS)
-"""Names of the synthesisers that run on this machine; the first is the default."""
-
-
-@functools.cache
-def find_synthesizer(name: str = SYNTHESIZER_NAMES[0]) -> Synthesizer:
-    """Returns a synthesiser by name, the same one for every call of a process.
-
-    Raises:
-        SpeechError: there is none of that name, or a package or program is missing.
-    """
-    if name not in _SYNTHESIZERS:
-        known = ", ".join(SYNTHESIZER_NAMES)
-        raise SpeechError(f"no synthesiser {name!r}: {did_you_mean(name, SYNTHESIZER_NAMES)}choose one of {known}")
-    return _SYNTHESIZERS[name]()

@@ -55,10 +55,9 @@ _STEERING = frozenset(
 )
 _COMMANDS = _STEERING | {ActionValue.STOP}
 _STOP_AHEAD = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
-_QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
-_SETTLED = _QUESTIONS | {DialogueMove.ALIGN}
+_SETTLED = contents.QUESTIONS | {DialogueMove.ALIGN}
 _PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
-_REPEATABLE = _QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
+_REPEATABLE = contents.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 
@@ -438,7 +437,7 @@ def _confusion(
     if not said:
         return
     last = said[-1]
-    repeats = last.act.move in _QUESTIONS or not last.act.slots
+    repeats = last.act.move in contents.QUESTIONS or not last.act.slots
     state.say(replace(last, text="", joined=False) if repeats else repeated(last, Function.CORRECTION))
 
 

@@ -46,7 +46,7 @@ STANDING_RANGE = 45.0
 PATIENT_TIME = 6.0
 """Standstill after which a car at the place, or one that is not guided, gets its next instruction [s]."""
 
-HERE = Wording(topic="here")
+_HERE = Wording(topic="here")
 """Wording of the statement that the place is right here."""
 
 _STOP = DialogueAct.of(DialogueMove.INSTRUCT, ActionValue.STOP)
@@ -88,9 +88,10 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
 
 
 def _choose_stop_words(state: ParticipantState, rng: np.random.Generator) -> None:
-    """Chooses the words to stop the car with: an instruction, or the statement that this is the place."""
-    points_out = not state.route.misses and rng.random() < state.style.points_out
-    act, wording = (_here(state).act, HERE) if points_out else (_STOP, Wording(here=True))
+    """Chooses the words to stop the car with: an instruction or, once, the statement that this is the place."""
+    first = not state.route.misses and state.guidance.stopped_at == -math.inf
+    points_out = first and rng.random() < state.style.points_out
+    act, wording = (_here(state).act, _HERE) if points_out else (_STOP, Wording(here=True))
     text = word_act(act, Role.PARTICIPANT, rng, wording, style=state.speech.style)
     state.guidance = state.guidance.with_stop_text(text, points_out=points_out)
 
@@ -99,7 +100,7 @@ def _here(state: ParticipantState) -> Remark:
     """Returns the statement that the place is right here, which makes a guided car stop."""
     place = None if state.task.goal is None else state.task.goal.name
     here = Proposition.of(Predicate.CLOSE, place=place)
-    return intend(CommunicativeFunction.INFORM, here, elided=("place",), wording=HERE, urgent=True)
+    return intend(CommunicativeFunction.INFORM, here, elided=("place",), wording=_HERE, urgent=True)
 
 
 def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:

@@ -12,7 +12,7 @@ from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, intend, repeated
 
-_WORTH_REPEATING = frozenset({DialogueMove.EXPLAIN, DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueMove.QUERY_W})
+_WORTH_REPEATING = contents.QUESTIONS | {DialogueMove.EXPLAIN}
 """Moves that the participant asks to have repeated."""
 
 _TAKES_UP = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.EXPLAIN, DialogueMove.QUERY_W})

@@ -47,8 +47,6 @@ from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, intend, repeate
 
 _ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 
-_QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK})
-
 _REPLIES = frozenset(
     {DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM}
 )
@@ -214,7 +212,7 @@ def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
 def _answers_question(state: ParticipantState, heard: HeardUtterance) -> bool:
     """Returns whether the car has answered the question that was asked last."""
     last = state.speech.last
-    return last is not None and last.act.move in _QUESTIONS and heard.acts[0].move in _REPLIES
+    return last is not None and last.act.move in contents.QUESTIONS and heard.acts[0].move in _REPLIES
 
 
 def _thank(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
