@@ -1,4 +1,4 @@
-"""What an agent can tell from its range of sight: what limits it, whether the camera fails, and which speed suits it.
+"""The range of sight of an agent: what limits it, whether the camera fails, and which speed suits it.
 
 No role observes the fault of a camera. A car knows how far its camera should see in the weather and light that it
 measures; from what is missing, it infers that the picture is blurred, or that there is none.
