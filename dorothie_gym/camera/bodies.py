@@ -68,6 +68,10 @@ def _copy(bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) ->
     _turn(bank.normals[row], c, s, body.rise, target.normals[at])
     if body.rise != 0.0:
         _shorten(target.normals[at])
+    for j in range(3):
+        for k in range(3):
+            target.components[3 * j + k, at] = target.corners[at, j, k]
+        target.components[9 + j, at] = target.normals[at, j]
     if bank.textures[row] != PLAIN:
         _turn(bank.u_axes[row], c, s, body.rise, target.u_axes[at])
         _turn(bank.v_axes[row], c, s, body.rise, target.v_axes[at])

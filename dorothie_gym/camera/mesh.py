@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,6 +57,8 @@ class Mesh(NamedTuple):
         surfaces: (n,) uint8 `Surface`.
         classes: (n,) uint8 semantic class, `ObjectClass`.
         instances: (n,) int32 key of the body, `TOWN` for none.
+        components: (12, n) float32 corners and normals again, one row for each component, which the projection reads:
+            neighbours in memory become vectors of the processor.
     """
 
     corners: NDArray[np.float32]
@@ -68,6 +70,7 @@ class Mesh(NamedTuple):
     surfaces: NDArray[np.uint8]
     classes: NDArray[np.uint8]
     instances: NDArray[np.int32]
+    components: NDArray[np.float32]
 
     @property
     def size(self) -> int:
@@ -76,12 +79,20 @@ class Mesh(NamedTuple):
 
     def part(self, rows: slice | NDArray[np.generic]) -> Mesh:
         """Returns some of the triangles."""
-        return Mesh._make(np.ascontiguousarray(column[rows]) for column in self)
+        return new_mesh(*(np.ascontiguousarray(column[rows]) for column in self[:-1]))
+
+
+def new_mesh(*columns: NDArray[Any]) -> Mesh:
+    """Returns a mesh of all columns of `Mesh` but its components."""
+    corners, normals, *others = columns
+    count = len(corners)
+    components = np.concatenate((corners.reshape(count, 9), normals), axis=1).T
+    return Mesh._make((corners, normals, *others, np.ascontiguousarray(components)))
 
 
 def empty_mesh(count: int = 0) -> Mesh:
     """Returns a mesh of `count` triangles without extent."""
-    return Mesh(
+    return new_mesh(
         np.zeros((count, 3, 3), np.float32), np.zeros((count, 3), np.float32), np.zeros((count, 4), np.float32),
         np.zeros((count, 4), np.float32), np.zeros((count, 3), np.uint8), np.zeros(count, np.int16),
         np.zeros(count, np.uint8), np.zeros(count, np.uint8), np.zeros(count, np.int32),
@@ -91,7 +102,7 @@ def empty_mesh(count: int = 0) -> Mesh:
 def joined(meshes: Iterable[Mesh]) -> Mesh:
     """Returns a mesh with the triangles of several, in their order."""
     parts = [empty_mesh(), *meshes]
-    return Mesh._make(np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return new_mesh(*(np.concatenate(columns) for columns in zip(*(part[:-1] for part in parts), strict=True)))
 
 
 class MeshBuilder:
@@ -303,7 +314,7 @@ class MeshBuilder:
         numbers = np.concatenate(self._numbers)[keep]
         colours = np.clip(np.rint(np.concatenate(self._colours)[keep]), 0, 255)
         u, v = (_axes(corners, normals, coordinates[..., k]) for k in (0, 1))
-        return Mesh(
+        return new_mesh(
             corners.astype(np.float32), normals.astype(np.float32), u.astype(np.float32), v.astype(np.float32),
             colours.astype(np.uint8), numbers[:, 0].astype(np.int16), numbers[:, 1].astype(np.uint8),
             numbers[:, 2].astype(np.uint8), numbers[:, 3].astype(np.int32),

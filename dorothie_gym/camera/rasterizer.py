@@ -130,16 +130,18 @@ def _project(view: View, mesh: Mesh, first: int, values: Array, count: int) -> N
     ux, uy, uz = focal * axes[1, 0], focal * axes[1, 1], focal * axes[1, 2]
     fx, fy, fz = axes[2, 0], axes[2, 1], axes[2, 2]
     wide, high, height = 0.5 * view.width, 0.5 * view.height, float(view.height)
-    corners, normals = mesh.corners[first : first + count], mesh.normals[first : first + count]
-    if corners.shape[1] != 3 or corners.shape[2] != 3 or normals.shape[1] != 3:
-        return  # never: it tells the compiler how far apart triangles lie
+    parts = mesh.components[:, first : first + count]
+    corner_ax, corner_ay, corner_az = parts[0], parts[1], parts[2]
+    corner_bx, corner_by, corner_bz = parts[3], parts[4], parts[5]
+    corner_cx, corner_cy, corner_cz = parts[6], parts[7], parts[8]
+    normal_x, normal_y, normal_z = parts[9], parts[10], parts[11]
     for k in range(count):
-        x, y, z = corners[k, 0, 0] - x0, corners[k, 0, 1] - y0, corners[k, 0, 2] - z0
-        offset = float(normals[k, 0]) * x + float(normals[k, 1]) * y + float(normals[k, 2]) * z
+        x, y, z = corner_ax[k] - x0, corner_ay[k] - y0, corner_az[k] - z0
+        offset = float(normal_x[k]) * x + float(normal_y[k]) * y + float(normal_z[k]) * z
         a_right, a_up, a = x * rx + y * ry + z * rz, x * ux + y * uy + z * uz, x * fx + y * fy + z * fz
-        x, y, z = corners[k, 1, 0] - x0, corners[k, 1, 1] - y0, corners[k, 1, 2] - z0
+        x, y, z = corner_bx[k] - x0, corner_by[k] - y0, corner_bz[k] - z0
         b_right, b_up, b = x * rx + y * ry + z * rz, x * ux + y * uy + z * uz, x * fx + y * fy + z * fz
-        x, y, z = corners[k, 2, 0] - x0, corners[k, 2, 1] - y0, corners[k, 2, 2] - z0
+        x, y, z = corner_cx[k] - x0, corner_cy[k] - y0, corner_cz[k] - z0
         c_right, c_up, c = x * rx + y * ry + z * rz, x * ux + y * uy + z * uz, x * fx + y * fy + z * fz
         is_outside = (
             (offset >= _BEHIND)  # seen from behind, or edge-on

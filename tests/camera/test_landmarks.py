@@ -83,7 +83,7 @@ def test_nothing_shows_which_house_or_person_is_a_goal(name: LandmarkName) -> No
     lots = (lot(),)
     known = build_landmarks([landmark(0, name, 0, label="House 1")], lots, FlatGround())
     goal = build_landmarks([landmark(3, name, 0, hidden=True, label="House 2")], lots, FlatGround())
-    for column, other in zip(known[:-1], goal[:-1], strict=True):
+    for column, other in zip(known._replace(instances=goal.instances), goal, strict=True):
         np.testing.assert_array_equal(column, other)
     letters = {int(texture) for texture, *_ in BRAND_SIGNS.values()} | set(range(len(Texture), 99))
     assert not letters & set(known.textures.tolist())

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.mesh import Mesh
+from dorothie_gym.camera.mesh import Mesh, new_mesh
 from dorothie_gym.maps.model import Array
 
 
@@ -70,14 +70,12 @@ def stamped(
     def repeated(column: NDArray[np.generic]) -> NDArray[np.generic]:
         return np.tile(column, count)
 
-    return Mesh._make(
-        (
-            corners.reshape(-1, 3, 3).astype(np.float32),
-            turned(template.normals).reshape(-1, 3).astype(np.float32),
-            axes[0].reshape(-1, 4).astype(np.float32),
-            axes[1].reshape(-1, 4).astype(np.float32),
-            colours.reshape(-1, 3).astype(np.uint8),
-            *(repeated(column) for column in (template.textures, template.surfaces, template.classes)),
-            repeated(template.instances),
-        )
+    return new_mesh(
+        corners.reshape(-1, 3, 3).astype(np.float32),
+        turned(template.normals).reshape(-1, 3).astype(np.float32),
+        axes[0].reshape(-1, 4).astype(np.float32),
+        axes[1].reshape(-1, 4).astype(np.float32),
+        colours.reshape(-1, 3).astype(np.uint8),
+        *(repeated(column) for column in (template.textures, template.surfaces, template.classes)),
+        repeated(template.instances),
     )
