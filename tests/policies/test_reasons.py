@@ -38,14 +38,15 @@ def answer(talk: Talk, view: CoWizardView, *values) -> DialogueAct:
 
 def test_standstill_is_explained_by_hazard():
     talk = on_the_way()
-    hazard = {"motion": np.int64(Motion.HAZARD), "hazard": np.int64(ObjectClass.PEDESTRIAN.value)}
+    hazard = {"motion": np.int64(Motion.HAZARD), "hazard": np.int64(ObjectClass.PEDESTRIAN.value), "speed": np.zeros(1)}
     assert answer(talk, view_of(talk, **hazard), ActionValue.STOP).slots == {ObjectClass.PEDESTRIAN}
 
 
 def test_stop_for_red_light_is_remembered_as_reason():
     talk = on_the_way()
     red = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT)
-    talk.state.commands = replace(talk.state.commands, standing_since=view_of(talk).time - 9.0).with_reason(red)
+    since = view_of(talk).time - 9.0
+    talk.state.commands = replace(talk.state.commands, standing_since=since).with_reason(red, since)
     stopped = view_of(talk, motion=np.int64(Motion.STOPPED), speed=np.zeros(1))
     assert answer(talk, stopped, ActionValue.STOP).slots == {ObjectClass.TRAFFIC_LIGHT}
 
@@ -53,13 +54,14 @@ def test_stop_for_red_light_is_remembered_as_reason():
 def test_reason_for_a_stop_is_told_in_the_past_when_the_car_drives_again():
     talk = on_the_way()
     red, now = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT), view_of(talk).time
-    talk.state.commands = replace(talk.state.commands, standing_since=None, stood_until=now - 5.0).with_reason(red)
+    stood = replace(talk.state.commands, standing_since=None, stood_until=now - 5.0)
+    talk.state.commands = stood.with_reason(red, now - 12.0)
     driving = view_of(talk, **DRIVING)
     assert answer(talk, driving, ActionValue.STOP).slots == {ObjectClass.TRAFFIC_LIGHT}
     reply = talk.state.speech.queue[0]
     (because,) = reply.meaning
     assert because.predicate is Predicate.BECAUSE and because.get("cause") == red
-    assert because.get("at") == round(now - 5.0)
+    assert because.get("at") == round(now - 12.0), "when the reason held"
     text = word_act(reply.act, Role.CO_WIZARD, np.random.default_rng(0), reply.wording)
     assert "was red" in text.lower()
 
@@ -67,7 +69,8 @@ def test_reason_for_a_stop_is_told_in_the_past_when_the_car_drives_again():
 def test_stop_long_ago_is_not_explained_by_its_reason():
     talk = on_the_way()
     red, now = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT), view_of(talk).time
-    talk.state.commands = replace(talk.state.commands, standing_since=None, stood_until=now - 300.0).with_reason(red)
+    stood = replace(talk.state.commands, standing_since=None, stood_until=now - 300.0)
+    talk.state.commands = stood.with_reason(red, now - 310.0)
     answer(talk, view_of(talk, **DRIVING), ActionValue.STOP)
     (said,) = talk.state.speech.queue[0].meaning
     assert said == Proposition.of(Predicate.STANDS, action=ActionValue.STOP, negated=True)

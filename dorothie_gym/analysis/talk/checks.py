@@ -18,7 +18,7 @@ from dorothie_gym.analysis.units import Units
 from dorothie_gym.dialogue import ASKED, Predicate, Proposition
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.ontology import DialogueMove, LandmarkName
+from dorothie_gym.ontology import DialogueMove, LandmarkName, Slot
 from dorothie_gym.recording import Corpus, EventType, MoveRecord, Session
 from dorothie_gym.tasks.purposes import find_items, read_people
 
@@ -154,8 +154,17 @@ def _check_answers(checks: TalkChecks, session: Session) -> None:
             asked = move
         elif asked is not None and move.speaker is not asked.speaker and move.act.move in _ANSWERS and move.meaning:
             if move.start - asked.end <= ANSWERED_WITHIN:
-                checks.add("relevance", _is_about(move.meaning[0], asked.meaning[0]))
+                checks.add("relevance", _is_about(move.meaning[0], _as_said(asked)))
             asked = None
+
+
+def _as_said(asked: MoveRecord) -> Proposition:
+    """Returns what a question asks, without a place that its words leave out: "is this it?"."""
+    question = asked.meaning[0]
+    named = question.get("place") in (None, *asked.act.values(Slot.LANDMARK))
+    if named or question.predicate is not Predicate.ARRIVED:
+        return question
+    return Proposition.of(question.predicate, negated=question.negated)
 
 
 def _is_about(answer: Proposition, question: Proposition) -> bool:

@@ -160,14 +160,32 @@ class SessionWorld:
 
     def _distances(self, time: float, kinds: Sequence[ActorKind]) -> NDArray[np.float64]:
         """Returns the distances of the recorded actors of some kinds (n,) [m]."""
+        offsets = self._offsets(time, kinds)
+        return np.hypot(offsets[:, 0], offsets[:, 1])
+
+    def _offsets(self, time: float, kinds: Sequence[ActorKind]) -> NDArray[np.float64]:
+        """Returns the positions of the recorded actors of some kinds relative to the car (n, 2) [m]."""
         table = self.session.scene.actors
         place = bisect.bisect_right(table.frames.tolist(), round(time * FRAME_RATE)) - 1
         if place < 0:
-            return np.empty(0)
+            return np.empty((0, 2))
         rows = table.rows[int(table.offsets[place]) : int(table.offsets[place + 1])]
         rows = rows[np.isin(rows["kind"], [int(kind) for kind in kinds])]
         x, y = self.position(time)
-        return np.hypot(rows["x"] - x, rows["y"] - y)
+        return np.column_stack((rows["x"] - x, rows["y"] - y)).astype(np.float64)
+
+    def is_ahead(self, time: float, kinds: Sequence[ActorKind], distance: float, angle: float) -> bool:
+        """Returns whether a recorded actor of some kinds is in front of the car at a time [s].
+
+        Args:
+            time: [s].
+            kinds: of the actors.
+            distance: largest distance from the middle of the car [m].
+            angle: largest angle to its heading [degrees].
+        """
+        offsets, heading = self._offsets(time, kinds), float(self.row(time)["heading"])
+        angles = np.abs(wrap_degrees(np.degrees(np.arctan2(offsets[:, 1], offsets[:, 0]) - heading)))
+        return bool(((np.hypot(*offsets.T) <= distance) & (angles <= angle)).any())
 
     def hazards(self, time: float, around: float) -> set[str]:
         """Returns the labels of the objects that the car brakes for within some seconds of a time [s]."""

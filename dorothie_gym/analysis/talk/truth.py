@@ -45,6 +45,8 @@ _NOW: Final = 4.0  # time within which "now" may lie [s]
 _FADING: Final = 16  # time for which a fault is felt after its end [s]
 _CHANGED: Final = 0.15  # share of a parameter's range that is a change
 _CROWD: Final = 3  # least number in a crowd
+_IN_FRONT: Final = 15.0  # largest distance from the middle of the car to what it stands behind [m]
+_AHEAD: Final = 25.0  # and its largest angle to the heading [degrees]
 _TOLD: Final = 60.0  # longest time between an order and what it explains [s]
 
 Evaluator = Callable[[SessionWorld, Proposition, float, Role], bool | None]
@@ -280,9 +282,17 @@ def _red(world: SessionWorld, cause: Proposition, time: float) -> bool | None:
     return label in world.hazards(time, _NOW) or any(world.light_is_red(time + shift) for shift in shifts)
 
 
+_OBSTACLES: Final = {**ACTORS, ObjectClass.TRAFFIC_SIGN: ACTORS[ObjectClass.STATIC]}  # a sign on the road is a prop
+
+
 def _hinders(world: SessionWorld, cause: Proposition, time: float) -> bool | None:
+    """Whether the car brakes for something, or stands right behind it, which it may have braked for something else."""
     kind = cause.get("object")
-    return kind.label in world.hazards(time, 2.0 * _NOW) if isinstance(kind, ObjectClass) else None
+    if not isinstance(kind, ObjectClass):
+        return None
+    shifts = (-_NOW, -2.0, 0.0)
+    in_front = any(world.is_ahead(time + shift, _OBSTACLES.get(kind, ()), _IN_FRONT, _AHEAD) for shift in shifts)
+    return in_front or kind.label in world.hazards(time, 2.0 * _NOW)
 
 
 def _told(world: SessionWorld, cause: Proposition, time: float) -> bool | None:

@@ -145,8 +145,12 @@ def answer_open(
         else:
             located = Proposition.of(Predicate.LOCATED, place=mark.name, street=mark.street)
             state.say(intend(Function.ANSWER, located, elided=("place",)))
-    else:
+    elif StreetName.QUERIED in act.values(Slot.STREET) or (
+        asked is not None and asked.predicate is Predicate.ON_STREET
+    ):
         _name_street(state, view)
+    else:
+        state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
 
 
 def _say_time(state: CoWizardState, view: CoWizardView) -> None:
@@ -162,7 +166,8 @@ def _say_time(state: CoWizardState, view: CoWizardView) -> None:
 def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
     """Answers why the car stands, or has just stood."""
     commands, stands = state.commands, Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
-    if view.standing or view.motion is Motion.HAZARD:
+    stood = view.time - commands.stood_until < RECENT_STOP
+    if view.standing or (view.motion is Motion.HAZARD and not stood):
         reason = reason_to_stand(state, view) or commands.reason
         if reason is not None and reason.predicate is Predicate.GOAL:
             state.say(intend(Function.SET_QUESTION, Proposition.of(Predicate.GOAL, place=LandmarkName.QUERIED)))
@@ -172,8 +177,9 @@ def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
         if reason is not None:
             state.dialogue = state.dialogue.after_explaining_hazard(view.time)
         _explain(state, stands, reason)
-    elif view.time - commands.stood_until < RECENT_STOP:
-        _explain(state, stands, commands.reason, at=round(commands.stood_until))
+    elif stood:
+        since = commands.reason_since if commands.reason is not None else commands.stood_until
+        _explain(state, stands, commands.reason, at=round(since))
     else:
         state.say(intend(Function.ANSWER, stands.opposite, elided=("action",)))
 

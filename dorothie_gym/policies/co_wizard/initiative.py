@@ -36,6 +36,9 @@ _HANDLED = frozenset(
 )
 """Parameters of the weather that have a reaction of their own."""
 
+HAZARD_EXPIRES = 4.0
+"""Time within which what the car stands for is mentioned [s]."""
+
 _CAUTION = 5  # by which a gentle driver is slower than the sight allows [km/h]
 
 _WISHED = {
@@ -225,7 +228,8 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
     because = Proposition.of(Predicate.BECAUSE, effect=stands, cause=reason)
     full = resting or rng.random() < 0.3
     wording = Wording(topic="because_standing" if full else "because")
-    explained = intend(Function.INFORM, because, elided=() if full else ("effect",), wording=wording)
+    elided = () if full else ("effect",)
+    explained = intend(Function.INFORM, because, elided=elided, wording=wording, expires=view.time + HAZARD_EXPIRES)
     state.say(explained, *plan_remark(state, view, rng, joined=True))
 
 

@@ -344,6 +344,7 @@ class CommandState:
     Attributes:
         standing_since: start of the present standstill [s]; None while the car moves.
         reason: why the car stands, or stood last, as far as the Co-Wizard knows.
+        reason_since: since when it has stood for this reason [s].
         stood_until: end of the last standstill [s].
         turn_sent: lane and angle of the last turn commanded [-, degrees].
         turn_sent_at: time of that command [s].
@@ -357,6 +358,7 @@ class CommandState:
 
     standing_since: float | None = 0.0
     reason: Proposition | None = None
+    reason_since: float = -math.inf
     stood_until: float = -math.inf
     turn_sent: tuple[int, int] = (-1, 0)
     turn_sent_at: float = -math.inf
@@ -377,9 +379,9 @@ class CommandState:
             return self if self.standing_since is None else replace(self, standing_since=None, stood_until=now)
         return replace(self, standing_since=now, reason=None) if self.standing_since is None else self
 
-    def with_reason(self, reason: Proposition | None) -> CommandState:
+    def with_reason(self, reason: Proposition | None, now: float) -> CommandState:
         """Notes why the car stands; a reason that is not known any more stays."""
-        return self if reason is None or reason == self.reason else replace(self, reason=reason)
+        return self if reason is None or reason == self.reason else replace(self, reason=reason, reason_since=now)
 
     def after_stop(self, now: float) -> CommandState:
         """Records a Stop command."""

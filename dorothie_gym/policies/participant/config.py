@@ -42,7 +42,7 @@ class ParticipantConfig(GuidanceConfig):
         take_over_distance: distance to a described goal at which guidance begins [m].
         corner_distance: distance to a junction within which a goal right behind it is easily missed [m].
         behind_corner: distance from the junction to such a goal [m].
-        careful_speed: speed asked for where the goal is easily missed [km/h].
+        careful_speeds: speeds asked for where the goal is easily missed [km/h].
         manoeuvre_cost: extra cost of each lane change and U-turn on a way that is to be described in words [m].
         run_up: least distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
@@ -101,7 +101,7 @@ class ParticipantConfig(GuidanceConfig):
     take_over_distance: float = 130.0
     corner_distance: float = 50.0
     behind_corner: float = 55.0
-    careful_speed: float = 15.0
+    careful_speeds: tuple[float, ...] = (10.0, 15.0, 15.0, 20.0)
     manoeuvre_cost: float = 60.0
     run_up: float = 45.0
     run_up_per_lane: float = 50.0
@@ -192,9 +192,9 @@ class ParticipantStyle:
             guides=0.15 if by_turns else 0.02,
             names_goal=within(0.85, 1.0, persona.certainty, rng),
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
-            hurries=within(0.75, 0.2, persona.patience, rng),
+            hurries=within(0.6, 0.12, persona.patience, rng),
             patience=within(7.0, 14.0, persona.patience, rng),
-            chat=within(160.0, 75.0, (persona.talkativeness + persona.humour) / 2.0, rng),
+            chat=within(190.0, 90.0, (persona.talkativeness + persona.humour) / 2.0, rng),
             waits=within(0.4, 0.8, persona.patience, rng) + 0.15 * vague,
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
             reasons=within(0.05, 0.3, persona.talkativeness, rng) + 0.15 * landmarks,

@@ -183,12 +183,25 @@ def _report_changed(
     was_announced = task.announced
     state.forget_target()
     state.speech = state.speech.cleared()
-    if was_announced and former.name is not landmark.name:
-        _aim_at(state, view, new, landmark)
-        state.task = state.task.after_announcement(view.time)
+    if not was_announced:
+        return
+    _aim_at(state, view, new, landmark)
+    state.task = state.task.after_announcement(view.time)
+    if former.name is landmark.name:
+        _report_same_place(state, view, former, landmark, rng)
+    else:
         dropped = contents.errand(former.name, GoalStatus.ABANDONED)
         instead = contents.errand(landmark.name, GoalStatus.ONGOING)
         state.say(intend(Function.REQUEST, instead, dropped, wording=Wording(dropped=former.name), urgent=True))
+
+
+def _report_same_place(
+    state: ParticipantState, view: ParticipantView, former: SeenLandmark, landmark: SeenLandmark,
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Tells what else is to be done at the target, or which place of its name is meant now."""
+    reason = story_remark(state, view, rng) if former.place == landmark.place else ()
+    state.say(*(reason or (intend(Function.REQUEST, contents.destination(landmark.name, landmark.street)),)))
 
 
 # --- target ---------------------------------------------------------------------------------------------------------

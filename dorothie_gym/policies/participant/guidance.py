@@ -139,7 +139,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
     if step is None:
         return
     key, distance, words = step
-    if _slow_down_early(state, view) or (key[0] == "round" and _takes_run_up(state, view)):
+    if _slow_down_early(state, view, rng) or (key[0] == "round" and _takes_run_up(state, view)):
         return
     near = distance < (_u_turn_distance(state, view) if key[0] == "round" else config.turn_distance)
     if _is_left_to_ask(state, view, key, distance, words.wording.direction is Direction.STRAIGHT, rng):
@@ -219,7 +219,7 @@ def _is_left_to_ask(
     return distance > state.config.turn_late_distance or goes_straight
 
 
-def _slow_down_early(state: ParticipantState, view: ParticipantView) -> bool:
+def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> bool:
     """Asks the car to slow down for a place that was missed before, or is easily missed behind a manoeuvre."""
     progress, config = state.route.progress, state.config
     assert progress is not None
@@ -229,7 +229,7 @@ def _slow_down_early(state: ParticipantState, view: ParticipantView) -> bool:
     if not state.route.misses and not _is_easily_missed(state, view):
         return False
     state.guidance = state.guidance.after_slowing_early()
-    wording = Wording(faster=False, speed=config.careful_speed)
+    wording = Wording(faster=False, speed=float(rng.choice(config.careful_speeds)))
     state.say(order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording))
     return True
 

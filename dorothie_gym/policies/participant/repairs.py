@@ -60,15 +60,16 @@ def correction(state: ParticipantState, view: ParticipantView, act: DialogueAct,
 
 
 def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None:
-    """Returns the place again if another one was taken up."""
+    """Returns the place again if another one was taken up, or this one was given up."""
     goal = state.task.goal
     assert goal is not None
     named = {value for value in act.values(Slot.LANDMARK) if value.label not in ("Unknown", "Queried")}
     said = {value for item in state.speech.said for value in item.act.slots}
     dropped = {item.wording.dropped for item in state.speech.said}
-    if not named or goal.name in named:
+    gives_up = named == {goal.name} and act.values(Slot.STATUS) == (GoalStatus.ABANDONED,)
+    if not named or (goal.name in named and not gives_up):
         return None
-    if named & (said | dropped) and not _revives(state, act, named):
+    if not gives_up and named & (said | dropped) and not _revives(state, act, named):
         return None
     if act.move is DialogueMove.EXPLAIN and GoalStatus.UNKNOWN not in act.slots:
         return None  # a remark about something in sight

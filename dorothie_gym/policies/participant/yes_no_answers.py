@@ -165,7 +165,10 @@ def answer_yes_no(
         goal = state.task.goal
         arriving = not act.slots and goal is not None and view.standing and about_to_arrive(state, view)
         place = Proposition.of(Predicate.ARRIVED, place=goal.name) if arriving and goal is not None else None
-        asked = words.asked or place or contents.action(ActionValue.UNKNOWN)
+        asked = words.asked or place or (checked(state, act, words) if act.slots else None)
+        if asked is None:
+            state.say_first(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
+            return
         unsure = (_short(Function.UNCERTAIN_ANSWER, asked),) if rng.random() < state.config.unsure else ()
         yes = _short(Function.AFFIRMATIVE_ANSWER, asked)
         state.say_first(*unsure, yes, *(() if unsure else addition(state, view, rng)))
@@ -178,8 +181,9 @@ def _asks_about_finished(
     place = state.task.finished[0]
     if not view.standing or not has_just_finished(state, view, (place,)):
         return False
-    asks = words.asked is None or words.asked.predicate is Predicate.ARRIVED
-    return asks and act.slots <= {place}
+    if words.asked is not None:
+        return words.asked.predicate is Predicate.ARRIVED and act.slots <= {place}
+    return act.slots == {place}
 
 
 def has_just_finished(state: ParticipantState, view: ParticipantView, landmarks: Collection[object]) -> bool:
