@@ -73,8 +73,8 @@ def inconsistencies(session: Session, units: Units | None = None) -> tuple[str, 
     """Returns one sentence for each fault of the annotation, beginning with its place; empty if it is consistent.
 
     An exchange starts with an initiating move, every response has an exchange, and exchanges and transactions equal, in
-    number and act by act, those that the rules derive. The last does not hold for sessions that people have annotated, by
-    other rules.
+    number and act by act, those that the rules derive. The last is not required of sessions that people have
+    annotated.
 
     Args:
         session: any.

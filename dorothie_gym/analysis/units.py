@@ -51,8 +51,8 @@ class Units:
         session: the session.
         utterances: utterances of participant and Co-Wizard, in the order of their ends.
         states: final state of each exchange, by number; empty for sessions that people have annotated.
-        marked_exceptions: kind of exception that an exchange handles ("environmental", "task", "none"), by number, where
-            people have marked it.
+        marked_exceptions: kind of exception that an exchange handles ("environmental", "task" or "none"), by number,
+            where people have marked it.
     """
 
     def __init__(self, session: Session) -> None:

@@ -8,7 +8,6 @@ stand behind its number at its first span.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeAlias
 
@@ -54,11 +53,10 @@ class _Document:
 
     def tier(self, name: str, speaker: Role, annotator: str, kind: str, parent: str | None = None) -> Element:
         """Appends a tier."""
-        settings = {} if parent is None else {"PARENT_REF": parent}
-        return etree.SubElement(
-            self.root, "TIER", TIER_ID=name, PARTICIPANT=speaker.value, ANNOTATOR=annotator, LINGUISTIC_TYPE_REF=kind,
-            **settings,
-        )  # fmt: skip
+        settings = {"TIER_ID": name, "PARTICIPANT": speaker.value, "ANNOTATOR": annotator, "LINGUISTIC_TYPE_REF": kind}
+        if parent is not None:
+            settings["PARENT_REF"] = parent
+        return etree.SubElement(self.root, "TIER", settings)
 
     def slot(self, seconds: float) -> str:
         """Appends a time [s]; returns its name."""
@@ -66,11 +64,11 @@ class _Document:
         etree.SubElement(self._times, "TIME_SLOT", TIME_SLOT_ID=name, TIME_VALUE=str(max(round(1000 * seconds), 0)))
         return name
 
-    def annotate(self, tier: Element, kind: str, value: str, **references: str) -> str:
+    def annotate(self, tier: Element, kind: str, value: str, references: Mapping[str, str]) -> str:
         """Appends an annotation to a tier; returns its name."""
         self._annotations += 1
         name = f"a{self._annotations}"
-        one = etree.SubElement(etree.SubElement(tier, "ANNOTATION"), kind, ANNOTATION_ID=name, **references)
+        one = etree.SubElement(etree.SubElement(tier, "ANNOTATION"), kind, {"ANNOTATION_ID": name, **references})
         etree.SubElement(one, "ANNOTATION_VALUE").text = value
         return name
 
@@ -91,12 +89,11 @@ def write_elan(path: Path, text: SourceText, annotation: Annotation, annotator: 
         raise AnnotationError(f"session {text.session} cannot be written as ELAN: {error}") from None
     root = document.root
     for name, constraint in _types():
-        settings = {} if constraint is None else {"CONSTRAINTS": constraint}
         aligned = "true" if constraint is None else "false"
-        etree.SubElement(
-            root, "LINGUISTIC_TYPE", LINGUISTIC_TYPE_ID=name, TIME_ALIGNABLE=aligned, GRAPHIC_REFERENCES="false",
-            **settings,
-        )  # fmt: skip
+        settings = {"LINGUISTIC_TYPE_ID": name, "TIME_ALIGNABLE": aligned, "GRAPHIC_REFERENCES": "false"}
+        if constraint is not None:
+            settings["CONSTRAINTS"] = constraint
+        etree.SubElement(root, "LINGUISTIC_TYPE", settings)
     for stereotype, description in _STEREOTYPES.items():
         etree.SubElement(root, "CONSTRAINT", STEREOTYPE=stereotype, DESCRIPTION=description)
     etree.indent(root)
@@ -131,9 +128,7 @@ def _write_speaker(
     name = speaker.value
     utterances = document.tier(name, speaker, annotator, "utterances")
     spans = document.tier(f"{name} {SPANS}", speaker, annotator, SPANS, name)
-    layers = {
-        layer: document.tier(f"{name} {layer}", speaker, annotator, layer, f"{name} {SPANS}") for layer in LAYERS
-    }
+    layers = {layer: document.tier(f"{name} {layer}", speaker, annotator, layer, f"{name} {SPANS}") for layer in LAYERS}
     over = 0.0
     for line in text.lines:
         if line.id.speaker is not speaker:
@@ -141,14 +136,14 @@ def _write_speaker(
         start = max(line.start, over)  # annotations of a tier do not overlap
         over = max(line.end, start + 0.001)
         slots = {"TIME_SLOT_REF1": document.slot(start), "TIME_SLOT_REF2": document.slot(over)}
-        parent = document.annotate(utterances, "ALIGNABLE_ANNOTATION", " ".join(line.words), **slots)
-        first, before = 0, {}
+        parent = document.annotate(utterances, "ALIGNABLE_ANNOTATION", " ".join(line.words), slots)
+        first, before = 0, dict[str, str]()
         for span in annotation.utterances[line.id]:
             words = line.text(first, span.words)
-            of = document.annotate(spans, "REF_ANNOTATION", words, ANNOTATION_REF=parent, **before)
+            of = document.annotate(spans, "REF_ANNOTATION", words, {"ANNOTATION_REF": parent, **before})
             before = {"PREVIOUS_ANNOTATION": of}
             for layer, value in _values(span, annotation, {key for key, at in firsts.items() if at == (line, first)}):
-                document.annotate(layers[layer], "REF_ANNOTATION", value, ANNOTATION_REF=of)
+                document.annotate(layers[layer], "REF_ANNOTATION", value, {"ANNOTATION_REF": of})
             first += span.words
 
 
@@ -160,7 +155,7 @@ def _values(span: SpanMark, annotation: Annotation, begun: set[tuple[str, int]])
         labels = DialogueAct(DialogueMove.IRRELEVANT, span.slots).slot_labels()
         yield "slots", "; ".join(f"{slot}={'+'.join(values)}" for slot, values in labels.items())
     if span.exchange is not None:
-        fields = {}
+        fields: dict[str, str | None] = {}
         if ("exchanges", span.exchange) in begun:
             mark = annotation.exchanges.get(span.exchange, ExchangeMark())
             fields = {"exception": mark.exception, "end": mark.end}

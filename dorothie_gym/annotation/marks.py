@@ -1,4 +1,4 @@
-"""Marks of an annotator: spans of utterances with moves and slots, and the exchanges and transactions they belong to."""
+"""Marks of an annotator: spans of utterances with moves, slots, exchanges and transactions, and marks of these units."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
@@ -68,7 +69,7 @@ def _word_counts(record: UtteranceRecord, line: SourceLine, session: str) -> lis
     if acts == 1:
         return [total]
     spans = [move.span.split() for move in record.moves]
-    if sum(spans, []) == list(line.words) and all(spans):
+    if tuple(itertools.chain.from_iterable(spans)) == line.words and all(spans):
         return [len(words) for words in spans]
     if all(move.span == record.text for move in record.moves) and acts <= total:
         return [(k + 1) * total // acts - k * total // acts for k in range(acts)]
@@ -127,9 +128,7 @@ def relabelled(session: Session, text: SourceText, annotation: Annotation, annot
     missing = next(annotation.undecided(text), None)
     if missing is not None:
         raise AnnotationError(f"session {session.name}, annotation by {annotator}: {missing} has no move yet")
-    return with_labels(
-        session, text, annotation, {**session.header.extra, ANNOTATION_FIELD: {"annotator": annotator}}
-    )
+    return with_labels(session, text, annotation, {**session.header.extra, ANNOTATION_FIELD: {"annotator": annotator}})
 
 
 def with_labels(
@@ -222,4 +221,3 @@ def _counts(session: Session, annotation: Annotation) -> Mapping[str, object] | 
         "transactions": len({span.transaction for span in spans} - {None}),
     }
     return {**session.summary, **{name: count for name, count in counts.items() if name in session.summary}}
-

@@ -14,7 +14,6 @@ from dorothie_gym.recording.file_names import MAX_FRAME
 from dorothie_gym.recording.json_io import Fields, canonical, canonical_object, from_line, to_line
 from dorothie_gym.sim.config import FRAME_RATE
 
-
 EXCHANGE_UNIT: Final = "exchange_unit"
 """Field of the first dialogue move of an exchange, where people have annotated it: exception ("environmental", "task",
 "none" or null) that the exchange handles, end ("fulfilled", "abandoned" or null)."""
