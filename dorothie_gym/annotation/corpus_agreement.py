@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,21 +38,33 @@ class CorpusAgreement:
             "annotators": list(self.annotators),
             "sessions": self.sessions,
             "pairs": [
-                {
-                    "annotators": list(names),
-                    "sessions": sessions,
-                    "utterances": each.utterances,
-                    "spans": {"agreement": each.spans, "equal": each.equal_spans},
-                    "moves": {"kappa": each.moves_of_equal_spans, "spans": each.equal_spans},
-                    "moves_of_pieces": {"kappa": each.moves, "pieces": each.pieces},
-                    "slots": {"kappa": each.slots, "pieces": each.pieces},
-                }
+                {"annotators": list(names), "sessions": sessions, **figures_of(each)}
                 for names, (sessions, each) in self.pairs.items()
             ],
             "alpha": None
             if self.alpha is None
             else {"moves": self.alpha.moves, "slots": self.alpha.slots, "pieces": self.alpha.pieces},
         }
+
+
+def figures_of(pair: Agreement) -> dict[str, object]:
+    """Returns the figures of two annotators in JSON types."""
+    return {
+        "utterances": pair.utterances,
+        "spans": {"agreement": pair.spans, "equal": pair.equal_spans},
+        "moves": {"kappa": pair.moves_of_equal_spans, "spans": pair.equal_spans},
+        "moves_of_pieces": {"kappa": pair.moves, "pieces": pair.pieces},
+        "slots": {"kappa": pair.slots, "pieces": pair.pieces},
+    }
+
+
+def pair_agreement(text: SourceText, annotations: Mapping[str, Annotation]) -> dict[tuple[str, str], Agreement]:
+    """Returns the agreement of each two annotators of a session."""
+    labels = {name: each.labels(text) for name, each in annotations.items()}
+    return {
+        (first, second): agreement_of(labels[first], labels[second])
+        for first, second in itertools.combinations(labels, 2)
+    }
 
 
 def corpus_agreement(
@@ -98,14 +111,12 @@ def corpus_agreement(
         for name in names
     }
     pairs = {}
-    for k, first in enumerate(names):
-        for second in names[k + 1 :]:
-            common = [
-                (a, b) for a, b in zip(labels[first], labels[second], strict=True) if a is not None and b is not None
-            ]
-            sessions = sum(first in each and second in each for each in found)
-            if common:
-                pairs[first, second] = sessions, agreement_of([a for a, _ in common], [b for _, b in common])
+    for first, second in itertools.combinations(names, 2):
+        judged = zip(labels[first], labels[second], strict=True)
+        common = [(a, b) for a, b in judged if a is not None and b is not None]
+        sessions = sum(first in each and second in each for each in found)
+        if common:
+            pairs[first, second] = sessions, agreement_of([a for a, _ in common], [b for _, b in common])
     alpha = alpha_of([labels[name] for name in names]) if with_alpha else None
     return CorpusAgreement(annotators=names, sessions=len(found), pairs=pairs, alpha=alpha)
 

@@ -1,4 +1,4 @@
-"""Marks of an annotator: spans of utterances with moves, slots, exchanges and transactions, and marks of these units."""
+"""Marks of an annotator: spans of utterances with moves and slots, and the exchanges and transactions of the spans."""
 
 from __future__ import annotations
 
