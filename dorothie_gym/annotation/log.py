@@ -21,11 +21,9 @@ from dorothie_gym.annotation.rows import ChangeRows, change_of, rows_of
 from dorothie_gym.annotation.source_text import SourceText
 from dorothie_gym.errors import AnnotationError, SessionError, one_line
 from dorothie_gym.input_files import check_value_count, raising
+from dorothie_gym.recording.file_names import ANNOTATIONS_FOLDER
 from dorothie_gym.recording.header import parse_version
 from dorothie_gym.recording.json_io import decode_text, read_bytes
-
-FOLDER: Final = "annotations"
-"""Folder of the logs in the folder of a session."""
 
 ADJUDICATED: Final = "adjudicated"
 """Name of the log of the final version."""
@@ -102,12 +100,12 @@ def check_name(name: str) -> str:
 
 def log_path(folder: Path, name: str) -> Path:
     """Returns the log of an annotator of the session in a folder."""
-    return folder / FOLDER / f"{name}.jsonl"
+    return folder / ANNOTATIONS_FOLDER / f"{name}.jsonl"
 
 
 def annotators_of(folder: Path) -> tuple[str, ...]:
     """Returns the names of the annotators of the session in a folder, without the final version."""
-    found = (path.stem for path in (folder / FOLDER).glob("*.jsonl") if _NAME.fullmatch(path.stem))
+    found = (path.stem for path in (folder / ANNOTATIONS_FOLDER).glob("*.jsonl") if _NAME.fullmatch(path.stem))
     return tuple(sorted(name for name in found if name.lower() not in (ADJUDICATED, RECORDED)))
 
 

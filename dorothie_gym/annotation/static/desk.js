@@ -62,8 +62,8 @@ export class Desk {
 
   addKeys() {
     const { keys } = this;
-    keys.add('ArrowDown', 'Next span (also J)', () => this.move(1));
-    keys.add('ArrowUp', 'Previous span (also K)', () => this.move(-1));
+    keys.add('ArrowDown', 'Next span', () => this.move(1));
+    keys.add('ArrowUp', 'Previous span', () => this.move(-1));
     keys.add('j', 'Next span', () => this.move(1));
     keys.add('k', 'Previous span', () => this.move(-1));
     keys.add('Enter', 'Accept the suggestion, and go to the next undecided span', () => this.accept());
