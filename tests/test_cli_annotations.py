@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,9 +20,10 @@ from dorothie_gym.annotation.log import read_annotation
 from dorothie_gym.annotation.marks import Change
 from dorothie_gym.annotation.session_labels import recorded_annotation
 from dorothie_gym.annotation.source_text import SourceText
+from dorothie_gym.benchmark import labels_of
 from dorothie_gym.cli import app
 from dorothie_gym.ontology import ActionValue, DialogueMove
-from dorothie_gym.recording import Corpus, Session
+from dorothie_gym.recording import Corpus, Session, Task
 from tests.annotation.builders import OKAY, annotate, recorded, span
 from tests.recording.builders import write
 from tests.recording.sdn.builders import sample
@@ -153,3 +155,19 @@ def test_annotate_prints_a_link_for_each_person_and_ends_at_a_signal(tmp_path: P
         finally:
             server.send_signal(signal.SIGTERM)
         server.wait(20)
+
+
+def test_models_are_trained_and_scored_on_the_labels_of_a_copy() -> None:
+    corpus()
+    call("annotations", "export", "corpus", "out", "--annotator", "ben")
+    before, after = (labels_of(f"{root}/train/s", "all").tasks[Task.RFN].labels.move for root in ("corpus", "out"))
+    assert len(before) == len(after) and list(before) != list(after)
+    assert DialogueMove.CONFIRM in list(after) and DialogueMove.CONFIRM not in list(before)
+
+
+def test_the_example_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    corpus()
+    shutil.rmtree("corpus/train/silent")
+    page = (Path(__file__).parents[1] / "docs" / "annotation-tool.md").read_text(encoding="utf-8")
+    exec(compile(page.split("```python\n")[1].split("```")[0], "annotation-tool.md", "exec"), {})
+    assert capsys.readouterr().out == "s Instruct(Landmark=KFC)\nt Instruct(Landmark=KFC)\n"

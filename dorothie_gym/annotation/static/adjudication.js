@@ -2,6 +2,7 @@
 
 import { h, words } from '/static/dom.js';
 import { popover } from './popover.js';
+import { letter } from './units.js';
 
 const LAYERS = { undecided: 'not finished by all' };
 
@@ -21,6 +22,7 @@ export class Adjudication {
     transcript.flagged = new Map(this.versions.disagreements.map(({ speaker, utterance, layers }) => [at.get(`${speaker}/${utterance}`), layers.map(layer => LAYERS[layer] ?? layer).join(', ')]));
     this.names = Object.keys(this.versions.annotators);
     this.spans = this.names.map(name => new Map(this.versions.annotators[name].utterances.map(row => [at.get(`${row.speaker}/${row.utterance}`), row.spans])));
+    this.ranks = this.spans.map(rows => ({ exchange: ranks(rows, 'exchange'), transaction: ranks(rows, 'transaction') }));
     const figure = value => (value === null ? 'undefined' : value.toFixed(2));
     this.figures.textContent = this.versions.agreement.map(pair => `${pair.annotators.join(', ')}: spans ${figure(pair.spans.agreement)}, moves κ ${figure(pair.moves.kappa)}, slots κ ${figure(pair.slots.kappa)}`).join('; ') || 'Fewer than two people have annotated this session.';
     transcript.draw();
@@ -31,16 +33,16 @@ export class Adjudication {
     this.k = k;
     if (!this.versions) return;
     this.list.replaceChildren(...this.names.map((name, n) => h('div', { class: 'version' }, h('b', { text: name }),
-      h('p', {}, this.chips(this.spans[n].get(k), k)),
+      h('p', {}, this.chips(this.spans[n].get(k), k, this.ranks[n])),
       h('button', { type: 'button', class: 'soft', 'aria-keyshortcuts': `Alt+${n + 1}`, 'aria-label': `Take over from ${name}`, onclick: () => this.take(n) }, 'Take over', h('kbd', { 'aria-hidden': 'true', text: `Alt ${n + 1}` })))));
   }
 
-  chips(spans, k) {
+  chips(spans, k, ranks) {
     let first = 0;
-    return spans.map(({ words: count, move, slots, suggested }) => {
+    return spans.map(({ words: count, move, slots, suggested, exchange, transaction }) => {
       const said = this.page.utterances[k].words.slice(first, first += count).join(' ');
       const values = Object.values(slots ?? {}).flat().map(words).join(', ');
-      return h('span', { class: 'chip', text: `${said} – ${move && !suggested ? move : 'undecided'}${values ? ` ${values}` : ''}` });
+      return h('span', { class: 'chip', text: `${said} – ${move && !suggested ? move : 'undecided'}${values ? ` ${values}` : ''}` }, h('small', { text: [ranks.exchange.get(exchange), ranks.transaction.get(transaction)].filter(Boolean).join(' ') }));
     });
   }
 
@@ -54,4 +56,11 @@ export class Adjudication {
       h('button', { type: 'button', class: 'primary', onclick: close }, 'Close'),
     ]);
   }
+}
+
+/** Returns the names of the units of an annotator, by their numbers: E1, E2, ... in the order of their first spans. */
+function ranks(rows, layer) {
+  const found = new Map();
+  for (const spans of rows.values()) for (const span of spans) if (Number.isInteger(span[layer]) && !found.has(span[layer])) found.set(span[layer], `${letter(layer)}${found.size + 1}`);
+  return found;
 }
