@@ -157,12 +157,49 @@ def test_annotate_prints_a_link_for_each_person_and_ends_at_a_signal(tmp_path: P
         server.wait(20)
 
 
+def test_a_killed_server_loses_no_acknowledged_mark(tmp_path: Path) -> None:
+    pytest.importorskip("uvicorn", reason="needs the extra console")
+    one, text = recorded(Path("one"))
+    command = [
+        sys.executable,
+        "-m",
+        "dorothie_gym.cli",
+        "annotate",
+        "one",
+        "--port",
+        "0",
+        "--json",
+        "--no-pre-annotation",
+    ]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ, cwd=tmp_path) as server:
+        try:
+            assert server.stdout is not None
+            page, token = json.loads(server.stdout.readline())["links"]["annotator"].split("#")
+            moves = [move.label for move in DialogueMove]
+            for k, move in enumerate(moves):
+                row = {"speaker": "participant", "utterance": 0, "spans": [{"words": 4, "move": move}]}
+                request = urllib.request.Request(
+                    page.replace("/annotate", "/api/sessions/0/mark"),
+                    data=json.dumps({"base": k, "change": {"utterances": [row]}}).encode(),
+                    headers={"Authorization": f"Bearer {token}"},
+                )
+                with urllib.request.urlopen(request, timeout=30) as answer:
+                    assert json.load(answer)["edit"] == k + 1
+        finally:
+            server.kill()
+    found = read_annotation(text, Path("one"), "annotator")
+    assert found.utterances[text.lines[0].id][0].move is DialogueMove(len(moves) - 1)
+    assert one.complete
+
+
 def test_models_are_trained_and_scored_on_the_labels_of_a_copy() -> None:
     corpus()
     call("annotations", "export", "corpus", "out", "--annotator", "ben")
-    before, after = (labels_of(f"{root}/train/s", "all").tasks[Task.RFN].labels.move for root in ("corpus", "out"))
-    assert len(before) == len(after) and list(before) != list(after)
-    assert DialogueMove.CONFIRM in list(after) and DialogueMove.CONFIRM not in list(before)
+    before, after = (
+        labels_of(f"{root}/train/s", "all").tasks[Task.RFN].labels.moves.tolist() for root in ("corpus", "out")
+    )
+    assert len(before) == len(after) and before != after
+    assert DialogueMove.CONFIRM in after and DialogueMove.CONFIRM not in before
 
 
 def test_the_example_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:

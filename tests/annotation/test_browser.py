@@ -27,6 +27,7 @@ from dorothie_gym.policies import make_policy  # noqa: E402
 from dorothie_gym.recording import Corpus, EventType, Session  # noqa: E402
 from dorothie_gym.rollout import play_session  # noqa: E402
 from dorothie_gym.speech import encode_flac  # noqa: E402
+from tests.annotation.builders import recorded  # noqa: E402
 from tests.annotation.serving import Served  # noqa: E402
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -216,6 +217,26 @@ def test_film_shows_map_and_windscreen_and_plays_the_audio(room: Room, session: 
         with page.expect_response(lambda answer: "/audio/" in answer.url and answer.status == 200):
             press(page, "r")
         room.until(lambda: page.evaluate("document.querySelector('.reel').textContent.includes('Play')"))
+
+
+def test_sessions_of_unknown_towns_and_damaged_logs_are_explained(browser: Any, tmp_path: Path) -> None:
+    one, _ = recorded(tmp_path / "corpus" / "one")
+    two, _ = recorded(tmp_path / "corpus" / "two")
+    (tmp_path / "corpus" / "two" / "annotations").mkdir()
+    (tmp_path / "corpus" / "two" / "annotations" / "anna.jsonl").write_text("{\n")
+    with Served(tmp_path / "corpus") as served:
+        made = Room(browser, served, one)
+        page = made.open("anna")
+        page.wait_for_selector("text=The map of the town is not known.")
+        press(page, "i")
+        made.until(lambda: made.line("anna", 0)[0].move is DialogueMove.INSTRUCT)
+        page.select_option("#bar select", "1")
+        page.wait_for_selector("text=anna.jsonl, line 1")
+        page.select_option("#bar select", "0")
+        page.wait_for_selector(".span.decided >> text=Instruct")
+        page.context.close()
+    assert all("400" in line for line in made.errors), "the browser reports the refusal"
+    assert two.name == "two"
 
 
 def test_annotators_work_side_by_side_and_the_adjudicator_decides(room: Room) -> None:

@@ -67,6 +67,7 @@ def test_a_copy_has_the_new_labels_and_everything_else_of_the_session(tmp_path: 
     assert copy.header.is_annotated and copy.header.extra["annotation"] == {"annotator": "anna"}
     assert [e for e in copy.events if e.type != "DialogueMove"] == [e for e in one.events if e.type != "DialogueMove"]
     assert len(copy.trajectory) == len(one.trajectory) and copy.complete and copy.decisions is None
+    assert copy.check() == one.check()
 
 
 def test_acts_of_sdn_without_spans_get_equal_parts_of_the_words() -> None:

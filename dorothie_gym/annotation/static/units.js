@@ -28,7 +28,7 @@ export function chooseTransaction(marks, vocabulary, [k, s], take) {
 function choose({ marks, layer, title, at: [k, s], take, marksOf, rows, save }) {
   const units = marks.units(layer), word = layer === 'exchange' ? 'exchange' : 'transaction';
   const before = [...units.values()].filter(unit => unit.k < k || (unit.k === k && unit.s < s)).slice(-RECENT).reverse();
-  const fresh = Math.max(-1, ...units.keys()) + 1;
+  const fresh = freshNumber(marks, units, k, s);
   const options = [[`New ${word}`, fresh], ...before.map(unit => [`${letter(layer)}${unit.name}: “${marks.text(unit.k, unit.s).slice(0, 44)}”`, unit.number]), [`No ${word}`, null]];
   const current = () => marks.spans[k][s][layer] ?? null;
   const pick = (number, fill) => { take(number); fill(); };
@@ -49,6 +49,13 @@ function choose({ marks, layer, title, at: [k, s], take, marksOf, rows, save }) 
       onclick: () => toggle(field, value, fill) }, words(value), letters[value] ? h('kbd', { 'aria-hidden': 'true', text: letters[value].toUpperCase() }) : null)))),
     h('button', { type: 'button', class: 'primary', onclick: close }, 'Done'),
   ], keys);
+}
+
+/** Number of a new unit: that of its first word in the session, as in the final version; beyond all words if it is taken. */
+function freshNumber(marks, units, k, s) {
+  const before = marks.lines.slice(0, k).reduce((sum, line) => sum + line.words.length, 0), number = before + marks.first(k, s);
+  if (!units.has(number)) return number;
+  return Math.max(marks.lines.reduce((sum, line) => sum + line.words.length, 0), ...units.keys()) + 1;
 }
 
 export const letter = layer => (layer === 'exchange' ? 'E' : 'T');
