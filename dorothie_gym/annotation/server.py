@@ -162,7 +162,7 @@ class AnnotationServer:
     async def _audio(self, request: Request, seat: Seat) -> Reply:
         name = str(request.path_params["name"])
         content = await asyncio.to_thread(lambda: self.workplace.open(_number(request)).page.audio(name))
-        return Response(content, media_type="audio/flac")
+        return Response(content, media_type="audio/wav" if name.endswith(".wav") else "audio/flac")
 
     # --- marks --------------------------------------------------------------------------------------------------------
 

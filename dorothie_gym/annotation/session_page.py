@@ -18,6 +18,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.recording import FRAME_RATE, ActorKind, EventType, Session
+from dorothie_gym.recording.sdn.audio import AUDIO_FOLDERS
 
 if TYPE_CHECKING:
     from dorothie_gym.camera.recorded_pictures import RecordedPictures
@@ -51,6 +52,7 @@ class SessionPage:
     Args:
         session: the session.
         text: its text.
+        folder: its folder, where sessions of SDN have their audio; None without one.
         maps: folder with maps of towns that are not shipped.
 
     Attributes:
@@ -58,8 +60,11 @@ class SessionPage:
         town: town of the session; None if it is not known, and then there is neither a map nor pictures.
     """
 
-    def __init__(self, session: Session, text: SourceText, maps: Path | None = None) -> None:
+    def __init__(
+        self, session: Session, text: SourceText, folder: Path | None = None, maps: Path | None = None
+    ) -> None:
         self.session, self._text = session, text
+        self._audio = dict(session.audio) or _audio_files(session, folder)
         self.town: Town | None = find_town(session.header.town, maps)
         self._pictures: RecordedPictures | None = None
         self._lock = threading.Lock()
@@ -103,7 +108,7 @@ class SessionPage:
             for event in self.session.of_type(EventType.DIALOGUE_MOVE)
             if event.source is line.id.speaker and event.data.get("utterance") == line.id.number
         ]
-        return list(dict.fromkeys(name for name in names if isinstance(name, str) and name in self.session.audio))
+        return list(dict.fromkeys(name for name in names if isinstance(name, str) and name in self._audio))
 
     def _poses(self) -> list[list[float]]:
         """Returns time [s], x, y [m], heading [rad] and speed [km/h] of the car."""
@@ -159,10 +164,21 @@ class SessionPage:
             SessionError: there is no such file.
             OSError: it cannot be read.
         """
-        path = self.session.audio.get(name)
+        path = self._audio.get(name)
         if path is None:
             raise SessionError(f"{self.session.name}: has no audio of this name")
         return read_file(path, MAX_AUDIO)
 
 
+_AUDIO_ENDINGS: Final = (".flac", ".wav")
 _PLACE: Final = ("x", "y", "heading", "length", "width")
+
+
+def _audio_files(session: Session, folder: Path | None) -> dict[str, Path]:
+    """Returns the audio files of a session of SDN, by the names in its dialogue moves."""
+    if folder is None:
+        return {}
+    names = {str(event.data.get("audio")) for event in session.of_type(EventType.DIALOGUE_MOVE)}
+    plain = [name for name in names if Path(name).name == name and Path(name).suffix in _AUDIO_ENDINGS]
+    places = [(name, folder / inner / name) for name in plain for inner in AUDIO_FOLDERS]
+    return {name: path for name, path in places if path.is_file()}

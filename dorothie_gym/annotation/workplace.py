@@ -80,7 +80,7 @@ class OpenSession:
         self.folder, self._pre_annotate = entry.path, pre_annotate
         session = entry.load()
         self.text = SourceText.of(session)
-        self.page = SessionPage(session, self.text, maps)
+        self.page = SessionPage(session, self.text, entry.path, maps)
         self._logs: dict[str, AnnotationLog] = {}
 
     def log(self, seat: Seat) -> AnnotationLog:

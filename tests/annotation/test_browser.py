@@ -278,6 +278,18 @@ def test_a_second_window_notices_edits_of_the_first(room: Room) -> None:
     room.errors = [line for line in room.errors if "409" not in line]  # the browser reports the refusal
 
 
+def test_axe_finds_no_violation_without_a_seat(room: Room) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python").Axe()
+    page = room.browser.new_context(bypass_csp=True).new_page()
+    room.pages.append(page)
+    for secret in ("", "#wrong"):
+        page.goto(f"http://127.0.0.1:{room.served.port}/annotate{secret}")
+        page.wait_for_selector("h1")
+        found = axe.run(page).response["violations"]
+        assert not found, [(each["id"], [node["html"] for node in each["nodes"]][:3]) for each in found]
+        page.goto("about:blank")
+
+
 @pytest.mark.parametrize("name", ["anna", "carol"])
 def test_axe_finds_no_violation(room: Room, name: str) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe-playwright-python").Axe()

@@ -17,9 +17,10 @@ from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import make_policy
-from dorothie_gym.recording import EventType, Session
+from dorothie_gym.recording import EventType, Session, read_session
 from dorothie_gym.rollout import play_session
 from tests.annotation.builders import recorded
+from tests.recording.sdn.builders import release
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +81,29 @@ def test_sound_is_served_by_the_names_of_the_record_only(tmp_path: Path) -> None
     for name in ("b.flac", "../s/session.json", ""):
         with pytest.raises(SessionError, match="has no audio of this name"):
             page.audio(name)
+
+
+def test_recordings_of_sdn_are_found_beside_the_log(tmp_path: Path) -> None:
+    release(tmp_path / "log")
+    (tmp_path / "log" / "utterance").mkdir()
+    (tmp_path / "secret.wav").write_bytes(b"no")
+    session = read_session(tmp_path / "log")
+    names = ["u_1.wav", "../../secret.wav", "/etc/passwd", "u_2.flac"]
+    moves = iter(names)
+    events = [
+        replace(event, data={**event.data, "audio": next(moves, "none.wav")})
+        if event.type is EventType.DIALOGUE_MOVE
+        else event
+        for event in session.events
+    ]
+    for name in ("u_1.wav", "u_2.flac"):
+        (tmp_path / "log" / "utterance" / name).write_bytes(name.encode())
+    session = replace(session, events=tuple(events))
+    page = SessionPage(session, SourceText.of(session), tmp_path / "log")
+    found = {name for row in page.content()["utterances"] for name in row["audio"]}
+    assert found == {"u_1.wav", "u_2.flac"} and page.audio("u_1.wav") == b"u_1.wav"
+    with pytest.raises(SessionError, match="no audio"):
+        page.audio("../../secret.wav")
 
 
 def test_the_events_of_the_page_are_words(page: SessionPage) -> None:
