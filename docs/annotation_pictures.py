@@ -57,7 +57,8 @@ def _take(links: dict[str, str], chromium: str) -> None:
         page.keyboard.press("b")  # through the windscreen
         page.keyboard.press("3")
         page.keyboard.press("2")
-        page.wait_for_function("() => document.querySelector('.picture .note').textContent === ''", timeout=120_000)
+        page.wait_for_selector(".screen:not([hidden])")
+        page.wait_for_selector(".picture .note:empty", state="attached", timeout=120_000)
         page.wait_for_timeout(1500)
         save(page.screenshot(), DOCS / "annotation_tool.png")
         for _ in range(spans):

@@ -110,6 +110,8 @@ class AnnotationServer:
                 return _json({"reason": str(error)}, 400)
             except ClientDisconnect:
                 return Response(status_code=400)
+            except asyncio.CancelledError:  # the server ends while a picture is drawn
+                return _json({"reason": "the server ends"}, 503)
             except OSError as error:
                 return _json({"reason": f"the file cannot be read or written ({error.strerror})"}, 507)
             return reply if isinstance(reply, Response) else _json(reply)
