@@ -61,7 +61,7 @@ def _take(links: dict[str, str], chromium: str) -> None:
         _work(pages)
         for seat, page in pages.items():
             page.evaluate("document.querySelector('.net').remove()")  # the time to the server, which is this machine's
-            _save(page.screenshot(), DOCS / f"console_{seat}.png")
+            save(page.screenshot(), DOCS / f"console_{seat}.png")
         browser.close()
 
 
@@ -81,7 +81,8 @@ def _work(pages: dict[str, Any]) -> None:
     time.sleep(3.0)
 
 
-def _save(content: bytes, path: Path) -> None:
+def save(content: bytes, path: Path) -> None:
+    """Writes a picture with few colours."""
     path.write_bytes(content)
     with Image.open(path) as picture:
         picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)

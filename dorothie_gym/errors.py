@@ -10,6 +10,7 @@ DorothieGymError
 ├── TownError            a map cannot be read or used
 ├── TownArchiveError     a cached town is damaged or of another format
 ├── StoryboardError      a storyboard cannot be read, bound or played
+├── AnnotationError      an annotation does not fit its session, or names what the vocabularies do not contain
 ├── SessionError         a recorded session or corpus cannot be read or written
 ├── OutputFolderError    an output folder was deleted or replaced while it was being written
 ├── PolicyLoadError      a policy name or file cannot be resolved
@@ -122,6 +123,10 @@ class StoryboardError(DorothieGymError, ValueError):
 
 class SessionError(DorothieGymError, ValueError):
     """A session cannot be written or read; the message names the file, the line and the field."""
+
+
+class AnnotationError(DorothieGymError, ValueError):
+    """An annotation does not fit its session, or cannot be represented; the message names the place."""
 
 
 class OutputFolderError(DorothieGymError, RuntimeError):

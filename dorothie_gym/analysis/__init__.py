@@ -1,6 +1,6 @@
 """Corpus analysis: counts, profiles, phenomena, consistency and agreement, all derived from the events."""
 
-from dorothie_gym.analysis.agreement import Agreement, agreement, inconsistencies
+from dorothie_gym.analysis.agreement import agreement, inconsistencies
 from dorothie_gym.analysis.behaviour import CLAIMS, BehaviourClaim, BehaviourVerdict, verdicts_of
 from dorothie_gym.analysis.corpus_stats import (
     PAPER,
@@ -15,6 +15,7 @@ from dorothie_gym.analysis.corpus_stats import (
 from dorothie_gym.analysis.exception_attribution import Handled, handled_by, handling, handling_of_events
 from dorothie_gym.analysis.phenomena import PHENOMENA, DialogueView, Occurrence, Phenomenon
 from dorothie_gym.analysis.profiles import Profile, Profiles
+from dorothie_gym.analysis.span_agreement import Agreement, Alpha, LabelledSpan, agreement_of, alpha_of, has_alpha
 from dorothie_gym.analysis.units import SaidUnit, Units
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "PAPER",
     "PHENOMENA",
     "Agreement",
+    "Alpha",
     "Anchors",
     "BehaviourClaim",
     "BehaviourVerdict",
@@ -29,6 +31,7 @@ __all__ = [
     "Counts",
     "DialogueView",
     "Handled",
+    "LabelledSpan",
     "Occurrence",
     "Phenomenon",
     "Profile",
@@ -36,12 +39,15 @@ __all__ = [
     "SaidUnit",
     "Units",
     "agreement",
+    "agreement_of",
+    "alpha_of",
     "anchors_of",
     "corpus_stats_of",
     "faults_of_corpus",
     "handled_by",
     "handling",
     "handling_of_events",
+    "has_alpha",
     "inconsistencies",
     "phenomena_of",
     "verdicts_of",

@@ -2,62 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 
 from dorothie_gym.analysis.diversity import plain, words_of
+from dorothie_gym.analysis.span_agreement import Agreement, LabelledSpan, LabelledUtterance, agreement_of
 from dorothie_gym.analysis.units import Units, is_initiating
 from dorothie_gym.errors import SessionError
-from dorothie_gym.ontology import DialogueAct, DialogueMove, Slot
+from dorothie_gym.ontology import DialogueMove
 from dorothie_gym.recording.events import MoveRecord, UtteranceRecord
-from dorothie_gym.recording.header import NATIVE
 from dorothie_gym.recording.session import Session
-
-_SLOTS = (Slot.ACTION, Slot.STREET, Slot.STATUS, Slot.LANDMARK, Slot.OBJECT)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Agreement:
-    """Agreement of two annotators.
-
-    Attributes:
-        moves: Cohen's kappa of the moves; None if both use a single move, so that chance explains the agreement.
-        slots: Cohen's kappa of the values of each of the five slots in each piece; None likewise.
-        pieces: compared stretches of words.
-        utterances: number of utterances.
-    """
-
-    moves: float | None
-    slots: float | None
-    pieces: int
-    utterances: int
 
 
 def agreement(first: Session, second: Session) -> Agreement:
     """Returns the agreement of two annotations of one session.
 
-    Utterances are aligned by their numbers. If annotators split an utterance differently, each stretch of words within
-    one span of both is a piece. For slots, a piece counts once for each of the five slots; its label is the set of the
-    slot's values there.
+    Utterances are aligned by their numbers, words ignore case and punctuation; `span_agreement` defines the figures.
 
     Raises:
         SessionError: they are not of the same session, or a span does not match the words of its utterance; the
             message names the place.
     """
     pairs = _aligned(first, second)
-    pieces = [piece for one, other in pairs for piece in _pieces(one, other, first.name, second.name)]
-    moves = [(a.move.label, b.move.label) for a, b in pieces]
-    slots = [(_label(a, slot), _label(b, slot)) for a, b in pieces for slot in _SLOTS]
-    return Agreement(moves=kappa(moves), slots=kappa(slots), pieces=len(pieces), utterances=len(pairs))
-
-
-def kappa(pairs: Sequence[tuple[str, str]]) -> float | None:
-    """Returns Cohen's kappa of pairs of labels of two annotators; None with fewer than two different labels."""
-    from sklearn.metrics import cohen_kappa_score
-
-    if len({label for pair in pairs for label in pair}) < 2:
-        return None
-    return float(cohen_kappa_score(*zip(*pairs, strict=True)))
+    return agreement_of([_labelled(a, first.name) for a, _ in pairs], [_labelled(b, second.name) for _, b in pairs])
 
 
 def _aligned(first: Session, second: Session) -> list[tuple[UtteranceRecord, UtteranceRecord]]:
@@ -87,30 +53,17 @@ def _aligned(first: Session, second: Session) -> list[tuple[UtteranceRecord, Utt
     return [(one[key], other[key]) for key in one]
 
 
-def _pieces(one: UtteranceRecord, other: UtteranceRecord, *names: str) -> Iterator[tuple[DialogueAct, DialogueAct]]:
-    """Returns the acts of both annotators for each stretch of words that neither of them splits."""
-    a, b = _by_word(one, names[0]), _by_word(other, names[1])
-    before: tuple[int, int] | None = None
-    for span, span_there in zip(a, b, strict=True):
-        if (span, span_there) != before:
-            yield one.moves[span].act, other.moves[span_there].act
-        before = span, span_there
-
-
-def _by_word(utterance: UtteranceRecord, name: str) -> list[int]:
-    """Returns the number of the span of each word of an utterance; a text without words counts as one word."""
+def _labelled(utterance: UtteranceRecord, name: str) -> LabelledUtterance:
+    """Returns the labelled spans of an utterance; a text without words counts as one word."""
     if len(utterance.moves) == 1:
-        return [0] * max(1, len(words_of(utterance.text)))
+        return [LabelledSpan(max(1, len(words_of(utterance.text))), utterance.moves[0].act)]
     spans = [words_of(move.span) for move in utterance.moves]
     if sum(spans, ()) != words_of(utterance.text):
         raise SessionError(
             f"session {name}, utterance {utterance.number}: the spans together are not the words of the utterance"
         )
-    return [k for k, words in enumerate(spans) for _ in words]
-
-
-def _label(act: DialogueAct, slot: Slot) -> str:
-    return "+".join(value.label for value in act.values(slot))
+    acts = (move.act for move in utterance.moves)
+    return [LabelledSpan(len(words), act) for words, act in zip(spans, acts, strict=True) if words]
 
 
 # --- Consistency -----------------------------------------------------------------------------------------------------
@@ -120,8 +73,8 @@ def inconsistencies(session: Session, units: Units | None = None) -> tuple[str, 
     """Returns one sentence for each fault of the annotation, beginning with its place; empty if it is consistent.
 
     An exchange starts with an initiating move, every response has an exchange, and exchanges and transactions equal, in
-    number and act by act, those that the rules derive. The last holds for sessions of this package only: people
-    annotate by other rules.
+    number and act by act, those that the rules derive. The last is not required of sessions that people have
+    annotated.
 
     Args:
         session: any.
@@ -130,7 +83,7 @@ def inconsistencies(session: Session, units: Units | None = None) -> tuple[str, 
     again = Units(session) if units is None else units
     moves = [move for utterance in again.utterances for move in utterance.moves]
     faults = [*_starts(moves), *_responses(moves)]
-    if session.header.source == NATIVE:
+    if not session.header.is_annotated:
         exchanges = {move.index: move.exchange for move in moves}
         transactions = {move.index: move.transaction for move in moves}
         faults += _differences("exchange", moves, exchanges, {m.index: again.exchange_of(m) for m in moves})

@@ -15,6 +15,8 @@ sessions with recorded meanings, the propositions decide (`exception_mentions`).
 For an object on the road, the window starts again when the car comes near. A question within `ANSWER_TIMEOUT` after an
 exchange that handles an object on the road belongs to it if it names no landmark; after an exchange that handles a task
 exception, a question for status or destination does. If several exceptions fit, the latest counts.
+
+Where people have marked what an exchange handles, their mark counts.
 """
 
 from __future__ import annotations
@@ -227,12 +229,14 @@ def handling(units: Units) -> dict[int, Handled]:
     """Returns the kind of exception that each exchange handles, by number of the exchange."""
     events = handled_by(units)
     kinds = {number: kind_of(event) for number, event in events.items()}
-    return {
+    found = {
         unit.id: Handled.NONE
         if (kind := kinds.get(unit.id)) is None
         else (Handled.TASK if kind.is_task else Handled.ENVIRONMENTAL)
         for unit in units.exchanges
     }
+    marked = {number: Handled(kind) for number, kind in units.marked_exceptions.items() if kind in set(Handled)}
+    return {**found, **marked}
 
 
 def handling_of_events(units: Units) -> dict[int, Handled]:

@@ -117,13 +117,13 @@ def _said(utterance: UtteranceRecord, units: Units, kinds: Mapping[int, Handled]
 
 
 def _happened(event: Event, session: Session) -> Iterator[TranscriptLine]:
-    text = _description(event, session)
+    text = description_of(event, session)
     if text:
         yield TranscriptLine(time=event.time, speaker=event.source, text=text, said=False)
 
 
-def _description(event: Event, session: Session) -> str:
-    """Returns the description of an event; empty for events that are left out."""
+def description_of(event: Event, session: Session) -> str:
+    """Returns the description of an event other than a dialogue move; empty for events that transcripts leave out."""
     data = event.data
     if event.type is EventType.PHYSICAL_ACTION:
         return _action_text(event)

@@ -1,11 +1,11 @@
 """Exchanges and transactions of a recording, derived from its utterances and arrivals.
 
-Numbers stored with the acts are used for sessions of other corpora only, which people annotated.
+Numbers stored with the acts are used for sessions that people have annotated only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,8 +14,7 @@ from dorothie_gym.dialogue.exchanges import EXPECTATIONS, Exchange
 from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import GoalStatus, LandmarkName, Role, SlotValue, parse_goal_status, parse_landmark
-from dorothie_gym.recording.events import Event, EventType, MoveRecord, UtteranceRecord
-from dorothie_gym.recording.header import NATIVE
+from dorothie_gym.recording.events import EXCHANGE_UNIT, Event, EventType, MoveRecord, UtteranceRecord
 from dorothie_gym.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
 
@@ -51,7 +50,9 @@ class Units:
     Attributes:
         session: the session.
         utterances: utterances of participant and Co-Wizard, in the order of their ends.
-        states: final state of each exchange, by number; empty for annotated sessions of other corpora.
+        states: final state of each exchange, by number; empty for sessions that people have annotated.
+        marked_exceptions: kind of exception that an exchange handles ("environmental", "task" or "none"), by number,
+            where people have marked it.
     """
 
     def __init__(self, session: Session) -> None:
@@ -68,6 +69,7 @@ class Units:
         self._exchange: dict[int, int] = {}
         self._transaction: dict[int, int] = {}
         self._place()
+        self.marked_exceptions: dict[int, str] = self._marked() if session.header.is_annotated else {}
 
     def exchange_of(self, move: MoveRecord) -> int | None:
         """Returns the number of an act's exchange; None if people annotated none."""
@@ -89,7 +91,7 @@ class Units:
 
     def _place(self) -> None:
         moves = [move for utterance in self.utterances for move in utterance.moves]
-        people = self.session.header.source != NATIVE
+        people = self.session.header.is_annotated
         if people and any(move.exchange is not None for move in moves):
             self._exchange = {move.index: move.exchange for move in moves if move.exchange is not None}
         if people and any(move.transaction is not None for move in moves):
@@ -115,6 +117,16 @@ class Units:
         annotator.tick(float("inf"))
         if place_exchanges:
             self.states = {exchange.id: exchange for exchange in annotator.exchanges}
+
+    def _marked(self) -> dict[int, str]:
+        found = {}
+        for utterance in self.utterances:
+            for move in utterance.moves:
+                unit = self.session.events[move.index].data.get(EXCHANGE_UNIT)
+                kind = unit.get("exception") if isinstance(unit, Mapping) else None
+                if isinstance(kind, str) and move.index in self._exchange:
+                    found[self._exchange[move.index]] = kind
+        return found
 
 
 def is_initiating(move: MoveRecord) -> bool:

@@ -13,6 +13,8 @@ from typer.core import TyperGroup
 
 from dorothie_gym._startup import exit_on_signals
 from dorothie_gym._version import __version__
+from dorothie_gym.cli.annotate import annotate
+from dorothie_gym.cli.annotations import agreement, annotations_app
 from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.console import console
 from dorothie_gym.cli.convert import convert
@@ -75,6 +77,9 @@ app = typer.Typer(
 )
 app.command()(run)
 app.command()(console)
+app.command()(annotate)
+app.add_typer(annotations_app, name="annotations")
+app.command()(agreement)
 app.command(cls=PictureCommand)(towns)
 app.command()(storyboards)
 app.command()(envs)

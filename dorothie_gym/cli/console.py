@@ -92,7 +92,7 @@ def console(
         else:
             out = out or resume.resolve().parent
             room = _resumed_room(resume, town, storyboard, roles, out, config)
-    listener = _listen(host, port)
+    listener = listen(host, port)
     links = _links(room, host, listener.getsockname()[1])
     if as_json:
         print_json({"links": links, "recorded": None if out is None else str(out)})
@@ -155,7 +155,8 @@ def _resumed_room(
     return room
 
 
-def _listen(host: str, port: int) -> socket.socket:
+def listen(host: str, port: int) -> socket.socket:
+    """Returns a socket that listens at an address; fails if it cannot be used."""
     listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

@@ -14,6 +14,14 @@ from dorothie_gym.recording.file_names import MAX_FRAME
 from dorothie_gym.recording.json_io import Fields, canonical, canonical_object, from_line, to_line
 from dorothie_gym.sim.config import FRAME_RATE
 
+EXCHANGE_UNIT: Final = "exchange_unit"
+"""Field of the first dialogue move of an exchange, where people have annotated it: exception ("environmental", "task",
+"none" or null) that the exchange handles, end ("fulfilled", "abandoned" or null)."""
+
+TRANSACTION_UNIT: Final = "transaction_unit"
+"""Field of the first dialogue move of a transaction, where people have annotated it: goal (landmark label or null), end
+("completed", "interrupted", "abandoned" or null)."""
+
 
 class EventType(enum.StrEnum):
     """Types of events, with the fields of their `data` (JSON types only)."""
@@ -23,7 +31,7 @@ class EventType(enum.StrEnum):
     ({slot label: [value labels]}), exchange (number or null), start and end [s]; if known, transaction
     (number), recognised (words that a speech recogniser returned for the whole utterance), fluent (words of this act
     without hesitations, restarts and withdrawn names, where it has any), meaning (the propositions of the span, see
-    `dialogue.propositions`) and audio (name of the file with this act's audio)."""
+    `dialogue.propositions`), audio (name of the file with this act's audio), `EXCHANGE_UNIT` and `TRANSACTION_UNIT`."""
     PHYSICAL_ACTION = "PhysicalAction"
     """Effective action of the Co-Wizard: action (label), angle (degrees, positive left, or null), up (or
     null)."""

@@ -30,6 +30,9 @@ PICTURES_FOLDER: Final = "pictures"
 AUDIO_FOLDER: Final = "utterance"
 """Optional audio of dialogue moves, as their field `audio` names it; the folder of SDN's layout."""
 
+ANNOTATIONS_FOLDER: Final = "annotations"
+"""Optional logs of annotators (`dorothie_gym.annotation`), which are no part of the session."""
+
 SESSION_FILES: Final = (HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, SEATS_FILE, FRAMES_FILE, JOURNAL_FILE)
 
 MAX_EVENTS: Final = 200_000

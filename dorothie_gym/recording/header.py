@@ -23,6 +23,9 @@ Another minor version only adds fields, columns and types of events; another maj
 NATIVE: Final = "dorothie_gym"
 """Source of the sessions that this package records."""
 
+ANNOTATION_FIELD: Final = "annotation"
+"""Field of `extra` of a copy with the labels of an annotator: annotator (name)."""
+
 _VERSION: Final = re.compile(r"(\d{1,4})\.(\d{1,4})")
 
 
@@ -146,6 +149,11 @@ class SessionHeader:
         clash = sorted(set(self.extra) & {*_NAMES, *RESERVED_NAMES})
         if clash:
             raise SessionError(f"{plain.where}: extra has {clash[0]!r}, which is a field of its own")
+
+    @property
+    def is_annotated(self) -> bool:
+        """Whether people have annotated the dialogue: in other corpora, and in copies with the labels of annotators."""
+        return self.source != NATIVE or ANNOTATION_FIELD in self.extra
 
     def to_json(self) -> dict[str, JsonValue]:
         """Returns the header in JSON types, fields in a fixed order."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import random
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -68,6 +69,40 @@ def _native(folder: Path) -> None:
     with SeatLogWriter(folder / "two") as log:
         log.append(SeatEvent(frame=3, kind=SeatEventKind.JOINED, role=Role.CO_WIZARD, data={"seconds": None}))
         log.append(SeatEvent(frame=9, kind=SeatEventKind.PAUSED, data={"reason": "absence"}))
+
+
+def _annotations(folder: Path) -> None:
+    from dorothie_gym.annotation.formats import Format, export_annotation
+    from tests.annotation.builders import annotate, random_annotation, recorded
+
+    one, text = recorded(folder / "one")
+    for seed, name in enumerate(("anna", "ben", "adjudicated")):
+        annotate(folder / "one", text, name, random_annotation(text, random.Random(seed), complete=True))
+    for to in (Format.JSONL, Format.ELAN):
+        export_annotation(one, random_annotation(text, random.Random(7)), "carl", folder / f"carl{to.suffix}", to)
+
+
+def _read_annotations(folder: Path) -> None:
+    from dorothie_gym.annotation.corpus_agreement import corpus_agreement
+    from dorothie_gym.annotation.formats import import_annotation
+    from dorothie_gym.errors import DorothieGymError
+    from dorothie_gym.recording import Corpus, Session
+
+    refusals: list[DorothieGymError] = []
+    session = None
+    try:
+        session = Session.load(folder / "one")
+        corpus_agreement(Corpus.load(folder).entries, with_alpha=False)
+    except DorothieGymError as error:
+        refusals.append(error)
+    for name in ("carl.jsonl", "carl.eaf"):
+        try:
+            if session is not None:
+                import_annotation(session, folder / name)
+        except DorothieGymError as error:
+            refusals.append(error)
+    if refusals:
+        raise refusals[0]
 
 
 def _read_sessions(folder: Path) -> None:
@@ -419,6 +454,7 @@ SUBJECTS: Final = MappingProxyType(
         "release": Subject(_release, _read_sessions),
         "sample": Subject(_sample, _read_sessions),
         "hub": Subject(_hub, _read_sessions),
+        "annotations": Subject(_annotations, _read_annotations),
         "corpus": Subject(_corpus, _read_corpus),
         "predictions": Subject(_predictions, _read_predictions),
         "yaml": Subject(_yaml_town, _read_town, slow=True),

@@ -31,7 +31,7 @@ export class Keys {
 
   show() {
     const dialog = h('dialog', { class: 'keys', 'aria-label': 'Keys' }, h('h2', { text: 'Keys' }),
-      h('dl', {}, this.rows.flatMap(({ key, label, alt }) => [h('dt', {}, h('kbd', { text: (alt ? 'Alt ' : '') + shownKey(key) })), h('dd', { text: label })])),
+      h('dl', { tabindex: '0' }, this.rows.flatMap(({ key, label, alt }) => [h('dt', {}, h('kbd', { text: (alt ? 'Alt ' : '') + shownKey(key) })), h('dd', { text: label })])),
       h('p', { class: 'hint', text: 'On the map: arrows move the pointer, Enter clicks, Shift and arrows move the map, + and − zoom, 0 follows the car.' }),
       h('button', { type: 'button', autofocus: true, onclick: () => dialog.close(), text: 'Close' }));
     dialog.addEventListener('close', () => dialog.remove());

@@ -10,7 +10,7 @@ from typing import Final
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording.events import Event
-from dorothie_gym.recording.file_names import MAX_FRAME
+from dorothie_gym.recording.file_names import ANNOTATIONS_FOLDER, MAX_FRAME
 from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.recording.sdn.audio import AudioFiles
 from dorothie_gym.recording.sdn.config import header_of, town_of
@@ -205,6 +205,7 @@ def _first_frame(config: JsonObject, rows: list[JsonObject], places: CarPoses) -
 
 def _note_files(folder: Path, layout: SdnLayout, report: ReadReport) -> None:
     """Reports the files of the folder that are not read."""
-    left = sorted(path.name for path in folder.iterdir() if path.name not in expected_files(layout))
+    known = (*expected_files(layout), ANNOTATIONS_FOLDER)
+    left = sorted(path.name for path in folder.iterdir() if path.name not in known)
     if left:
         report.facts["files_not_read"] = ", ".join(name[:60] for name in left[:20]) + ("..." if len(left) > 20 else "")

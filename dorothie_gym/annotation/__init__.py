@@ -1,0 +1,1 @@
+"""Annotation of sessions by people: marks, logs, agreement, adjudication, formats, and the tool in the browser."""

@@ -1,0 +1,238 @@
+"""The server over real sockets: marks, blindness, adjudication, refusals."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+
+pytest.importorskip("uvicorn", reason="needs the extra console")
+
+from dorothie_gym.annotation.log import ADJUDICATED, read_annotation
+from dorothie_gym.annotation.requests import MAX_BODY
+from dorothie_gym.annotation.session_labels import recorded_annotation
+from dorothie_gym.annotation.vocabulary import MOVE_KEYS
+from dorothie_gym.annotation.workplace import Seat
+from dorothie_gym.ontology import DECISION_TREE, DialogueMove, walk
+from tests.annotation.builders import FIRST, annotate, recorded
+from tests.annotation.serving import Served
+from tests.recording.builders import write
+
+INSTRUCT = {"words": 4, "move": "Instruct", "slots": {"Landmark": ["KFC"]}, "exchange": 0}
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Served]:
+    recorded(tmp_path / "corpus" / "one")
+    write(tmp_path / "corpus" / "silent")
+    with Served(tmp_path / "corpus") as running:
+        yield running
+
+
+def test_marks_are_written_before_they_are_acknowledged(served: Served) -> None:
+    session, text = recorded(served.corpus.parent / "copy")
+    assert served.ask("sessions/0/marks")["edit"] == 0
+    answer = served.mark(0, 0, INSTRUCT)
+    assert (answer["edit"], answer["undo"], answer["done"], answer["spans"]) == (1, "test", 1, 5)
+    found = read_annotation(text, served.corpus / "one", "anna")
+    assert found.utterances[FIRST][0].move is DialogueMove.INSTRUCT
+    undone = served.ask("sessions/0/undo", {"base": 1})
+    assert undone["change"]["utterances"][0]["spans"] == [{"words": 4}] and undone["redo"] == "test"
+    assert served.ask("sessions/0/redo", {"base": 2})["done"] == 1
+    assert session.name
+
+
+def test_annotators_do_not_see_each_other(served: Served) -> None:
+    served.mark(0, 0, {"words": 4, "move": "Align", "slots": {"Street": ["Plymouth"]}})
+    seen = b"".join(
+        served.raw(f"/api/{path}", name="ben")[2]
+        for path in ("sessions/0", "sessions/0/marks", "sessions/0/bodies?frame=0", "seat")
+    )
+    own = json.loads(served.raw("/api/sessions/0/marks", name="ben")[2])
+    assert all(span.keys() == {"words"} for row in own["change"]["utterances"] for span in row["spans"])
+    assert b"anna" not in seen and served.seats["anna"].token.encode() not in seen
+    for path in ("versions", "history"):
+        assert served.raw(f"/api/sessions/0/{path}", name="ben")[0] == 403
+    body = json.dumps({"base": 0, "speaker": "participant", "utterance": 0, "annotator": "anna"}).encode()
+    assert served.raw("/api/sessions/0/adopt", body, name="ben")[0] == 403
+
+
+def test_the_page_of_a_session_has_no_labels_of_its_talk(served: Served) -> None:
+    page = served.ask("sessions/0")
+    assert {key for row in page["utterances"] for key in row} == {
+        "speaker",
+        "utterance",
+        "words",
+        "start",
+        "end",
+        "audio",
+    }
+    text = json.dumps(page)
+    assert not any(f'"{move.label}"' in text for move in DialogueMove)
+
+
+def test_suggestions_are_shown_only_if_wanted(tmp_path: Path) -> None:
+    recorded(tmp_path / "c" / "one")
+    with Served(tmp_path / "c", pre_annotate=True) as running:
+        state = running.ask("sessions/0/marks")
+        spans = [span for row in state["change"]["utterances"] for span in row["spans"]]
+        assert all(span["suggested"] for span in spans) and state["done"] == 0 and state["pre_annotated"]
+        accepted = {key: value for key, value in spans[0].items() if key != "suggested"}
+        assert running.mark(0, 0, accepted)["done"] == 1
+    with Served(tmp_path / "c", pre_annotate=False) as running:
+        assert running.ask("sessions/0/marks")["pre_annotated"], "the log says how it was begun"
+
+
+def test_edits_of_two_windows_do_not_overwrite_each_other(served: Served) -> None:
+    served.mark(0, 0, INSTRUCT)
+    body = {"base": 0, "change": {"utterances": [{"speaker": "participant", "utterance": 0, "spans": [{"words": 4}]}]}}
+    status, _, content = served.raw("/api/sessions/0/mark", json.dumps(body).encode())
+    assert status == 409 and "changed elsewhere" in json.loads(content)["reason"]
+    assert served.ask("sessions/0/marks")["edit"] == 1
+
+
+def test_the_adjudicator_decides_with_a_history(served: Served) -> None:
+    session, text = recorded(served.corpus.parent / "copy")
+    first = recorded_annotation(session, text)
+    annotate(served.corpus / "one", text, "anna", first)
+    served.mark(0, 0, {"words": 4, "move": "Check"}, name="ben")
+    found = served.ask("sessions/0/versions", name="carol")
+    assert set(found["annotators"]) == {"anna", "ben"} and len(found["disagreements"]) == 5
+    assert found["agreement"][0]["moves"]["spans"] == 1
+    state = served.ask("sessions/0/marks", name="carol")
+    adopt = {"base": state["edit"], "speaker": "participant", "utterance": 0, "annotator": "ben"}
+    state = served.ask("sessions/0/adopt", adopt, "carol")
+    assert state["change"]["utterances"][0]["spans"][0]["move"] == "Check"
+    served.ask("sessions/0/adopt", {**adopt, "base": state["edit"], "annotator": "anna"}, "carol")
+    served.mark(2, 4, {"words": 1, "move": "Acknowledge"}, name="carol")
+    history = served.ask("sessions/0/history", name="carol")
+    assert [(row["by"], row["source"]) for row in history] == [("carol", ""), ("carol", "anna"), ("carol", "ben")]
+    final = read_annotation(text, served.corpus / "one", ADJUDICATED)
+    assert final.utterances[FIRST][0].move is DialogueMove.INSTRUCT
+    assert read_annotation(text, served.corpus / "one", "anna") == first, "annotators keep their own"
+
+
+def test_the_tree_of_the_page_is_that_of_the_ontology(served: Served) -> None:
+    vocabulary = served.ask("seat")["vocabulary"]
+
+    def leaves(node: object, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], str]]:
+        if isinstance(node, str):
+            yield path, node
+        else:
+            for label, after in node["answers"]:  # type: ignore[index]  # a question
+                yield from leaves(after, (*path, label))
+
+    assert vocabulary["tree"]["text"] == DECISION_TREE.text
+    found = dict(leaves(vocabulary["tree"]))
+    assert {walk(path).label: path for path in found} == {move: path for path, move in found.items()}
+    keys = [MOVE_KEYS[move] for move in DialogueMove]
+    assert len(set(keys)) == len(keys) and not set(keys) & set("sm[]gxptrbjk+-?123456789")
+
+
+def test_sessions_that_cannot_be_annotated_say_why(served: Served) -> None:
+    status, _, content = served.raw("/api/sessions/1")
+    assert status == 400 and "nobody speaks in it" in json.loads(content)["reason"]
+    (served.corpus / "one" / "annotations").mkdir()
+    (served.corpus / "one" / "annotations" / "anna.jsonl").write_text("{\n")
+    status, _, content = served.raw("/api/sessions/0/marks")
+    assert status == 400 and "anna.jsonl, line 1" in json.loads(content)["reason"]
+
+
+# --- Security ---------------------------------------------------------------------------------------------------------
+
+
+def test_wrong_tokens_and_pages_of_other_hosts_are_refused(served: Served) -> None:
+    assert served.raw("/api/seat", name=None)[0] == 401
+    for token in ("Bearer ", "Bearer x", "Basic x", f"Bearer {served.seats['anna'].token}x", "ä"):
+        assert served.raw("/api/seat", name=None, Authorization=token)[0] == 401
+    assert served.raw("/api/seat", Origin="https://example.org")[0] == 403
+    assert served.raw("/api/seat", Origin=f"http://127.0.0.1:{served.port}")[0] == 200
+
+
+def test_every_answer_forbids_foreign_content(served: Served) -> None:
+    for path in ("/annotate", "/annotation/main.js", "/static/dom.js", "/api/seat", "/nothing"):
+        _, headers, _ = served.raw(path)
+        assert "default-src 'none'" in headers["Content-Security-Policy"]
+        assert "unsafe" not in headers["Content-Security-Policy"] and headers["Referrer-Policy"] == "no-referrer"
+
+
+def test_only_the_files_of_the_page_are_served(served: Served) -> None:
+    for path in (
+        "/annotation/../server.py",
+        "/annotation/%2e%2e/server.py",
+        "/static//etc/passwd",
+        "/annotation/..%2flog.py",
+    ):
+        assert served.raw(path)[0] == 404
+    for name in ("..%2f..%2fsession.json", "x", "%00", "utterance_0_0.flac"):
+        assert served.raw(f"/api/sessions/0/audio/{name}")[0] in (400, 404)
+
+
+def test_links_have_secrets_of_128_bits_behind_the_number_sign(served: Served) -> None:
+    tokens = {seat.token for seat in served.seats.values()} | {
+        Seat("x", served.seats["anna"].kind).token for _ in range(50)
+    }
+    assert len(tokens) == 53 and min(map(len, tokens)) >= 22
+    assert "#" in served.link("anna") and served.seats["anna"].token in served.link("anna").split("#")[1]
+
+
+def test_large_and_frequent_requests_are_refused(served: Served) -> None:
+    assert served.raw("/api/sessions/0/mark", b"x" * (MAX_BODY + 1))[0] == 413
+    assert 429 in {served.raw("/api/seat", name="ben")[0] for _ in range(700)}
+    assert served.raw("/api/seat")[0] == 200, "others are not slowed down"
+
+
+def test_fuzzed_requests_get_refusals_only(served: Served, caplog: pytest.LogCaptureFixture) -> None:
+    served.application._budgets = _Unlimited()  # type: ignore[assignment]  # 1,500 requests without the limit of the rate
+    rng = random.Random(3)
+    served.mark(0, 0, INSTRUCT)
+    before = (served.corpus / "one" / "annotations" / "anna.jsonl").read_bytes()
+    sound = {
+        "base": 1,
+        "label": "x",
+        "change": {"utterances": [{"speaker": "participant", "utterance": 0, "spans": [INSTRUCT]}]},
+    }
+    numbers = ["0", "1", "2", "-1", "999999999999999999999", "9" * 5000, "a", "%00", "..", "0x0", "１"]
+    endings = [
+        "",
+        "/mark",
+        "/undo",
+        "/redo",
+        "/adopt",
+        "/marks",
+        "/bodies",
+        "/picture",
+        "/audio/x",
+        "/town",
+        "/versions",
+        "/x",
+    ]
+    queries = ["", "?frame=-1", "?frame=1e9", f"?frame={'9' * 400}", "?frame=0&frame=1", "?frame=%ff"]
+    for _ in range(1500):
+        text = bytearray(json.dumps(sound).encode())
+        for _ in range(rng.randint(1, 5)):
+            at = rng.randrange(len(text))
+            text[at : at + rng.choice([0, 1, 2, 20])] = rng.choice(
+                [b"", b"\x00", b'"', b"9" * 40, b"[" * 500, b"\xff", b"null", b"-1", b"{}", b"NaN", b"1e999"]
+            )
+        path = f"/api/sessions/{quote(rng.choice(numbers), safe='%')}{rng.choice(endings)}{rng.choice(queries)}"
+        body = None if rng.random() < 0.3 else bytes(text)
+        status, _, content = served.raw(path, body, name=rng.choice(["anna", "ben", "carol"]))
+        assert status in (200, 400, 403, 404, 405, 409), (path, status, content)
+        if status not in (200, 404, 405):
+            reason = json.loads(content)["reason"]
+            assert reason and "\n" not in reason and len(reason) < 1500
+    assert not caplog.records
+    log = (served.corpus / "one" / "annotations" / "anna.jsonl").read_bytes()
+    assert log.startswith(before)
+    assert served.ask("sessions/0/marks")["spans"] >= 5
+
+
+class _Unlimited(dict[str, tuple[float, float]]):
+    def get(self, key: str, default: object = None) -> tuple[float, float]:  # type: ignore[override]
+        assert isinstance(default, tuple)
+        return default
