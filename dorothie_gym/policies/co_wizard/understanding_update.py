@@ -58,6 +58,7 @@ _STOP_AHEAD = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
 _SETTLED = contents.QUESTIONS | {DialogueMove.ALIGN}
 _PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
 _REPEATABLE = contents.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
+_SIGNS_OF_HEARING = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 
@@ -87,6 +88,8 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
             react(state, view, act, heard.words, rng)
     remember(state, heard, rng)
     answer = _in_one_breath(state.speech.queue)
+    if answer and answer[0].act.move in _SIGNS_OF_HEARING and all(map(_is_plain_sign, before)):
+        before = ()  # one sign of hearing is enough
     state.speech = state.speech.cleared().plan(*before, *answer)
 
 
@@ -112,7 +115,7 @@ def _in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
     """
     understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
     answers = sorted(understood or answers[:1], key=_tells_plan)
-    plain = [item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots for item in answers]
+    plain = list(map(_is_plain_sign, answers))
     leads = [following.joined for following in answers[1:]]
     kept = [
         item
@@ -120,6 +123,11 @@ def _in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
         if not plain[k] or (k == 0 if all(plain) else k < len(leads) and leads[k])
     ]
     return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
+
+
+def _is_plain_sign(item: Remark) -> bool:
+    """Returns whether a remark is a mere "okay"."""
+    return item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots
 
 
 def _tells_plan(item: Remark) -> bool:
