@@ -16,7 +16,7 @@ from starlette.applications import Starlette
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
@@ -191,10 +191,13 @@ class SecurityHeaders:
 # --- websocket --------------------------------------------------------------------------------------------------------
 
 
-def is_same_origin(socket: WebSocket) -> bool:
-    """Returns whether a websocket was opened by a page of this server, or by a program without an origin."""
-    origin = socket.headers.get("origin")
-    return origin is None or urlsplit(origin).netloc.lower() == socket.headers.get("host", "").lower()
+def is_same_origin(connection: HTTPConnection) -> bool:
+    """Returns whether a request comes from a page of this server, or from a program without an origin."""
+    origin = connection.headers.get("origin")
+    try:
+        return origin is None or urlsplit(origin).netloc.lower() == connection.headers.get("host", "").lower()
+    except ValueError:  # no address
+        return False
 
 
 async def _serve(console: Console, socket: WebSocket) -> None:
