@@ -15,7 +15,7 @@ from typing import Any, Final, TypeVar
 import msgspec
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
@@ -50,6 +50,9 @@ MAX_BYTES: Final = 256 * 1024
 
 NEWS_SECONDS: Final = 20.0
 """Longest time that a request for news waits [s]: below the time-outs of proxies."""
+
+PATIENCE: Final = 2.0
+"""Time after which a request for news looks again by itself, as time may have passed for its person [s]."""
 
 TICK: Final = 0.3
 """Time between two looks at the waiting room and at the sessions [s]."""
@@ -215,8 +218,10 @@ class StudyServer:
                 left = end - time.monotonic()
                 if answer.headers["etag"] != body.have or left <= 0.0:
                     return answer
-                with contextlib.suppress(ClientDisconnect):
-                    await self._presence.wait_for_news(min(left, 2.0))
+                try:
+                    await self._presence.wait_for_news(min(left, PATIENCE))
+                except asyncio.CancelledError:
+                    return answer  # the server stops
                 if await request.is_disconnected():
                     return answer
 

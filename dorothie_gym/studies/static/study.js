@@ -7,7 +7,7 @@ import { prose } from './prose.js';
 
 const RETRY = 2000;  // [ms]
 const main = document.getElementById('main'), bar = document.getElementById('bar');
-let tag = '', shown = '', seated = false, asking = null, over = false;
+let tag = '', shown = '', seated = false, asking = null, acting = null, over = false;
 
 // --- server ----------------------------------------------------------------------------------------------------------
 
@@ -18,9 +18,16 @@ async function post(name, body, signal) {
   return { view, newTag: answer.headers.get('ETag') };
 }
 
-/** Sends what the participant did, and shows what follows. */
+/** Sends what the participant did, and shows what follows; no news are asked for meanwhile. */
 async function act(name, body) {
+  if (acting) return;
   asking?.abort();
+  acting = send(name, body);
+  await acting;
+  acting = null;
+}
+
+async function send(name, body) {
   try {
     show(await post(name, body));
   } catch (error) {
@@ -33,12 +40,14 @@ async function act(name, body) {
 /** Asks for news for as long as the page is open; the server answers when something has changed. */
 async function follow() {
   while (!over) {
+    await acting;
+    if (over) return;
     asking = new AbortController();
     try {
       show(await post('news', { have: tag }, asking.signal));
       document.body.classList.remove('lost');
     } catch (error) {
-      if (error.name === 'AbortError') { await pause(50); continue; }
+      if (error.name === 'AbortError') continue;
       if (error.status === 401) return gone('You do not take part in this study any more.');
       document.body.classList.add('lost');
       await pause(RETRY);
@@ -145,12 +154,19 @@ function seat(view, tools) {
   openSeat(view.token, {
     then: { label: 'Continue', run: proceed(view.stage) }, tools: [...tools, withdrawal()],
     onFinal: why => {
-      if (why === 'unknown') { setTimeout(() => location.reload(), 1000); return true; }  // the server has restarted, or the room is closed
+      if (why === 'unknown') { again(); return true; }
       if (why !== 'failed') return false;
       page(view, 'The session is over', h('p', { text: 'The program failed. This is not your fault.' }), next('Continue', proceed(view.stage)));
       return true;
     },
   });
+}
+
+/** Loads the page again after the seat is gone: the server has restarted, or the room was closed. */
+async function again() {
+  await pause(1000);
+  await acting;
+  if (!over) location.reload();
 }
 
 // --- end -------------------------------------------------------------------------------------------------------------
