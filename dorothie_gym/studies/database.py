@@ -21,6 +21,12 @@ BUSY_SECONDS: Final = 10.0
 """Time that a command waits for the server, or the server for a command [s]."""
 
 
+_PRAGMAS: Final = (
+    "journal_mode=DELETE", "synchronous=FULL", "secure_delete=ON", "foreign_keys=ON", "temp_store=MEMORY",
+)  # fmt: skip
+"""Settings of each connection; temporary tables in memory, so that no copies lie in other folders."""
+
+
 class Database:
     """SQLite database in a file that only its owner can read.
 
@@ -43,7 +49,7 @@ class Database:
         self._connection = sqlite3.connect(path, timeout=BUSY_SECONDS, isolation_level=None)
         self._connection.row_factory = sqlite3.Row
         try:
-            for pragma in ("journal_mode=DELETE", "synchronous=FULL", "secure_delete=ON", "foreign_keys=ON"):
+            for pragma in _PRAGMAS:
                 self._connection.execute(f"PRAGMA {pragma}").fetchall()
             if writable:
                 self._connection.executescript(schema)

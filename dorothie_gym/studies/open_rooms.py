@@ -11,7 +11,7 @@ from typing import Final
 
 from dorothie_gym.console.config import AfterAbsence
 from dorothie_gym.console.room import Room
-from dorothie_gym.console.seat import EXPERIMENTER, RoomState
+from dorothie_gym.console.seat import RoomState
 from dorothie_gym.console.server import Console
 from dorothie_gym.errors import DorothieGymError
 from dorothie_gym.ontology import Role
@@ -28,7 +28,7 @@ AT_ONCE: Final = 2
 """Rooms that are built at the same time."""
 
 IDLE_SECONDS: Final = 120.0
-"""Time after which a tutorial that nobody sits in is closed [s]; it begins again when the person is back."""
+"""Time after which a tutorial or a finished session is closed if nobody sits in it [s]; a tutorial begins again."""
 
 LEAST_PATIENCE: Final = 15.0
 """Shortest time for the people of a new session to sit down [s]: pages have to load."""
@@ -42,7 +42,8 @@ class OpenRoom:
         people: ids of the participants, by role.
         session: the session; None for a tutorial.
         resumes: whether it goes on with a session of a stopped server.
-        opened: clock at which it was opened, or at which a tutorial had its person last [s].
+        opened: clock at which it was opened [s].
+        attended: clock at which people were in it last [s].
         room: the room; None while it is being built.
         ready: set when it is built.
     """
@@ -51,6 +52,7 @@ class OpenRoom:
     session: SessionRow | None
     resumes: bool = False
     opened: float = field(default_factory=time.monotonic)
+    attended: float = field(default_factory=time.monotonic)
     room: Room | None = None
     ready: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -109,6 +111,10 @@ class OpenRooms:
             self._records.set_folder(row.id, row.id)  # before the record begins, so that a restart finds it
         return self._open(OpenRoom(people=dict(people), session=row, resumes=resumes))
 
+    def summary_left_behind(self, row: SessionRow) -> Mapping[str, object] | None:
+        """Returns the outcome of a session whose record is complete; None if it is not."""
+        return self._builder.summary(row)
+
     def _open(self, place: OpenRoom) -> OpenRoom:
         self._rooms.append(place)
         task = asyncio.create_task(self._build(place))
@@ -130,8 +136,9 @@ class OpenRooms:
             self._rooms.remove(place)
             if row is not None:
                 self._records.finish_session(row.id, EndReason.TECHNICAL.value, success=None, seconds=None)
+                self._records.set_group_state(row.group, "broken")
         else:
-            place.room, place.opened = room, time.monotonic()
+            place.room, place.opened, place.attended = room, time.monotonic(), time.monotonic()
             self._console.open(room)
             if row is not None and place.resumes and room.record is not None:
                 self._records.set_folder(row.id, room.record.folder.name)
@@ -146,14 +153,6 @@ class OpenRooms:
         role = next(role for role, person in place.people.items() if person == name)
         return place.room.seats[role.value].token
 
-    def experimenter_tokens(self) -> dict[str, str]:
-        """Returns the tokens of the experimenter's seat in the sessions in progress, by session."""
-        return {
-            place.session.id: place.room.seats[EXPERIMENTER].token
-            for place in self._rooms
-            if place.session is not None and place.room is not None and not place.is_over
-        }
-
     # --- progress ---------------------------------------------------------------------------------------------------
 
     def finished(self) -> list[OpenRoom]:
@@ -161,7 +160,7 @@ class OpenRooms:
         return [each for each in self._rooms if each.is_over and each.session is not None]
 
     def mind(self, now: float) -> list[OpenRoom]:
-        """Closes idle tutorials and applies the rules for people who do not come.
+        """Closes idle rooms and applies the rules for people who do not come.
 
         Args:
             now: monotonic clock [s].
@@ -170,19 +169,17 @@ class OpenRooms:
             New sessions whose people did not all sit down.
         """
         missed = []
-        for place in list(self._rooms):
-            if place.room is None or place.is_over:
-                continue
-            present = any(seat.present for seat in place.room.seats.values() if seat.role is not None)
-            if place.session is None:
-                if present:
-                    place.opened = now
-                elif now - place.opened > IDLE_SECONDS:
+        for place in [each for each in self._rooms if each.room is not None]:
+            assert place.room is not None
+            if any(seat.present for seat in place.room.seats.values() if seat.role is not None):
+                place.attended = now
+            if place.session is None or place.is_over:
+                if now - place.attended > IDLE_SECONDS:
                     self.close(place)
             elif place.room.state is RoomState.WAITING and now - place.opened > self._patience:
                 if not place.resumes:
                     missed.append(place)
-                elif present:
+                elif place.attended == now:
                     self._go_on_without(place.room)
         return missed
 

@@ -32,9 +32,9 @@ def participant_view(progress: Progress, person: Participant) -> dict[str, Any]:
         view["items"] = msgspec.to_builtins(study.questionnaire(QUESTIONNAIRES[stage]))
         view["part"] = person.position
     elif stage is Stage.INSTRUCTIONS and person.role is not None:
-        view["text"] = study.texts.instructions[person.role]
+        view["text"] = study.texts.instructions.of(person.role)
     elif stage is Stage.TUTORIAL and person.role is not None:
-        view |= {"text": study.texts.tutorial.get(person.role), "token": progress.seat_token(person)}
+        view |= {"text": study.texts.tutorial.of(person.role), "token": progress.seat_token(person)}
     elif stage is Stage.LOBBY:
         in_vain = progress.has_waited_in_vain(person.id)
         view |= {"text": study.texts.no_partner if in_vain else study.texts.waiting, "in_vain": in_vain}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Any, Final
 
 from dorothie_gym.errors import DorothieGymError
 from dorothie_gym.recording import EndReason
@@ -231,8 +231,15 @@ class Progress:
         return self.rooms.token(self.rooms.open_session(row, group.members), person.id)
 
     def reopen(self) -> None:
-        """Opens the rooms of sessions that were in progress when the last server stopped."""
+        """Opens the rooms of sessions that were in progress when the last server stopped.
+
+        Ends that the last server could not note any more are noted.
+        """
         for row in self.records.sessions():
+            summary = None if row.reason is not None else self.rooms.summary_left_behind(row)
+            if summary is not None:
+                self._note_summary(row, str(summary["reason"]), summary)
+                continue
             group = self.records.group(row.group)
             people = [self.records.participant(name) for name in group.members.values()]
             if (
@@ -259,17 +266,21 @@ class Progress:
     def _note_end(self, place: OpenRoom, row: SessionRow) -> None:
         room = place.room
         assert room is not None
-        reason = EndReason.TECHNICAL.value if room.failed else str(room.engine.summary()["reason"])
         summary = room.engine.summary()
-        logger.info("session %s is over: %s", row.id, reason)
+        reason = EndReason.TECHNICAL.value if room.failed else str(summary["reason"])
         with self.records.transaction():
             self.records.set_folder(row.id, None if room.record is None else room.record.folder.name)
+            self._note_summary(row, reason, summary)
+            self._note_absent(place, reason)
+
+    def _note_summary(self, row: SessionRow, reason: str, summary: Mapping[str, Any]) -> None:
+        logger.info("session %s is over: %s", row.id, reason)
+        with self.records.transaction():
             self.records.finish_session(
                 row.id, reason, success=bool(summary["success"]), seconds=float(summary["seconds"])
             )
             if reason not in COMPLETE:
                 self.records.set_group_state(row.group, "broken")
-                self._note_absent(place, reason)
             elif row.position + 1 >= self.study.sessions_each:
                 self.records.set_group_state(row.group, "completed")
 
@@ -294,6 +305,11 @@ class Progress:
                 self.records.dissolve(row.group)
             else:
                 self.records.set_group_state(row.group, "broken")
+
+    def forget_undecided(self) -> None:
+        """Deletes people who neither agreed nor declined and have not been seen for long."""
+        for name in self.records.undecided():
+            erase(self.records, name)
 
     # --- withdrawal -------------------------------------------------------------------------------------------------
 

@@ -28,7 +28,10 @@ from dorothie_gym.studies.record_types import (
 from dorothie_gym.studies.stages import Outcome, Stage
 
 ABANDONED_SECONDS: Final = 1800.0
-"""Time after which a role is given to somebody else if its person is not seen before the first session [s]."""
+"""Time without a sign of a person after which the role is given to somebody else, or what is known is deleted [s].
+
+The first holds before the first session, the second before the consent.
+"""
 
 
 class StudyRecords:
@@ -119,6 +122,12 @@ class StudyRecords:
     def see(self, name: str) -> None:
         """Notes that the browser of a participant was heard of."""
         self.data.run("UPDATE participants SET seen = ? WHERE id = ?", time.time(), name)
+
+    def undecided(self) -> list[str]:
+        """Returns the ids of the people who neither agreed nor declined and have not been seen for long."""
+        limit = time.time() - ABANDONED_SECONDS
+        rows = self.data.rows("SELECT id FROM participants WHERE stage = ? AND seen < ?", Stage.CONSENT.value, limit)
+        return [row["id"] for row in rows]
 
     def taken_tickets(self) -> set[int]:
         """Returns the numbers of the people who have a role, without those who dropped out or are away for long."""

@@ -16,7 +16,7 @@ from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.policy_loader import find_player
-from dorothie_gym.recording import SessionState, session_state
+from dorothie_gym.recording import Session, SessionState, session_state
 from dorothie_gym.rollout.replay import begin_replay
 from dorothie_gym.studies.record_types import SESSIONS_FOLDER, SessionRow
 from dorothie_gym.studies.study import HUMAN, Scenario, Study
@@ -84,6 +84,12 @@ class RoomBuilder:
     def state(self, row: SessionRow) -> SessionState:
         """Returns the state of the record of a session."""
         return SessionState.ABSENT if row.folder is None else session_state(self._folder / row.folder)
+
+    def summary(self, row: SessionRow) -> Mapping[str, object] | None:
+        """Returns the outcome of a session whose record is complete; None if it is not."""
+        if row.folder is None or self.state(row) is not SessionState.FINISHED:
+            return None
+        return Session.load(self._folder / row.folder).summary
 
     def _left_behind(self, row: SessionRow) -> Resumed | None:
         if row.folder is None or self.state(row) is not SessionState.PARTIAL:

@@ -57,6 +57,9 @@ PATIENCE: Final = 2.0
 TICK: Final = 0.3
 """Time between two looks at the waiting room and at the sessions [s]."""
 
+CLEANING_PERIOD: Final = 300.0
+"""Time between two deletions of people who did not decide to take part [s]."""
+
 REQUESTS: Final = (40.0, 4.0)
 """Requests that a participant may send at once, and per second."""
 
@@ -123,10 +126,14 @@ class StudyServer:
         return Starlette(routes=routes, lifespan=lifespan, middleware=[Middleware(SecurityHeaders)])
 
     async def _supervise(self) -> None:
-        """Pairs people, and notes the ends of sessions."""
+        """Pairs people, notes the ends of sessions, and deletes people who did not decide to take part."""
+        cleaned = 0.0
         while True:
             await asyncio.sleep(TICK)
             try:
+                if time.monotonic() - cleaned > CLEANING_PERIOD:
+                    self.progress.forget_undecided()
+                    cleaned = time.monotonic()
                 changed = self.progress.note_ends()
                 for place in self.rooms.mind(time.monotonic()):
                     self.progress.dissolve(place)

@@ -164,6 +164,19 @@ class Consent(_Part, frozen=True, kw_only=True):
     statements: Annotated[list[Annotated[str, Meta(min_length=1, max_length=1000)]], Meta(min_length=1, max_length=20)]
 
 
+class RoleTexts(_Part, frozen=True, kw_only=True):
+    """Text for each role that people play."""
+
+    participant: Prose | None = None
+    co_wizard: Prose | None = None
+    ad_wizard: Prose | None = None
+
+    def of(self, role: Role) -> str | None:
+        """Returns the text for a role; None if there is none."""
+        text: str | None = getattr(self, role.value)
+        return text
+
+
 class Texts(_Part, frozen=True, kw_only=True):
     """Texts of the study.
 
@@ -177,9 +190,9 @@ class Texts(_Part, frozen=True, kw_only=True):
         withdrawn: text after a withdrawal.
     """
 
-    instructions: dict[Role, Prose]
+    instructions: RoleTexts
     debriefing: Prose
-    tutorial: dict[Role, Prose] = {}
+    tutorial: RoleTexts = field(default_factory=RoleTexts)
     waiting: Prose = "You will be connected to another person as soon as one is ready. Please stay on this page."
     no_partner: Prose = "Nobody else is ready at the moment. You can go on waiting, or finish now."
     declined: Prose = "You did not agree, so the study ends here. Nothing about you was kept. You can close this page."

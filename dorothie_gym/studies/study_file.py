@@ -15,6 +15,7 @@ from dorothie_gym.errors import DorothieGymError, InputFileError, one_line, shor
 from dorothie_gym.input_files import read_text
 from dorothie_gym.maps import load_town
 from dorothie_gym.policies.policy_loader import find_player
+from dorothie_gym.studies.expectations import explain
 from dorothie_gym.studies.items import Choice, Number
 from dorothie_gym.studies.study import HUMAN, Method, Scenario, Study
 from dorothie_gym.tasks import load_template
@@ -23,6 +24,7 @@ MAX_STUDY: Final = 1_000_000
 """Largest study file [bytes]."""
 
 _DEEPEST: Final = 20
+_PLACE: Final = re.compile(r" - at `(?:key` in `)?\$(.*)`$")
 _INDEX: Final = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 
 
@@ -56,8 +58,9 @@ def read_study(path: Path) -> Study:
     try:
         study = msgspec.convert(value, Study)
     except msgspec.ValidationError as error:
-        reason, _, field = str(error).rpartition(" - at `$")
-        _fail(path, root, field.rstrip("`") if reason else "", reason or field)
+        place = _PLACE.search(str(error))
+        reason, field = (str(error)[: place.start()], place[1]) if place else (str(error), "")
+        _fail(path, root, field, explain(reason, Study, _INDEX.findall(field)))
     except RecursionError:
         _fail(path, root, "", "is nested too deeply")
     for field, reason in _faults(study):
@@ -151,7 +154,7 @@ def _faults(study: Study) -> Iterator[tuple[str, str]]:
     if study.assignment.method is Method.LATIN_SQUARE and len({each.people for each in study.conditions}) > 1:
         yield ".conditions", "people play the same roles in all conditions of a balanced Latin square; here they differ"
     for role in study.people:
-        if role not in study.texts.instructions:
+        if study.texts.instructions.of(role) is None:
             yield ".texts.instructions", f"the text for {role.value!r} is missing, which people play"
     for name in ("before", "after_session", "after"):
         items = study.questionnaire(name)

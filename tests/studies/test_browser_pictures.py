@@ -13,7 +13,8 @@ pytest.importorskip("uvicorn", reason="needs the extra console")
 
 from dorothie_gym.recording import Session  # noqa: E402
 from tests.console.test_browser_pictures import CHROMIUM, FLAGS, WAIT  # noqa: E402
-from tests.studies.serving import STUDY, ServedStudy, write_study  # noqa: E402
+from tests.studies.content import STUDY, write_study  # noqa: E402
+from tests.studies.serving import ServedStudy  # noqa: E402
 
 pytestmark = [
     pytest.mark.slow,
@@ -57,11 +58,17 @@ class Laboratory:
         page = self.browser.new_context(viewport={"width": width, "height": height}, **options).new_page()
         page.set_default_timeout(WAIT)
         page.on("pageerror", lambda error: self.errors.append(str(error)))
-        page.on("console", lambda line: self.errors.append(f"{line.text} {line.location}") if line.type == "error" else None)
+        page.on(
+            "console", lambda line: self.errors.append(f"{line.text} {line.location}") if line.type == "error" else None
+        )
         page.goto(f"{self.served.address}{link}")
         page.wait_for_selector("body[data-stage]")
         self.pages.append(page)
         return page
+
+    def read(self, line: Any) -> None:
+        if line.type == "error":
+            self.errors.append(f"{line.text} {line.location}")
 
 
 @pytest.fixture

@@ -14,7 +14,8 @@ from dorothie_gym.maps import load_town
 from dorothie_gym.recording import Session
 from dorothie_gym.rollout.replay import resimulate
 from dorothie_gym.studies.export import export_study
-from tests.studies.serving import SOLO, STUDY, Client, ServedStudy, at_once, seat, write_study
+from tests.studies.content import SOLO, STUDY, write_study
+from tests.studies.serving import Client, ServedStudy, at_once, seat
 
 
 def remains(folder: Path, text: str) -> list[str]:
