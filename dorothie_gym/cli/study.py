@@ -136,12 +136,11 @@ def invite(
     """Print links of which each admits one person once; only their hashes are stored."""
     import contextlib
 
-    from dorothie_gym.studies.record_types import STUDY_FILE
+    from dorothie_gym.studies.folder import check_folder
     from dorothie_gym.studies.records import StudyRecords
 
     with reporting_errors():
-        if not (folder / STUDY_FILE).is_file():
-            fail(f"{folder}: is no folder of a study; begin it first: dorothie-gym study run STUDY.yaml --out {folder}")
+        check_folder(folder)
         with contextlib.closing(StudyRecords(folder)) as records:
             links = [f"{site.rstrip('/')}/#{token}" for token in records.invite(count)]
     if as_json:

@@ -15,6 +15,7 @@ from typing import Any, Final, TypeAlias
 
 from dorothie_gym.files import replacing, write_atomically
 from dorothie_gym.recording import Session, SessionState, session_state
+from dorothie_gym.studies.folder import check_folder
 from dorothie_gym.studies.record_types import SESSIONS_FOLDER, STUDY_FILE
 from dorothie_gym.studies.records import StudyRecords
 from dorothie_gym.studies.study import Study
@@ -59,6 +60,7 @@ def export_study(folder: Path, out: Path) -> dict[str, int]:
     Raises:
         SessionError: the folder is of no study, or a session is damaged.
     """
+    check_folder(folder)
     records = StudyRecords(folder, writable=False)
     try:
         study = read_study(folder / STUDY_FILE)

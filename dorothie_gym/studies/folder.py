@@ -10,7 +10,7 @@ from typing import Final
 from dorothie_gym.errors import SessionError
 from dorothie_gym.files import write_atomically
 from dorothie_gym.studies.database import RunLock
-from dorothie_gym.studies.record_types import STUDY_FILE
+from dorothie_gym.studies.record_types import DATABASE_FILE, STUDY_FILE
 from dorothie_gym.studies.records import StudyRecords
 from dorothie_gym.studies.study import Study
 from dorothie_gym.studies.study_file import MAX_STUDY, read_study
@@ -43,11 +43,17 @@ def running_study(file: Path, folder: Path) -> Iterator[tuple[Study, StudyRecord
 @contextlib.contextmanager
 def open_study(folder: Path, *, create: bool = False) -> Iterator[StudyRecords]:
     """Yields the records of a study for changes, while no server runs; errors as of `running_study`."""
-    if not create and not (folder / STUDY_FILE).is_file():
-        raise SessionError(f"{folder}: is no folder of a study; give the one of `dorothie-gym study run --out`")
+    if not create:
+        check_folder(folder)
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     with contextlib.closing(RunLock(folder)), contextlib.closing(StudyRecords(folder)) as records:
         yield records
+
+
+def check_folder(folder: Path) -> None:
+    """Raises `SessionError` if a folder is not one of a study's data."""
+    if not (folder / STUDY_FILE).is_file() or not (folder / DATABASE_FILE).is_file():
+        raise SessionError(f"{folder}: is no folder of a study; give the one of `dorothie-gym study run --out`")
 
 
 def _keep(study: Study, file: Path, copy: Path) -> None:

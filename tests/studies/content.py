@@ -15,7 +15,7 @@ STUDY: dict[str, Any] = {
         {"name": "noisy", "co_wizard": "human", "word_error_rate": 0.2},
     ],
     "scenarios": [{"town": "brookside", "storyboard": "lunch_break"}, {"town": "brookside"}],
-    "session": {"max_seconds": 6.0, "pictures": False},
+    "session": {"max_seconds": 5.0, "pictures": False},
     "tutorial": {"seconds": 5.0},
     "waiting_room": {"seconds": 60.0},
     "absence": {"seconds": 1.0, "then": "end"},
