@@ -110,7 +110,6 @@ def test_people_go_on_where_they_were_after_a_restart(tmp_path: Path) -> None:
     with ServedStudy(file, data) as served:
         early, one, two = Client(served.port), Client(served.port), Client(served.port)
         early.do("join")
-        early.do("consent", {"agreed": [True, True]})
         one.enter()
         two.enter()
         seat(one, two)
