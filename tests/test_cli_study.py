@@ -140,6 +140,9 @@ def test_an_invitation_admits_one_person_once(tmp_path: Path) -> None:
         assert two.post("join", {"invitation": token}) == 409
         one.do("join", {"invitation": token})  # the same browser loads its link again
         assert one.stage == "consent"
+        first = one.view["id"]
+        one.do("join", {"invitation": links[1].rpartition("#")[2]})
+        assert one.view["id"] != first, "another person at a shared computer"
 
 
 def test_data_are_not_mixed_with_those_of_a_changed_study(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ from dorothie_gym.console.config import AfterAbsence
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.seat import RoomState
 from dorothie_gym.console.server import Console
-from dorothie_gym.errors import DorothieGymError
 from dorothie_gym.ontology import Role
 from dorothie_gym.recording import EndReason, SessionState
 from dorothie_gym.studies.erasure import remove_folders
@@ -131,7 +130,7 @@ class OpenRooms:
                     room = await asyncio.to_thread(self._builder.tutorial, role)
                 else:
                     room = await asyncio.to_thread(self._builder.session, row, place.people)
-        except (DorothieGymError, OSError):
+        except Exception:  # such as a full disk; the others go on
             logger.exception("%s cannot be opened", "a tutorial" if row is None else f"session {row.id}")
             self._rooms.remove(place)
             if row is not None:

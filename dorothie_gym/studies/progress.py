@@ -67,8 +67,10 @@ class Progress:
                 raise RefusedError("This invitation is not valid, or it has been used. Please ask for a new one.")
         return self.records.add_participant(kept)
 
-    def is_other_person(self, name: str, parameters: Mapping[str, str]) -> bool:
+    def is_other_person(self, name: str, parameters: Mapping[str, str], invitation: str | None) -> bool:
         """Returns whether a link was given to another person than the one who used this browser before."""
+        if invitation is not None and self.records.is_unused(invitation):
+            return True
         key = next(iter(self.study.recruitment.parameters), None)
         given = parameters.get(key, "") if key is not None else ""
         return bool(given) and key is not None and self.records.find_platform_id(key, given) != name

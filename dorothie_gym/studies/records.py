@@ -187,12 +187,17 @@ class StudyRecords:
                 self.data.run("INSERT INTO invitations (token) VALUES (?)", digest(token))
         return tokens
 
+    def is_unused(self, token: str) -> bool:
+        """Returns whether a token is valid and unused."""
+        query = "SELECT 1 FROM invitations WHERE token = ? AND used = 0"
+        return self.data.row(query, digest(token)) is not None
+
     def use_invitation(self, token: str) -> bool:
         """Uses a token up; returns whether it was valid and unused."""
         with self.data.transaction():
-            found = self.data.row("SELECT 1 FROM invitations WHERE token = ? AND used = 0", digest(token))
+            valid = self.is_unused(token)
             self.data.run("UPDATE invitations SET used = 1 WHERE token = ?", digest(token))
-        return found is not None
+        return valid
 
     # --- groups and sessions ----------------------------------------------------------------------------------------
 

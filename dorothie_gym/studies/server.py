@@ -196,10 +196,10 @@ class StudyServer:
 
     async def _join(self, request: Request) -> Response:
         body = await r.read_body(request, r.Join, MAX_BYTES)
-        person = self._person(request)
-        if person is not None and not self.progress.is_other_person(person.id, body.parameters):
+        person, given = self._person(request), (body.parameters, body.invitation)
+        if person is not None and not self.progress.is_other_person(person.id, *given):
             return self._view(person)
-        name, secret = self.progress.join(body.parameters, body.invitation)
+        name, secret = self.progress.join(*given)
         answer = _answer(participant_view(self.progress, self._known(name)))
         secure = request.url.scheme == "https"
         answer.set_cookie(

@@ -24,6 +24,9 @@ MAX_STUDY: Final = 1_000_000
 """Largest study file [bytes]."""
 
 _DEEPEST: Final = 20
+_UNPRINTABLE: Final = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
+"""Control characters and halves of characters, which escapes can give."""
+
 _PLACE: Final = re.compile(r" - at `(?:key` in `)?\$(.*)`$")
 _INDEX: Final = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 
@@ -122,7 +125,7 @@ def _plain(path: Path, node: yaml.Node) -> Any:
     if isinstance(node, yaml.MappingNode):
         fields: dict[str, Any] = {}
         for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode) or key.tag.endswith(":merge"):
+            if not isinstance(key, yaml.ScalarNode) or key.tag.endswith(":merge") or not key.value.isprintable():
                 raise InputFileError(path, "a name is expected before the colon", line)
             if key.value in fields:
                 place = f"line {key.start_mark.line + 1}"
@@ -135,6 +138,8 @@ def _plain(path: Path, node: yaml.Node) -> Any:
     if kind not in ("str", "bool", "null", "int", "float"):
         raise InputFileError(path, f"the tag {short_repr(node.tag)} is not read; remove it", line)
     text = str(node.value)
+    if found := _UNPRINTABLE.search(text):
+        raise InputFileError(path, f"the character {found[0]!a} cannot be shown; remove it", line)
     try:
         if kind in ("int", "float"):
             return int(text) if kind == "int" else float(text)

@@ -71,6 +71,7 @@ class Client:
         self.port, self.cookie, self.tag = port, "", ""
         self.view: dict[str, Any] = {}
         self.answer: dict[str, Any] = {}
+        self.received = b""
         self.headers: dict[str, str] = {}
 
     def send(self, method: str, path: str, body: bytes | None = None, headers: dict[str, str] | None = None) -> Any:
@@ -91,6 +92,7 @@ class Client:
         if "Set-Cookie" in headers:
             self.cookie = headers["Set-Cookie"].partition(";")[0]
         self.answer = json.loads(answer)
+        self.received += answer
         if status == 200:
             self.view, self.tag = self.answer, headers["ETag"]
         return int(status)

@@ -11,7 +11,7 @@ pytest.importorskip("uvicorn", reason="needs the extra console")
 pytest.importorskip("websockets", reason="needs the extra console")
 
 from dorothie_gym.maps import load_town
-from dorothie_gym.recording import Session
+from dorothie_gym.recording import SeatEventKind, Session, read_seat_log
 from dorothie_gym.rollout.replay import resimulate
 from dorothie_gym.studies.export import export_study
 from tests.studies.content import SOLO, STUDY, write_study
@@ -42,6 +42,8 @@ def test_two_people_go_from_the_link_to_the_code(tmp_path: Path) -> None:
         at_once(two.finish, lambda: one.finish("quite nice"))
         assert one.view["code"] == two.view["code"] == "FINISHED"
         assert one.view["url"] == "https://recruiting.example.org/done"
+        for secret in (two.view["id"], "platform", "exact", "noisy", "condition", "brookside", "scripted"):
+            assert secret.encode() not in one.received, f"the page is told {secret!r}"
     (folder,) = (tmp_path / "data" / "sessions").iterdir()
     session = Session.load(folder)
     assert session.complete
@@ -99,10 +101,11 @@ def test_withdrawal_in_a_session_ends_it_for_both(tmp_path: Path) -> None:
         three.enter()
         four.enter()
         seat(three, four)
-    rows = {row["session"]: row for row in exported(data, tmp_path / "out", "sessions")}
-    assert [row["reason"] for row in rows.values()] == ["withdrawn", ""]
-    assert len({row["slot"] for row in rows.values()}) == 1, "the slot is free again"
-    assert exported(data, tmp_path / "out", "participants")[0]["outcome"] in ("interrupted", "")
+    rows = exported(data, tmp_path / "out", "sessions")
+    assert [row["reason"] for row in rows] == ["withdrawn", ""]
+    assert len({row["slot"] for row in rows}) == 1, "the slot is free again"
+    outcomes = {row["participant"]: row["outcome"] for row in exported(data, tmp_path / "out", "participants")}
+    assert len(outcomes) == 3 and outcomes[two.view["id"]] == "interrupted"
 
 
 def test_people_go_on_where_they_were_after_a_restart(tmp_path: Path) -> None:
@@ -194,3 +197,59 @@ def test_all_conditions_are_played_in_turn(tmp_path: Path) -> None:
     assert [(row["session"], row["number"]) for row in answers] == list(zip(played, ["2.0", "6.0"], strict=True))
     assert [row["condition"] for row in answers] == list(played.values())
     assert exported(tmp_path / "data", tmp_path / "out", "participants")[0]["outcome"] == "completed"
+
+
+def test_a_script_takes_over_for_a_person_who_leaves(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    with ServedStudy(write_study(tmp_path, {**STUDY, "absence": {"seconds": 0.5, "then": "script"}}), data) as served:
+        one, two = Client(served.port), Client(served.port)
+        one.enter()
+        two.enter()
+        seat(one, two)
+        with one.sit():
+            with two.sit() as there:
+                two.say(there, "Certainly so.")
+            one.finish()
+    (folder,) = (data / "sessions").iterdir()
+    events = read_seat_log(folder)
+    assert events is not None
+    role = next(event.role for event in events if event.kind is SeatEventKind.TAKEN_OVER)
+    assert role is not None and Session.load(folder).header.extra["study"]["participants"][role] == two.view["id"]  # type: ignore[index]
+    assert exported(data, tmp_path / "out", "sessions")[0]["reason"] == "out of time"
+
+
+def test_people_go_back_to_the_waiting_room_if_their_partner_does_not_come(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dorothie_gym.studies.open_rooms.LEAST_PATIENCE", 1.0)
+    with ServedStudy(write_study(tmp_path, STUDY), tmp_path / "data") as served:
+        one, two = Client(served.port), Client(served.port)
+        one.enter()
+        two.enter()
+        seat(one, two)
+        with one.sit():
+            one.follow(lambda: one.stage == "lobby")
+        two.tag = ""
+        two.do("news")
+        seat(one, two)
+        with one.sit(), two.sit():
+            at_once(*(lambda each=each: each.follow(lambda: each.view.get("over")) for each in (one, two)))
+    (row,) = exported(tmp_path / "data", tmp_path / "out", "sessions")
+    assert row["reason"] == "out of time"
+
+
+def test_another_person_at_the_same_computer_begins_anew(tmp_path: Path) -> None:
+    with ServedStudy(write_study(tmp_path, SOLO), tmp_path / "data") as served:
+        one = Client(served.port)
+        one.do("join", {"parameters": {"PROLIFIC_PID": "first"}})
+        first, cookie = one.view["id"], one.cookie
+        for parameters in ({"PROLIFIC_PID": "first"}, {}):
+            one.do("join", {"parameters": parameters})
+            assert one.view["id"] == first and one.cookie == cookie
+        one.do("join", {"parameters": {"PROLIFIC_PID": "platform-two"}})
+        assert one.view["id"] != first and one.cookie != cookie
+        stranger = Client(served.port)
+        assert stranger.post("join", {"parameters": {"PROLIFIC_PID": "platform-two"}}) == 409, "in another browser"
+        one.do("consent", {"agreed": None})
+        assert one.view["gone"] and remains(tmp_path / "data", "platform-two") == []
+        stranger.do("join", {"parameters": {"PROLIFIC_PID": "platform-two"}})

@@ -83,6 +83,9 @@ def test_a_latin_square_needs_the_same_people_in_all_conditions(tmp_path: Path) 
         ("- 1", "expected `object`, got `array`"),
         ("[" * 60, "is nested more than 20 deep"),
         ("a: \x00", "is not YAML"),
+        ('a: "\\ud800"', r"line 1: the character '\\ud800' cannot be shown"),
+        ('a: "\\e[31m"', r"line 1: the character '\\x1b' cannot be shown"),
+        ('"\\ud800": 1', "line 1: a name is expected"),
     ],
 )
 def test_other_files_are_refused(tmp_path: Path, text: str, message: str) -> None:
