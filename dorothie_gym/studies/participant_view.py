@@ -36,7 +36,7 @@ def participant_view(progress: Progress, person: Participant) -> dict[str, Any]:
     elif stage is Stage.TUTORIAL and person.role is not None:
         view |= {"text": study.texts.tutorial.of(person.role), "token": progress.seat_token(person)}
     elif stage is Stage.LOBBY:
-        in_vain = progress.has_waited_in_vain(person.id)
+        in_vain = progress.waiting.has_waited_in_vain(person.id)
         view |= {"text": study.texts.no_partner if in_vain else study.texts.waiting, "in_vain": in_vain}
     elif stage is Stage.SESSION:
         token, row = progress.seat_token(person), progress.session_of(person)

@@ -1,32 +1,27 @@
-"""Progress of participants through a study: what they may do at each stage, pairing, and the end of sessions."""
+"""Progress of participants through a study: what they may do at each stage, and the end of sessions."""
 
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from dorothie_gym.errors import DorothieGymError
 from dorothie_gym.recording import EndReason
-from dorothie_gym.studies.assignment import Assigner, first_free, match
+from dorothie_gym.studies.assignment import Assigner, first_free
 from dorothie_gym.studies.erasure import erase
 from dorothie_gym.studies.items import Answer, check_answers
 from dorothie_gym.studies.open_rooms import OpenRoom, OpenRooms
 from dorothie_gym.studies.presence import Presence
-from dorothie_gym.studies.record_types import Group, Participant, SessionRow
+from dorothie_gym.studies.record_types import Participant, SessionRow
 from dorothie_gym.studies.records import StudyRecords
-from dorothie_gym.studies.stages import QUESTIONNAIRES, Outcome, Stage, next_stage
+from dorothie_gym.studies.stages import QUESTIONNAIRES, Outcome, RefusedError, Stage, check_stage, next_stage
 from dorothie_gym.studies.study import Admission, Study
+from dorothie_gym.studies.waiting_room import WaitingRoom
 
 logger = logging.getLogger(__name__)
 
 COMPLETE: Final = (EndReason.ARRIVED.value, EndReason.OUT_OF_TIME.value)
 """Reasons for the end of sessions that count as played."""
-
-
-class RefusedError(DorothieGymError, ValueError):
-    """A participant asked for what the present stage does not offer; the message is shown to the person."""
 
 
 class Progress:
@@ -39,12 +34,15 @@ class Progress:
         records: records of the study.
         rooms: open rooms.
         presence: people whose browsers are connected.
+
+    Attributes:
+        waiting: the waiting room.
     """
 
     def __init__(self, study: Study, records: StudyRecords, rooms: OpenRooms, presence: Presence) -> None:
-        self.study, self.records, self.rooms, self.presence = study, records, rooms, presence
+        self.study, self.records, self.rooms = study, records, rooms
         self.assigner = Assigner(study)
-        self._waiting_since: dict[str, float] = {}
+        self.waiting = WaitingRoom(study, records, rooms, presence, self.assigner)
 
     # --- entry ------------------------------------------------------------------------------------------------------
 
@@ -79,7 +77,7 @@ class Progress:
 
     def consent(self, person: Participant, agreed: Sequence[bool]) -> None:
         """Begins the study for a person who has agreed to all statements."""
-        _check_stage(person, Stage.CONSENT)
+        check_stage(person.stage, Stage.CONSENT)
         if list(agreed) != [True] * len(self.study.consent.statements):
             raise RefusedError("Please agree to every statement, or do not take part.")
         with self.records.transaction():
@@ -89,12 +87,12 @@ class Progress:
 
     def decline(self, person: Participant) -> None:
         """Deletes a person who does not agree."""
-        _check_stage(person, Stage.CONSENT)
+        check_stage(person.stage, Stage.CONSENT)
         erase(self.records, person.id)
 
     def answer(self, person: Participant, stage: Stage, answers: Mapping[str, Answer]) -> None:
         """Stores the answers to the questionnaire of a stage; raises `AnswerError` if they are not allowed."""
-        _check_stage(person, stage)
+        check_stage(person.stage, stage)
         if stage not in QUESTIONNAIRES:
             raise RefusedError("There is no questionnaire at this point.")
         name = QUESTIONNAIRES[stage]
@@ -106,7 +104,7 @@ class Progress:
 
     def proceed(self, person: Participant, stage: Stage) -> None:
         """Ends a stage at the wish of its participant."""
-        _check_stage(person, stage)
+        check_stage(person.stage, stage)
         if stage is Stage.SESSION:
             self._leave_session(person)
             return
@@ -147,72 +145,6 @@ class Progress:
         members = [self.records.participant(name) for name in group.members.values()]
         if place is not None and not any(each is not None and each.stage is Stage.SESSION for each in members):
             self.rooms.close(place)
-
-    # --- waiting room -----------------------------------------------------------------------------------------------
-
-    def has_waited_in_vain(self, name: str) -> bool:
-        """Returns whether a participant has waited for the time of the waiting room."""
-        since = self._waiting_since.get(name)
-        return since is not None and time.monotonic() - since >= self.study.waiting_room.seconds
-
-    def wait_on(self, person: Participant) -> None:
-        """Lets a participant wait for the time of the waiting room once more."""
-        _check_stage(person, Stage.LOBBY)
-        self._waiting_since[person.id] = time.monotonic()
-
-    def give_up(self, person: Participant) -> None:
-        """Ends the participation of a person who has waited in vain; the group of later sessions is broken."""
-        _check_stage(person, Stage.LOBBY)
-        if not self.has_waited_in_vain(person.id):
-            raise RefusedError("Please wait a little longer.")
-        with self.records.transaction():
-            if person.position == 0:
-                self.records.set_stage(person.id, Stage.DEBRIEFING, outcome=Outcome.NO_PARTNER)
-            else:
-                group = self.records.group_of(person.id)
-                assert group is not None
-                self.records.set_group_state(group.id, "broken")
-                stage = next_stage(self.study, Stage.AFTER_SESSION)
-                self.records.set_stage(person.id, stage, outcome=Outcome.INTERRUPTED)
-        self._waiting_since.pop(person.id, None)
-
-    def pair(self) -> bool:
-        """Forms groups of people who wait and are present, and continues groups; returns whether any session begins."""
-        waiting = self._waiting()
-        fresh = [(person.id, person.role) for person in waiting if person.position == 0 and person.role is not None]
-        begun = False
-        for slot, members in match(self.assigner, fresh, self.records.taken_slots()):
-            group = self.records.add_group(slot, members)
-            self._begin(group, 0)
-            begun = True
-        later = [self.records.group_of(person.id) for person in waiting if person.position > 0]
-        for group in {group.id: group for group in later if group is not None}.values():
-            ready = [person for person in waiting if person.id in group.members.values()]
-            if self.records.is_broken(group.id):
-                for person in ready:
-                    stage = next_stage(self.study, Stage.AFTER_SESSION)
-                    self.records.set_stage(person.id, stage, outcome=Outcome.INTERRUPTED)
-                begun = True
-            elif len(ready) == len(group.members) and len({person.position for person in ready}) == 1:
-                self._begin(group, ready[0].position)
-                begun = True
-        return begun
-
-    def _waiting(self) -> list[Participant]:
-        """Returns the people in the waiting room who are present, the longest waiting first."""
-        people = [self.records.participant(name) for name in self.presence.present()]
-        lobby = {each.id: each for each in people if each is not None and each.stage is Stage.LOBBY}
-        now = time.monotonic()
-        self._waiting_since = {name: self._waiting_since.get(name, now) for name in lobby}
-        return sorted(lobby.values(), key=lambda person: self._waiting_since[person.id])
-
-    def _begin(self, group: Group, position: int) -> None:
-        row = self.records.sessions(group.id)[position]
-        with self.records.transaction():
-            for name in group.members.values():
-                self.records.set_stage(name, Stage.SESSION, position=position)
-        logger.info("session %s begins: condition %s", row.id, row.condition)
-        self.rooms.open_session(row, group.members)
 
     # --- sessions ---------------------------------------------------------------------------------------------------
 
@@ -324,11 +256,6 @@ class Progress:
         place = None if row is None else self.rooms.of_session(row.id)
         if place is not None:
             await self.rooms.stop(place, EndReason.LEFT)
-        self._waiting_since.pop(person.id, None)
+        self.waiting.forget(person.id)
         erase(self.records, person.id)
         logger.info("a participant has withdrawn")
-
-
-def _check_stage(person: Participant, stage: Stage) -> None:
-    if person.stage is not stage:
-        raise RefusedError("This step is over. The page is loaded again.")

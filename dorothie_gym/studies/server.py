@@ -28,10 +28,11 @@ from dorothie_gym.studies.items import AnswerError
 from dorothie_gym.studies.open_rooms import OpenRooms
 from dorothie_gym.studies.participant_view import entrance_view, participant_view
 from dorothie_gym.studies.presence import Presence
-from dorothie_gym.studies.progress import Progress, RefusedError
+from dorothie_gym.studies.progress import Progress
 from dorothie_gym.studies.record_types import Participant
 from dorothie_gym.studies.records import StudyRecords
 from dorothie_gym.studies.room_building import RoomBuilder
+from dorothie_gym.studies.stages import RefusedError
 from dorothie_gym.studies.study import Study
 
 logger = logging.getLogger(__name__)
@@ -138,7 +139,7 @@ class StudyServer:
                 for place in self.rooms.mind(time.monotonic()):
                     self.progress.dissolve(place)
                     changed = True
-                changed = self.progress.pair() or changed
+                changed = self.progress.waiting.pair() or changed
             except Exception:
                 logger.exception("the study could not go on; it tries again")
                 await asyncio.sleep(5.0)
@@ -253,9 +254,9 @@ class StudyServer:
     async def _wait(self, request: Request) -> Response:
         person, body = await self._read(request, r.Wait)
         if body.on:
-            self.progress.wait_on(person)
+            self.progress.waiting.wait_on(person)
         else:
-            self.progress.give_up(person)
+            self.progress.waiting.give_up(person)
         return self._view(person)
 
     async def _withdraw(self, request: Request) -> Response:

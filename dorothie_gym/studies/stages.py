@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import enum
 
+from dorothie_gym.errors import DorothieGymError
 from dorothie_gym.studies.study import Study
+
+
+class RefusedError(DorothieGymError, ValueError):
+    """A participant asked for what the present stage does not offer; the message is shown to the person."""
 
 
 class Stage(enum.StrEnum):
@@ -66,3 +71,9 @@ def next_stage(study: Study, stage: Stage, *, more_sessions: bool = False) -> St
     if following is Stage.TUTORIAL and study.tutorial is None:
         return next_stage(study, following)
     return following
+
+
+def check_stage(stage: Stage, wanted: Stage) -> None:
+    """Raises `RefusedError` unless a participant is at a stage."""
+    if stage is not wanted:
+        raise RefusedError("This step is over. The page is loaded again.")
