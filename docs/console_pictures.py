@@ -34,9 +34,7 @@ COLOURS: Final = 256
 
 def main() -> None:
     """Takes all pictures."""
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        sys.exit("no Chromium is installed; on Debian: apt-get install chromium")
+    chromium = find_chromium()
     with subprocess.Popen(COMMAND, stdout=subprocess.PIPE, text=True) as server:
         try:
             assert server.stdout is not None
@@ -44,6 +42,14 @@ def main() -> None:
             _take(links, chromium)
         finally:
             server.terminate()
+
+
+def find_chromium() -> str:
+    """Returns the path of Chromium; exits if none is installed."""
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        sys.exit("no Chromium is installed; on Debian: apt-get install chromium")
+    return chromium
 
 
 def _take(links: dict[str, str], chromium: str) -> None:

@@ -34,8 +34,11 @@ UNCOMPILED = frozenset(
 """Folders and files whose tests step no simulation."""
 
 SESSIONS = frozenset(
-    ["benchmark", "console", "engine", "recording", "rendering", "rollout", "test_cli_console.py", "test_routing.py"]
-)
+    [
+        "benchmark", "console", "engine", "recording", "rendering", "rollout", "studies", "test_cli_console.py",
+        "test_cli_study.py", "test_routing.py",
+    ]
+)  # fmt: skip
 """Folders and files whose tests step sessions; those of all others may step batches, too."""
 
 PICTURES = "camera", "picture", "video", "film"

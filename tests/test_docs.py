@@ -6,12 +6,14 @@ import json
 import re
 import sys
 import tomllib
+from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
+import yaml
 
 from dorothie_gym.benchmark import metrics_of, read_predictions
 from dorothie_gym.benchmark.features import Batch
@@ -26,6 +28,10 @@ from dorothie_gym.recording import Task
 from dorothie_gym.rollout.closed_loop import METRICS, RecoverySeconds
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.speech import CabinState, signal_to_noise
+from dorothie_gym.studies.export import COLUMNS
+from dorothie_gym.studies.items import Item
+from dorothie_gym.studies.study import Study
+from dorothie_gym.studies.study_file import read_study
 from dorothie_gym.tasks import bind, load_template
 from tests.recording.builders import write
 from tests.recording.dialogues import talk
@@ -62,6 +68,18 @@ def test_pages_have_a_title_and_no_dead_links(page: str) -> None:
     assert text.startswith("# ")
     for link in re.findall(r"\]\(((?!http)[^)#]+)\)", text):
         assert (DOCS / link).exists(), f"{page} links to {link}"
+
+
+def test_the_page_of_studies_has_every_field_table_and_kind_of_item(tmp_path: Path) -> None:
+    page = (DOCS / "studies.md").read_text(encoding="utf-8")
+    content = yaml.safe_load((files("dorothie_gym.studies") / "data" / "example.yaml").read_text(encoding="utf-8"))
+    content["questionnaires"]["after"] = yaml.safe_load(example("studies.md", "yaml"))
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    items = read_study(tmp_path / "study.yaml").questionnaires.after
+    assert {type(item) for item in items} == set(get_args(Item))
+    rows = page.split("## Study file")[1].split("Texts are paragraphs")[0]
+    assert [name for name in Study.__struct_fields__ if f"`{name}`" not in rows] == []
+    assert [name for name in COLUMNS if f"| `{name}` |" not in page] == []
 
 
 def test_the_storyboard_of_its_page_is_strict_json() -> None:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dorothie_gym.cli.annotations import CorpusOrSession, load_corpus
-from dorothie_gym.cli.console import LOCAL, listen
 from dorothie_gym.cli.options import AsJson, Maps, needs
 from dorothie_gym.cli.output import fail, print_json, reporting_errors, stdout
+from dorothie_gym.cli.serving import LOCAL, listen
 from dorothie_gym.cli.warm_up import compile_first
 
 if TYPE_CHECKING:

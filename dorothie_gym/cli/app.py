@@ -28,6 +28,7 @@ from dorothie_gym.cli.rollout import leaderboard, rollout
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.sessions import compare, film, replay, show
 from dorothie_gym.cli.stats import stats
+from dorothie_gym.cli.study import study
 from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl
 from dorothie_gym.cli.warm_up import warm_up
@@ -77,6 +78,7 @@ app = typer.Typer(
 )
 app.command()(run)
 app.command()(console)
+app.add_typer(study, name="study")
 app.command()(annotate)
 app.add_typer(annotations_app, name="annotations")
 app.command()(agreement)

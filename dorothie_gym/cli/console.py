@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-import socket
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dorothie_gym.cli.completion import complete_town
-from dorothie_gym.cli.options import AsJson, Storyboard, WordErrors, needs
+from dorothie_gym.cli.options import AsJson, Storyboard, WordErrors
 from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stdout
+from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_libraries, listen, serve
 from dorothie_gym.cli.warm_up import compile_first
 
 if TYPE_CHECKING:
     from dorothie_gym.console.config import ConsoleConfig
     from dorothie_gym.console.room import Room
 
-LOCAL = "127.0.0.1"
-"""Address that is reached from this machine only."""
-
-PORT = 8023
-"""Usual port."""
-
 TOWN = "brookside"
 """Town if none is given: the smallest one."""
-
-_LIBRARIES = ("starlette", "uvicorn", "websockets")
 
 
 def console(
@@ -73,17 +64,17 @@ def console(
         str, typer.Option(metavar="pause|continue", help="What the session does while that person is away.")
     ] = "pause",
     pictures: Annotated[bool, typer.Option(help="Let participant and Co-Wizard look through the windscreen.")] = True,
-    host: Annotated[str, typer.Option(help="Address to listen at; by default only this machine reaches it.")] = LOCAL,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes a free one.")] = PORT,
+    host: Host = LOCAL,
+    port: Port = PORT,
     as_json: AsJson = False,
 ) -> None:
     """Play sessions with people in browsers, in real time: prints a link for each seat.
 
     Each link holds a secret and leads to one seat. A second browser at the seat of a role takes it over.
     """
-    for library in _LIBRARIES:
-        if find_spec(library) is None:
-            fail(f"console {needs('console')}: {library} is not installed; run: pip install 'dorothie-gym[console]'")
+    check_libraries("console")
+    from dorothie_gym.console.server import Console
+
     compile_first(pictures=pictures)
     with reporting_errors():
         config = _config(max_seconds, word_errors, absence, after_absence, while_away, pictures)
@@ -98,7 +89,7 @@ def console(
         print_json({"links": links, "recorded": None if out is None else str(out)})
     else:
         _print_links(links, out)
-    _serve(room, listener)
+    serve(Console([room]).app(), listener)
 
 
 def _config(
@@ -155,23 +146,9 @@ def _resumed_room(
     return room
 
 
-def listen(host: str, port: int) -> socket.socket:
-    """Returns a socket that listens at an address; fails if it cannot be used."""
-    listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind((host, port))
-        listener.listen(128)  # links work from now on
-    except OSError as error:
-        listener.close()
-        fail(f"{host}:{port} cannot be used ({error.strerror}); give another --port, or 0 for a free one")
-    return listener
-
-
 def _links(room: Room, host: str, port: int) -> dict[str, str]:
     """Returns the link of each seat; its secret is behind the #, which browsers do not send and servers do not log."""
-    shown = f"[{host}]" if ":" in host else host
-    return {name: f"http://{shown}:{port}/seat#{seat.token}" for name, seat in room.seats.items()}
+    return {name: f"{address(host, port)}/seat#{seat.token}" for name, seat in room.seats.items()}
 
 
 def _print_links(links: Facts, out: Path | None) -> None:
@@ -185,22 +162,3 @@ def _print_links(links: Facts, out: Path | None) -> None:
             screen.print(f"{folder} was interrupted; --resume {folder} goes on with it.", soft_wrap=True)
     recorded = f"Sessions are recorded in {out}." if out is not None else "Nothing is recorded; --out DIR records."
     screen.print(f"{recorded} Ctrl-C ends the session and the server.", soft_wrap=True)
-
-
-def _serve(room: Room, listener: socket.socket) -> None:
-    import uvicorn
-
-    from dorothie_gym.console.messages import MAX_BYTES
-    from dorothie_gym.console.server import Console
-
-    config = uvicorn.Config(
-        Console([room]).app(),
-        log_level="warning",
-        access_log=False,
-        ws="websockets-sansio",
-        ws_max_size=2 * MAX_BYTES,
-        ws_per_message_deflate=False,
-        server_header=False,
-        timeout_graceful_shutdown=2,
-    )
-    uvicorn.Server(config).run(sockets=[listener])

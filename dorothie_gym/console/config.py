@@ -64,6 +64,7 @@ class ConsoleConfig:
         picture_size: width and height of the pictures [px].
         picture_quality: quality of the pictures as JPEG, in 1..95.
         absence: rules for people who leave.
+        repeatable: whether people at the seats may begin another session after the last one.
 
     Raises:
         ValueError: a value is out of range; names the field.
@@ -76,6 +77,7 @@ class ConsoleConfig:
     picture_size: tuple[int, int] = (480, 270)
     picture_quality: int = 72
     absence: AbsenceRules = field(default_factory=AbsenceRules)
+    repeatable: bool = True
 
     def __post_init__(self) -> None:
         if not 1 <= self.picture_quality <= 95:

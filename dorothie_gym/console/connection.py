@@ -9,6 +9,8 @@ from typing import Any, Final
 
 import msgspec
 
+from dorothie_gym.console.rate_limit import TokenBucket
+
 MOST_WAITING: Final = 300
 """Messages that may wait for a slow browser; beyond that the connection is closed and can be made again: 30 s."""
 
@@ -61,19 +63,13 @@ class Connection:
         self._waiting: asyncio.Queue[bytes | Closing] = asyncio.Queue()
         self._picture: bytes | None = None
         self._closed = False
-        self._budget = BURST
-        self._seen: float | None = None
+        self._messages = TokenBucket(BURST, RATE)
 
     # --- incoming ---------------------------------------------------------------------------------------------------
 
     def admits(self, now: float) -> bool:
         """Returns whether another message is within the rate that a browser may send; `now` is a clock [s]."""
-        passed = 0.0 if self._seen is None else now - self._seen
-        self._seen, self._budget = now, min(BURST, self._budget + passed * RATE)
-        if self._budget < 1.0:
-            return False
-        self._budget -= 1.0
-        return True
+        return self._messages.admits(now)
 
     # --- outgoing ---------------------------------------------------------------------------------------------------
 

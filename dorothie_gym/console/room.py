@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeAlias
 
 from dorothie_gym.console import messages as m
-from dorothie_gym.console.config import AfterAbsence, ConsoleConfig, WhileAway
+from dorothie_gym.console.attendance import is_missing, is_ready, overdue, pause_reason
+from dorothie_gym.console.config import AfterAbsence, ConsoleConfig
 from dorothie_gym.console.connection import CloseCode, Connection, encode
 from dorothie_gym.console.inbox import SeatInbox
 from dorothie_gym.console.lane_lookup import lane_lookup
 from dorothie_gym.console.messages import MessageError
+from dorothie_gym.console.players import Players
 from dorothie_gym.console.resuming import SEATS, Resumed
+from dorothie_gym.console.room_calls import Arrival, Call, Departure, End, Receipt, Start
 from dorothie_gym.console.room_record import RoomRecord, free_folder
 from dorothie_gym.console.seat import EXPERIMENTER, SPECTATOR, Outgoing, PauseReason, RoomState, Seat
 from dorothie_gym.console.seat_frames import RoomStatus, SeatFrames
@@ -25,40 +27,16 @@ from dorothie_gym.console.talk_log import TalkLog
 from dorothie_gym.console.windscreen import Windscreen
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.recording import EndReason, SeatEvent, SeatEventKind
-from dorothie_gym.rollout.play import with_personas
 from dorothie_gym.rollout.replay import recorded_actions
 from dorothie_gym.spaces import ActionMapping
-
-
-@dataclass(frozen=True)
-class _Arrival:
-    seat: Seat
-    connection: Connection
-
-
-@dataclass(frozen=True)
-class _Departure:
-    seat: Seat
-    connection: Connection
-
-
-@dataclass(frozen=True)
-class _Receipt:
-    seat: Seat
-    connection: Connection
-    message: m.Incoming
-
-
-_Call: TypeAlias = _Arrival | _Departure | _Receipt
 
 
 class Room:
     """Room of one session after the other, with the same seats.
 
-    The thread of the event loop calls `join`, `leave` and `receive`, which only append to a queue; everything else
-    happens in `tick`, which one thread at a time may call.
+    The thread of the event loop calls `join`, `leave`, `receive`, `start` and `end`, which only append to a queue;
+    everything else happens in `tick`, which one thread at a time may call.
 
     Args:
         engine: engine of the sessions.
@@ -66,6 +44,8 @@ class Room:
         config: settings.
         seed: seed of the first session; each further one has the next number.
         folder: folder in which each session is recorded in a folder of its own; None records nothing.
+        name: name of the folder of a session; None names it by town, storyboard and seed.
+        extra: further fields of the header of the record (JSON types).
         resumed: interrupted session that the first one goes on with; the engine is then one of `begin_replay`.
 
     Attributes:
@@ -86,10 +66,13 @@ class Room:
         *,
         seed: int = 0,
         folder: Path | None = None,
+        name: str | None = None,
+        extra: Mapping[str, object] | None = None,
         resumed: Resumed | None = None,
     ) -> None:
         self.engine, self.config = engine, config
-        self._plans, self._seed, self._folder = dict(plans), seed, folder
+        self._plans, self._seed, self._folder, self._name = dict(plans), seed, folder, name
+        self._extra = {**(extra or {}), SEATS: plan_labels(self._plans)}
         self._places = lane_lookup(engine.town)
         self.seats = {seat.name: seat for seat in self._make_seats()}
         self.state = RoomState.WAITING
@@ -98,12 +81,11 @@ class Room:
         self.record: RoomRecord | None = None
         self.failed = False
         self._early: list[SeatEvent] = []
-        self._calls: deque[_Call] = deque()
+        self._calls: deque[Call] = deque()
         self._held = self._started = False
         self._why: PauseReason | None = None
         self._stopped_at = 0.0
-        self._policies: dict[Role, AnyPolicy] = {}
-        self._policy_states: dict[Role, Any] = {}
+        self._players = Players(engine, self._plans)
         self._begin(resumed)
 
     def _make_seats(self) -> Iterator[Seat]:
@@ -119,15 +101,23 @@ class Room:
 
     def join(self, seat: Seat, connection: Connection) -> None:
         """Seats a browser at the next tick; at the seat of a role it replaces the one before."""
-        self._calls.append(_Arrival(seat, connection))
+        self._calls.append(Arrival(seat, connection))
 
     def leave(self, seat: Seat, connection: Connection) -> None:
         """Notes at the next tick that a connection has ended."""
-        self._calls.append(_Departure(seat, connection))
+        self._calls.append(Departure(seat, connection))
 
     def receive(self, seat: Seat, connection: Connection, message: m.Incoming) -> None:
         """Carries out a message at the next tick."""
-        self._calls.append(_Receipt(seat, connection, message))
+        self._calls.append(Receipt(seat, connection, message))
+
+    def start(self) -> None:
+        """Begins the session at the next tick; policies play for the people who are missing."""
+        self._calls.append(Start())
+
+    def end(self, reason: EndReason) -> None:
+        """Ends the session at the next tick, if it is not over; one that has not begun leaves no record."""
+        self._calls.append(End(reason))
 
     @property
     def wants_pictures(self) -> bool:
@@ -137,7 +127,7 @@ class Room:
     @property
     def is_quiet(self) -> bool:
         """Whether nothing happens and nobody watches."""
-        return self.state is not RoomState.RUNNING and not self._calls and not any(map(_is_present, self._all()))
+        return self.state is not RoomState.RUNNING and not self._calls and not any(s.present for s in self._all())
 
     # --- a tick -----------------------------------------------------------------------------------------------------
 
@@ -174,6 +164,12 @@ class Room:
         out += [Outgoing(each, code=CloseCode.RESTART) for seat in self._all() for each in seat.connections]
         return out
 
+    def suspend(self) -> list[Outgoing]:
+        """Interrupts a session that is in progress because the program stops: a new program can go on with it."""
+        if self.record is not None:
+            self.record.close()
+        return [Outgoing(each, code=CloseCode.RESTART) for seat in self._all() for each in seat.connections]
+
     # --- sessions ---------------------------------------------------------------------------------------------------
 
     def _begin(self, resumed: Resumed | None = None) -> None:
@@ -181,10 +177,7 @@ class Room:
         engine = self.engine
         if resumed is None:
             engine.reset(seed=self._seed)
-        self._policies, self._policy_states = {}, {}
-        for role, plan in self._plans.items():
-            if plan.occupancy is Occupancy.POLICY:
-                self._start_policy(role)
+        self._players.begin(self._seed)
         for seat in self._all():
             seat.talk = TalkLog(seat.role)
             seat.taken_over, seat.refused = False, []
@@ -201,9 +194,9 @@ class Room:
         if self._folder is None or self.record is not None:
             return
         engine = self.engine
-        name = f"{engine.town.name}_{engine.scenario.storyboard.name}_{self._seed}"
-        header = with_personas(engine.session_header(), self._policies, self._policy_states)
-        header = replace(header, extra={**header.extra, SEATS: plan_labels(self._plans)})
+        name = self._name or f"{engine.town.name}_{engine.scenario.storyboard.name}_{self._seed}"
+        header = self._players.sign(engine.session_header())
+        header = replace(header, extra={**header.extra, **self._extra})
         self.record = RoomRecord(engine, header, free_folder(self._folder, name))
         self.record.note(self._early)
 
@@ -245,7 +238,7 @@ class Room:
         if self.state is RoomState.OVER:
             return
         if self.state is RoomState.WAITING:
-            if self._is_ready():
+            if is_ready(self.seats.values(), started=self._started):
                 self._open_record()
                 self.state = RoomState.RUNNING
             return
@@ -261,22 +254,10 @@ class Room:
         else:
             self._why = reason
 
-    def _is_ready(self) -> bool:
-        roles = list(self._roles())
-        if any(seat.needs_person and not seat.present and not seat.taken_over for seat in roles):
-            return False
-        if not roles:
-            return self._started or any(map(_is_present, self._all()))
-        return self._started or any(map(_is_present, roles))
-
     def _mind_absences(self, now: float) -> bool:
         """Applies the rules for people who are away; returns whether they ended the session."""
         rules = self.config.absence
-        for seat in self._roles():
-            if not seat.needs_person or seat.away_since is None or seat.taken_over:
-                continue
-            if now - seat.away_since < rules.seconds:
-                continue
+        for seat in overdue(self.seats.values(), rules, now):
             if rules.then is AfterAbsence.END:
                 self._break_off(EndReason.LEFT)
                 return True
@@ -288,22 +269,11 @@ class Room:
     def _pause_reason(self) -> PauseReason | None:
         if self._held:
             return PauseReason.EXPERIMENTER
-        roles = list(self._roles())
-        stops = self.config.absence.while_away is WhileAway.PAUSE
-        if stops and any(seat.needs_person and not seat.present and not seat.taken_over for seat in roles):
-            return PauseReason.ABSENCE
-        if not self._started and not any(map(_is_present, self._all())) and not any(seat.taken_over for seat in roles):
-            return PauseReason.ABSENCE  # nobody is there at all
-        return None
-
-    def _start_policy(self, role: Role) -> None:
-        policy = self._plans[role].player.make(role, self.engine.limits)
-        self._policies[role] = policy
-        self._policy_states[role] = policy.initial_state(policy_seed(self._seed, role), self.engine.town)
+        return pause_reason(self.seats.values(), self.config.absence, started=self._started)
 
     def _take_over(self, seat: Seat) -> None:
         assert seat.role is not None and seat.plan is not None
-        self._start_policy(seat.role)
+        self._players.start(seat.role)
         if seat.inbox is not None:
             seat.inbox.clear()
         if seat.joined:
@@ -314,17 +284,13 @@ class Room:
         engine = self.engine
         for seat in self._roles():
             assert seat.plan is not None and seat.role is not None
-            if seat.plan.occupancy is Occupancy.OPEN and not seat.present and seat.role not in self._policies:
+            if seat.plan.occupancy is Occupancy.OPEN and not seat.present and seat.role not in self._players:
                 self._take_over(seat)
-        actions: dict[str, ActionMapping] = {}
-        inputs = policy_inputs(engine, self._policies)
-        for role in AGENT_ROLES:
-            if role in self._policies:
-                actions[role.value], self._policy_states[role] = self._policies[role].step(
-                    inputs[role], self._policy_states[role]
-                )
-            else:
-                actions[role.value] = self._typed_action(self.seats[role.value])
+        played = self._players.actions()
+        actions = {
+            role.value: played[role.value] if role in self._players else self._typed_action(self.seats[role.value])
+            for role in AGENT_ROLES
+        }
         engine.step(actions)
         if self.record is not None:
             self.record.record(actions)
@@ -332,7 +298,7 @@ class Room:
         self._hear()
         for seat in self._roles():
             assert seat.role is not None
-            if seat.role not in self._policies:
+            if seat.role not in self._players:
                 seat.refused += engine.session.refused[seat.role]
         if engine.over:
             self._finish()
@@ -357,11 +323,16 @@ class Room:
 
     # --- people -----------------------------------------------------------------------------------------------------
 
-    def _handle(self, call: _Call, now: float, out: list[Outgoing]) -> None:
-        if isinstance(call, _Arrival):
+    def _handle(self, call: Call, now: float, out: list[Outgoing]) -> None:
+        if isinstance(call, Arrival):
             self._seat(call.seat, call.connection, now, out)
-        elif isinstance(call, _Departure):
+        elif isinstance(call, Departure):
             self._unseat(call.seat, call.connection, now)
+        elif isinstance(call, Start):
+            self._start_without_the_missing()
+        elif isinstance(call, End):
+            if self.state is not RoomState.OVER:
+                self._break_off(call.reason)
         else:
             try:
                 self._obey(call, out)
@@ -376,14 +347,13 @@ class Room:
             replaced, seat.connections = bool(seat.connections), [connection]
             if seat.inbox is not None:
                 seat.inbox.forget_numbers()
-                if seat.role in self._policies:
+                if seat.role in self._players:
                     seat.inbox.start_turn()
             if not replaced:
                 away = None if seat.away_since is None else round(now - seat.away_since, 1)
                 self._note(SeatEventKind.JOINED, seat.role, {"seconds": away})
             seat.joined, seat.away_since, seat.taken_over = True, None, False
-            self._policies.pop(seat.role, None)
-            self._policy_states.pop(seat.role, None)
+            self._players.stop(seat.role)
         else:
             seat.connections.append(connection)
 
@@ -395,7 +365,7 @@ class Room:
             seat.away_since = now
             self._note(SeatEventKind.LEFT, seat.role, {})
 
-    def _obey(self, call: _Receipt, out: list[Outgoing]) -> None:
+    def _obey(self, call: Receipt, out: list[Outgoing]) -> None:
         seat, connection, message = call.seat, call.connection, call.message
         if connection not in seat.connections:
             return  # it was replaced
@@ -427,6 +397,8 @@ class Room:
                 raise MessageError("the session is still in progress")
             if seat.name == SPECTATOR:
                 raise MessageError("spectators begin no sessions")
+            if not self.config.repeatable:
+                raise MessageError("no other session follows")
             self._begin_again()
             return
         if seat.name != EXPERIMENTER:
@@ -434,15 +406,18 @@ class Room:
         if self.state is RoomState.OVER:
             raise MessageError("the session is over")
         if message.act == "start":
-            self._started = True
-            for each in self._roles():
-                if each.needs_person and not each.present and not each.taken_over:
-                    each.taken_over = True
-                    self._take_over(each)
+            self._start_without_the_missing()
         elif message.act == "end":
             self._break_off(EndReason.ENDED)
         else:
             self._held = message.act == "pause"
+
+    def _start_without_the_missing(self) -> None:
+        self._started = True
+        for each in self._roles():
+            if is_missing(each):
+                each.taken_over = True
+                self._take_over(each)
 
     def _announce(self, seat: Seat, message: m.Announce) -> None:
         if seat.name != EXPERIMENTER:
@@ -473,7 +448,7 @@ class Room:
             self._early.append(event)
 
     def _status(self) -> RoomStatus:
-        return RoomStatus(state=self.state, why=self._why, plans=self._plans, policies=frozenset(self._policies))
+        return RoomStatus(state=self.state, why=self._why, plans=self._plans, policies=self._players.roles)
 
     # --- seats ------------------------------------------------------------------------------------------------------
 
@@ -482,7 +457,3 @@ class Room:
 
     def _roles(self) -> Iterator[Seat]:
         return (seat for seat in self.seats.values() if seat.role is not None)
-
-
-def _is_present(seat: Seat) -> bool:
-    return seat.present

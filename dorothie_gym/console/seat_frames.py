@@ -139,6 +139,7 @@ class SeatFrames:
             "town": town.name,
             "rate": self._config.decision_frequency,
             "pictures": self._windscreen is not None and seat.role is not Role.AD_WIZARD,
+            "repeatable": self._config.repeatable,
             "vocabulary": vocabulary(),
             **static_view(observed, len(town.streets)),
         }

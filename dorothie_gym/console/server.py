@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import secrets
 from collections.abc import AsyncIterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -15,9 +16,9 @@ from starlette.applications import Starlette
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, RedirectResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -61,21 +62,44 @@ class Console:
     """Rooms of a server and the seats of their links.
 
     Args:
-        rooms: rooms of the server.
+        rooms: rooms of the server when it starts.
+        suspends: whether sessions in progress are interrupted when the server stops, so that another server can go on
+            with them; otherwise they end.
 
     Attributes:
-        rooms: see above.
+        rooms: rooms that are open.
         connections: number of open websockets.
     """
 
-    def __init__(self, rooms: Sequence[Room]) -> None:
+    def __init__(self, rooms: Sequence[Room] = (), *, suspends: bool = False) -> None:
         self.rooms = list(rooms)
         self.connections = 0
-        self._seats = {seat.token: (room, seat) for room in self.rooms for seat in room.seats.values()}
+        self._suspends = suspends
+        self._tasks: dict[Room, asyncio.Task[None]] = {}
+        self._threads: tuple[ThreadPoolExecutor, ThreadPoolExecutor] | None = None
 
     def find(self, token: str) -> tuple[Room, Seat] | None:
         """Returns the room and the seat of a token; None for an unknown one."""
-        return self._seats.get(token)
+        seats = ((room, seat) for room in self.rooms for seat in room.seats.values())
+        given = token.encode()
+        return next((found for found in seats if secrets.compare_digest(found[1].token.encode(), given)), None)
+
+    def open(self, room: Room) -> None:
+        """Opens a room while the server runs."""
+        self.rooms.append(room)
+        self._run(room)
+
+    def close(self, room: Room) -> None:
+        """Closes a room whose session is over, and the connections of its seats."""
+        self.rooms.remove(room)
+        self._tasks.pop(room).cancel()
+        for seat in room.seats.values():
+            for connection in seat.connections:
+                connection.close(CloseCode.UNKNOWN_SEAT)
+
+    def _run(self, room: Room) -> None:
+        assert self._threads is not None, "the server does not run"
+        self._tasks[room] = asyncio.create_task(run_room(room, *self._threads))
 
     def town_page(self, name: str) -> bytes | None:
         """Returns the map of a town in which a session takes place; None for others."""
@@ -85,11 +109,22 @@ class Console:
     def app(self) -> Starlette:
         """Returns the application, which plays the sessions while it runs."""
 
-        async def index(request: Request) -> Response:
-            return FileResponse(STATIC / "index.html")
-
         async def root(request: Request) -> Response:
             return RedirectResponse("/seat")
+
+        @contextlib.asynccontextmanager
+        async def lifespan(app: Starlette) -> AsyncIterator[None]:
+            async with self.running():
+                yield
+
+        routes = [Route("/", root), *self.routes()]
+        return Starlette(routes=routes, lifespan=lifespan, middleware=[Middleware(SecurityHeaders)])
+
+    def routes(self) -> list[BaseRoute]:
+        """Returns the routes of seats, maps, static files and the websocket."""
+
+        async def index(request: Request) -> Response:
+            return FileResponse(STATIC / "index.html")
 
         async def town(request: Request) -> Response:
             page = await asyncio.to_thread(self.town_page, request.path_params["name"])
@@ -100,30 +135,34 @@ class Console:
         async def websocket(socket: WebSocket) -> None:
             await _serve(self, socket)
 
-        routes = [
-            Route("/", root),
+        return [
             Route("/seat", index),
             Route("/towns/{name}.json", town),
             WebSocketRoute("/ws", websocket),
             Mount("/static", StaticFiles(directory=STATIC)),
         ]
-        return Starlette(routes=routes, lifespan=self._lifespan, middleware=[Middleware(SecurityHeaders)])
 
     @contextlib.asynccontextmanager
-    async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
+    async def running(self) -> AsyncIterator[None]:
+        """Plays the sessions as long as the block lasts."""
         with (
             ThreadPoolExecutor(THREADS, thread_name_prefix="tick") as threads,
             ThreadPoolExecutor(1, thread_name_prefix="scene") as builders,
         ):
-            tasks = [asyncio.create_task(run_room(room, threads, builders)) for room in self.rooms]
+            self._threads = threads, builders
+            for room in self.rooms:
+                self._run(room)
             try:
                 yield
             finally:
-                for task in tasks:
+                for task in self._tasks.values():
                     task.cancel()
-                await asyncio.gather(*tasks, return_exceptions=True)
+                await asyncio.gather(*self._tasks.values(), return_exceptions=True)
         for room in self.rooms:
-            room.shut_down()
+            if self._suspends:
+                room.suspend()
+            else:
+                room.shut_down()
 
 
 class SecurityHeaders:
@@ -152,10 +191,13 @@ class SecurityHeaders:
 # --- websocket --------------------------------------------------------------------------------------------------------
 
 
-def is_same_origin(socket: WebSocket) -> bool:
-    """Returns whether a websocket was opened by a page of this server, or by a program without an origin."""
-    origin = socket.headers.get("origin")
-    return origin is None or urlsplit(origin).netloc.lower() == socket.headers.get("host", "").lower()
+def is_same_origin(connection: HTTPConnection) -> bool:
+    """Returns whether a request comes from a page of this server, or from a program without an origin."""
+    origin = connection.headers.get("origin")
+    try:
+        return origin is None or urlsplit(origin).netloc.lower() == connection.headers.get("host", "").lower()
+    except ValueError:  # no address
+        return False
 
 
 async def _serve(console: Console, socket: WebSocket) -> None:

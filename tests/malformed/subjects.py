@@ -447,6 +447,23 @@ def _read_audio(folder: Path) -> None:
     read_audio(folder / "speech.flac")
 
 
+def _study(folder: Path) -> None:
+    from importlib.resources import files
+
+    example = files("dorothie_gym.studies") / "data" / "example.yaml"
+    (folder / "study.yaml").write_text(example.read_text(encoding="utf-8"), encoding="utf-8")
+
+
+def _read_study(folder: Path) -> None:
+    from dorothie_gym.studies.assignment import Assigner
+    from dorothie_gym.studies.study_file import check_sources, read_study
+
+    file = folder / "study.yaml"
+    study = read_study(file)
+    Assigner(study).slot(3)
+    check_sources(study, file)
+
+
 SUBJECTS: Final = MappingProxyType(
     {
         "audio": Subject(_audio, _read_audio),
@@ -460,6 +477,7 @@ SUBJECTS: Final = MappingProxyType(
         "yaml": Subject(_yaml_town, _read_town, slow=True),
         "opendrive": Subject(_opendrive_town, _read_town),
         "storyboard": Subject(_storyboard, _read_storyboard),
+        "study": Subject(_study, _read_study),
         "rollout": Subject(_rollout, _read_rollout),
         "cache": Subject(_cache, _read_cache),
         "rl": Subject(_rl_model, _read_model, slow=True),

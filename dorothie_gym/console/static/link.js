@@ -18,11 +18,15 @@ export class Link extends EventTarget {
 
   closed(code) {
     clearInterval(this.pinging);
+    if (this.stopped) return;
     if (FINAL[code]) return this.emit('final', FINAL[code]);
     this.emit('lost');
     setTimeout(() => this.connect(), this.wait);
     this.wait = Math.min(4000, this.wait * 1.6);
   }
+
+  /** Ends the connection for good. */
+  stop() { this.stopped = true; this.socket?.close(); }
 
   read(message) {
     if (message.k === 'hello') {

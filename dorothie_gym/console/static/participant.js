@@ -19,7 +19,7 @@ export class ParticipantPage {
     this.tasks = h('ol', { class: 'tasks' });
     this.speed = h('output', { 'aria-label': 'Speed' });
     this.texts = new Map();
-    const errands = panel('Your errands', { class: 'errands' }, this.story, this.tasks);
+    const errands = panel('Your errands', { class: 'errands', tabindex: '0' }, this.story, this.tasks);
     this.element = h('div', { class: 'page participant' },
       h('div', { class: 'front' }, this.windscreen.element, h('div', { class: 'gauge' }, this.speed, h('span', { text: 'km/h' }))),
       errands, h('section', { class: 'panel map', 'aria-label': 'Map' }, this.canvas), this.talk.element);

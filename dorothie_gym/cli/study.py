@@ -1,0 +1,201 @@
+"""`dorothie-gym study init|check|run|invite|export|delete`: studies with people."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dorothie_gym.cli.options import AsJson
+from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stdout
+from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_libraries, listen, serve
+from dorothie_gym.cli.warm_up import compile_first
+
+if TYPE_CHECKING:
+    from dorothie_gym.studies.study import Study
+
+study = typer.Typer(help="Studies with people in the browser, from consent to completion code.", no_args_is_help=True)
+
+StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="File of the study.")]
+Data = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the study's data.")]
+
+
+@study.command()
+def init(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="New file, such as study.yaml.")],
+) -> None:
+    """Write an example study to change: two conditions, consent, instructions, questionnaires, debriefing."""
+    from importlib.resources import files
+
+    from dorothie_gym.files import write_atomically
+
+    if file.exists():
+        fail(f"{file}: exists; give the name of a new file")
+    with reporting_errors():
+        example = files("dorothie_gym.studies") / "data" / "example.yaml"
+        write_atomically(file, example.read_text(encoding="utf-8"))
+    stdout().print(f"{file} is an example. Change it, then: dorothie-gym study check {file}", soft_wrap=True)
+
+
+@study.command()
+def check(file: StudyFile, as_json: AsJson = False) -> None:
+    """Check a study file, and the towns, storyboards and policies that it names; print the order of conditions."""
+    from dorothie_gym.studies.study_file import check_sources, read_study
+
+    with reporting_errors():
+        found = read_study(file)
+        check_sources(found, file)
+    facts = _facts(found)
+    if as_json:
+        print_json(facts)
+        return
+    screen = stdout()
+    screen.print(f"{file}: {facts['title']}", soft_wrap=True)
+    screen.print(f"People play: {', '.join(facts['people'])}. Sessions of each group: {facts['sessions_each']}.")
+    screen.print(f"The first block has {facts['block_size']} groups:")
+    for number, slot in enumerate(facts["first_block"], start=1):
+        screen.print(f"  {number}  {'; '.join(slot)}", soft_wrap=True)
+
+
+def _facts(found: Study) -> Facts:
+    from dorothie_gym.studies.assignment import Assigner
+
+    assigner = Assigner(found)
+    slots = [assigner.slot(number) for number in range(assigner.block_size)]
+    return {
+        "title": found.title,
+        "people": [role.value for role in found.people],
+        "sessions_each": found.sessions_each,
+        "block_size": assigner.block_size,
+        "first_block": [
+            [
+                f"{condition} in {scenario.town}" + (f" ({scenario.storyboard})" if scenario.storyboard else "")
+                for condition, scenario in zip(slot.conditions, slot.scenarios, strict=True)
+            ]
+            for slot in slots
+        ],
+    }
+
+
+@study.command()
+def run(
+    file: StudyFile,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the data; an interrupted study goes on.")],
+    host: Host = LOCAL,
+    port: Port = PORT,
+    as_json: AsJson = False,
+) -> None:
+    """Run a study: print the link for its people, and serve it until Ctrl-C.
+
+    After a crash or Ctrl-C, the same command goes on: people are where they were.
+    """
+    check_libraries("study run")
+    from dorothie_gym.studies.folder import running_study
+    from dorothie_gym.studies.server import StudyServer
+    from dorothie_gym.studies.study_file import check_sources, read_study
+
+    with reporting_errors():
+        check_sources(read_study(file), file)
+    compile_first(pictures=read_study(file).session.pictures)
+    with reporting_errors(), running_study(file, out) as (found, records):
+        listener = listen(host, port)
+        link = f"{address(host, listener.getsockname()[1])}/"
+        if as_json:
+            print_json({"link": link, "data": str(out)})
+        else:
+            logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
+            logging.getLogger("dorothie_gym.studies").setLevel(logging.INFO)
+            _print_links(found, link, out)
+        serve(StudyServer(found, file.parent, records).app(), listener)
+
+
+def _print_links(found: Study, link: str, out: Path) -> None:
+    from dorothie_gym.studies.study import Admission
+
+    screen, names = stdout(), found.recruitment.parameters
+    if found.recruitment.admission is Admission.INVITED:
+        screen.print(f"Invitations: dorothie-gym study invite {out} --address {link} --count N", soft_wrap=True)
+    else:
+        query = "&".join(f"{name}={{{{%{name}%}}}}" for name in names)
+        screen.print(f"Link for people: {link}{f'?{query}' if query else ''}", soft_wrap=True)
+    screen.print(f"Data are in {out}. Ctrl-C stops the server; the same command goes on.", soft_wrap=True)
+
+
+@study.command()
+def invite(
+    folder: Data,
+    count: Annotated[int, typer.Option(min=1, max=10_000, help="Number of invitations.")] = 1,
+    site: Annotated[
+        str, typer.Option("--address", metavar="URL", help="Address of the study for its people.")
+    ] = f"http://{LOCAL}:{PORT}/",
+    as_json: AsJson = False,
+) -> None:
+    """Print links of which each admits one person once; only their hashes are stored."""
+    import contextlib
+
+    from dorothie_gym.studies.folder import check_folder
+    from dorothie_gym.studies.records import StudyRecords
+
+    with reporting_errors():
+        check_folder(folder)
+        with contextlib.closing(StudyRecords(folder)) as records:
+            links = [f"{site.rstrip('/')}/#{token}" for token in records.invite(count)]
+    if as_json:
+        print_json({"links": links})
+    else:
+        for link in links:
+            stdout().print(link, soft_wrap=True)
+
+
+@study.command()
+def export(
+    folder: Data,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the tables.")],
+    as_json: AsJson = False,
+) -> None:
+    """Write pseudonymous tables as CSV, and as Parquet: participants, answers, stages, sessions, utterances."""
+    from dorothie_gym.studies.export import export_study
+
+    with reporting_errors():
+        rows = export_study(folder, out)
+    if as_json:
+        print_json({"folder": str(out), "rows": rows})
+    else:
+        stdout().print(f"{out}: {', '.join(f'{count} {name}' for name, count in rows.items())}", soft_wrap=True)
+
+
+@study.command()
+def delete(
+    folder: Data,
+    participant: Annotated[
+        str, typer.Argument(metavar="PARTICIPANT", help="Number in the data, or id of the recruiting platform.")
+    ],
+    as_json: AsJson = False,
+) -> None:
+    """Delete everything of a person; the server must be stopped. Exports made before still have the person."""
+    from dorothie_gym.studies.erasure import erase
+    from dorothie_gym.studies.folder import open_study
+    from dorothie_gym.studies.record_types import STUDY_FILE
+    from dorothie_gym.studies.study_file import read_study
+
+    with reporting_errors(), open_study(folder) as records:
+        known = read_study(folder / STUDY_FILE).recruitment.parameters
+        ids = _ids(participant, (records.find_platform_id(known[0], participant) if known else None))
+        name = next((each for each in ids if records.participant(each) is not None), None)
+        if name is None:
+            fail(f"{folder}: has no participant {participant!r}")
+        sessions = erase(records, name)
+    if as_json:
+        print_json({"participant": name, "deleted_sessions": sessions})
+    else:
+        taken = f", and the records of {', '.join(sessions)}" if sessions else ""
+        stdout().print(f"Everything of {name} is deleted{taken}.", soft_wrap=True)
+
+
+def _ids(given: str, by_platform: str | None) -> Iterator[str]:
+    yield given
+    if by_platform is not None:
+        yield by_platform

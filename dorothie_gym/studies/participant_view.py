@@ -1,0 +1,50 @@
+"""What the browser of a participant is sent at each stage: texts, questions, and the token of the participant's seat.
+
+It holds nothing about conditions, other people or the assignment.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from dorothie_gym.studies.progress import Progress
+from dorothie_gym.studies.record_types import Participant
+from dorothie_gym.studies.stages import QUESTIONNAIRES, Outcome, Stage
+
+
+def entrance_view(progress: Progress) -> dict[str, Any]:
+    """Returns what everybody may see: the title."""
+    return {"title": progress.study.title}
+
+
+def participant_view(progress: Progress, person: Participant) -> dict[str, Any]:
+    """Returns the view of a participant in JSON types; equal states give equal views.
+
+    May open the room in which the participant has a seat.
+    """
+    study, stage = progress.study, person.stage
+    view: dict[str, Any] = {"title": study.title, "contact": study.contact, "stage": stage.value, "id": person.id}
+    if stage is Stage.CONSENT:
+        view |= {"text": study.consent.text, "statements": study.consent.statements}
+    elif stage in QUESTIONNAIRES:
+        view["items"] = msgspec.to_builtins(study.questionnaire(QUESTIONNAIRES[stage]))
+        view["part"] = person.position
+    elif stage is Stage.INSTRUCTIONS and person.role is not None:
+        view["text"] = study.texts.instructions.of(person.role)
+    elif stage is Stage.TUTORIAL and person.role is not None:
+        view |= {"text": study.texts.tutorial.of(person.role), "token": progress.seat_token(person)}
+    elif stage is Stage.LOBBY:
+        in_vain = progress.waiting.has_waited_in_vain(person.id)
+        view |= {"text": study.texts.no_partner if in_vain else study.texts.waiting, "in_vain": in_vain}
+    elif stage is Stage.SESSION:
+        token, row = progress.seat_token(person), progress.session_of(person)
+        view |= {"token": token, "over": row is not None and row.reason is not None}
+    elif stage is Stage.DEBRIEFING:
+        view["text"] = study.texts.debriefing
+    elif stage is Stage.DONE:
+        in_vain = person.outcome is Outcome.NO_PARTNER
+        end = study.recruitment.no_partner if in_vain else study.recruitment.completion
+        view |= {"code": end.code, "url": end.url}
+    return view

@@ -1,0 +1,261 @@
+"""Progress of participants through a study: what they may do at each stage, and the end of sessions."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from dorothie_gym.recording import EndReason
+from dorothie_gym.studies.assignment import Assigner, first_free
+from dorothie_gym.studies.erasure import erase
+from dorothie_gym.studies.items import Answer, check_answers
+from dorothie_gym.studies.open_rooms import OpenRoom, OpenRooms
+from dorothie_gym.studies.presence import Presence
+from dorothie_gym.studies.record_types import Participant, SessionRow
+from dorothie_gym.studies.records import StudyRecords
+from dorothie_gym.studies.stages import QUESTIONNAIRES, Outcome, RefusedError, Stage, check_stage, next_stage
+from dorothie_gym.studies.study import Admission, Study
+from dorothie_gym.studies.waiting_room import WaitingRoom
+
+logger = logging.getLogger(__name__)
+
+COMPLETE: Final = (EndReason.ARRIVED.value, EndReason.OUT_OF_TIME.value)
+"""Reasons for the end of sessions that count as played."""
+
+
+class Progress:
+    """Participants of a running study.
+
+    All methods are for the event loop.
+
+    Args:
+        study: the study.
+        records: records of the study.
+        rooms: open rooms.
+        presence: people whose browsers are connected.
+
+    Attributes:
+        waiting: the waiting room.
+    """
+
+    def __init__(self, study: Study, records: StudyRecords, rooms: OpenRooms, presence: Presence) -> None:
+        self.study, self.records, self.rooms = study, records, rooms
+        self.assigner = Assigner(study)
+        self.waiting = WaitingRoom(study, records, rooms, presence, self.assigner)
+
+    # --- entry ------------------------------------------------------------------------------------------------------
+
+    def join(self, parameters: Mapping[str, str], invitation: str | None) -> tuple[str, str]:
+        """Adds a person; returns the id and the secret of the browser.
+
+        Args:
+            parameters: parameters of the link; unknown names are left out.
+            invitation: token of an invitation; None for none.
+
+        Raises:
+            RefusedError: the invitation is not valid, or the person takes part already.
+        """
+        kept = {name: parameters[name] for name in self.study.recruitment.parameters if parameters.get(name)}
+        key = next(iter(self.study.recruitment.parameters), None)
+        if key in kept and self.records.find_platform_id(key, kept[key]) is not None:
+            raise RefusedError("You take part in this study already. Please go on in the browser in which you began.")
+        if self.study.recruitment.admission is Admission.INVITED:
+            if invitation is None or not self.records.use_invitation(invitation):
+                raise RefusedError("This invitation is not valid, or it has been used. Please ask for a new one.")
+        return self.records.add_participant(kept)
+
+    def is_other_person(self, name: str, parameters: Mapping[str, str], invitation: str | None) -> bool:
+        """Returns whether a link was given to another person than the one who used this browser before."""
+        if invitation is not None and self.records.is_unused(invitation):
+            return True
+        key = next(iter(self.study.recruitment.parameters), None)
+        given = parameters.get(key, "") if key is not None else ""
+        return bool(given) and key is not None and self.records.find_platform_id(key, given) != name
+
+    # --- stages -----------------------------------------------------------------------------------------------------
+
+    def consent(self, person: Participant, agreed: Sequence[bool]) -> None:
+        """Begins the study for a person who has agreed to all statements."""
+        check_stage(person.stage, Stage.CONSENT)
+        if list(agreed) != [True] * len(self.study.consent.statements):
+            raise RefusedError("Please agree to every statement, or do not take part.")
+        with self.records.transaction():
+            ticket = first_free(self.records.taken_tickets())
+            self.records.set_role(person.id, self.assigner.role(ticket), ticket)
+            self._advance(person)
+
+    def decline(self, person: Participant) -> None:
+        """Deletes a person who does not agree."""
+        check_stage(person.stage, Stage.CONSENT)
+        erase(self.records, person.id)
+
+    def answer(self, person: Participant, stage: Stage, answers: Mapping[str, Answer]) -> None:
+        """Stores the answers to the questionnaire of a stage; raises `AnswerError` if they are not allowed."""
+        check_stage(person.stage, stage)
+        if stage not in QUESTIONNAIRES:
+            raise RefusedError("There is no questionnaire at this point.")
+        name = QUESTIONNAIRES[stage]
+        checked = check_answers(self.study.questionnaire(name), answers)
+        with self.records.transaction():
+            position = person.position - 1 if stage is Stage.AFTER_SESSION else 0
+            self.records.answer(person.id, name, position, checked)
+            self._advance(person)
+
+    def proceed(self, person: Participant, stage: Stage) -> None:
+        """Ends a stage at the wish of its participant."""
+        check_stage(person.stage, stage)
+        if stage is Stage.SESSION:
+            self._leave_session(person)
+            return
+        if stage not in (Stage.INSTRUCTIONS, Stage.TUTORIAL, Stage.DEBRIEFING):
+            raise RefusedError("This step cannot be skipped.")
+        tutorial = self.rooms.tutorial_of(person.id)
+        if tutorial is not None:
+            self.rooms.close(tutorial)
+        with self.records.transaction():
+            self._advance(person)
+
+    def _advance(self, person: Participant) -> None:
+        more = self._plays_on(person)
+        cut_short = person.stage is Stage.AFTER_SESSION and not more and person.outcome is None
+        outcome = Outcome.INTERRUPTED if cut_short else None
+        stage = next_stage(self.study, person.stage, more_sessions=more)
+        self.records.set_stage(person.id, stage, outcome=outcome)
+
+    def _plays_on(self, person: Participant) -> bool:
+        group = self.records.group_of(person.id)
+        return group is not None and person.position < self.study.sessions_each and not self.records.is_broken(group.id)
+
+    def _leave_session(self, person: Participant) -> None:
+        """Moves a participant on whose session is over."""
+        row = self.session_of(person)
+        if row is None or row.reason is None:
+            raise RefusedError("The session is still in progress.")
+        group = self.records.group(row.group)
+        broken, last = self.records.is_broken(group.id), row.position + 1 >= self.study.sessions_each
+        stage, outcome = next_stage(self.study, Stage.SESSION), person.outcome
+        if outcome is None and (broken or last):
+            outcome = Outcome.COMPLETED if row.reason in COMPLETE and last else Outcome.INTERRUPTED
+        if outcome is None and stage is not Stage.AFTER_SESSION:
+            stage = Stage.LOBBY  # there is no questionnaire between sessions
+        with self.records.transaction():
+            self.records.set_stage(person.id, stage, outcome=outcome, position=row.position + 1)
+        place = self.rooms.of_session(row.id)
+        members = [self.records.participant(name) for name in group.members.values()]
+        if place is not None and not any(each is not None and each.stage is Stage.SESSION for each in members):
+            self.rooms.close(place)
+
+    # --- sessions ---------------------------------------------------------------------------------------------------
+
+    def session_of(self, person: Participant) -> SessionRow | None:
+        """Returns the present session of a participant."""
+        group = self.records.group_of(person.id)
+        return None if group is None else self.records.sessions(group.id)[person.position]
+
+    def seat_token(self, person: Participant) -> str | None:
+        """Returns the token of the participant's seat in a tutorial or session; opens the room if it is not open."""
+        if person.stage is Stage.TUTORIAL:
+            assert person.role is not None
+            return self.rooms.token(self.rooms.open_tutorial(person.id, person.role), person.id)
+        row = self.session_of(person)
+        if row is None or (row.reason is not None and self.rooms.of_session(row.id) is None):
+            return None
+        group = self.records.group(row.group)
+        return self.rooms.token(self.rooms.open_session(row, group.members), person.id)
+
+    def reopen(self) -> None:
+        """Opens the rooms of sessions that were in progress when the last server stopped.
+
+        Ends that the last server could not note any more are noted.
+        """
+        for row in self.records.sessions():
+            summary = None if row.reason is not None else self.rooms.summary_left_behind(row)
+            if summary is not None:
+                self._note_summary(row, str(summary["reason"]), summary)
+                continue
+            group = self.records.group(row.group)
+            people = [self.records.participant(name) for name in group.members.values()]
+            if (
+                row.reason is None
+                and people
+                and all(p is not None and p.stage is Stage.SESSION and p.position == row.position for p in people)
+            ):
+                self.rooms.open_session(row, group.members)
+
+    def note_ends(self) -> bool:
+        """Notes the ends of sessions that are over; returns whether there were any."""
+        ended = False
+        for place in self.rooms.finished():
+            assert place.session is not None and place.room is not None
+            row = next(
+                (each for each in self.records.sessions(place.session.group) if each.id == place.session.id), None
+            )
+            if row is None or row.reason is not None:
+                continue
+            ended = True
+            self._note_end(place, row)
+        return ended
+
+    def _note_end(self, place: OpenRoom, row: SessionRow) -> None:
+        room = place.room
+        assert room is not None
+        summary = room.engine.summary()
+        reason = EndReason.TECHNICAL.value if room.failed else str(summary["reason"])
+        with self.records.transaction():
+            self.records.set_folder(row.id, None if room.record is None else room.record.folder.name)
+            self._note_summary(row, reason, summary)
+            self._note_absent(place, reason)
+
+    def _note_summary(self, row: SessionRow, reason: str, summary: Mapping[str, Any]) -> None:
+        logger.info("session %s is over: %s", row.id, reason)
+        with self.records.transaction():
+            self.records.finish_session(
+                row.id, reason, success=bool(summary["success"]), seconds=float(summary["seconds"])
+            )
+            if reason not in COMPLETE:
+                self.records.set_group_state(row.group, "broken")
+            elif row.position + 1 >= self.study.sessions_each:
+                self.records.set_group_state(row.group, "completed")
+
+    def _note_absent(self, place: OpenRoom, reason: str) -> None:
+        """Notes who left a session that ended for this reason."""
+        assert place.room is not None
+        for role, name in place.people.items():
+            if reason == EndReason.LEFT.value and not place.room.seats[role.value].present:
+                self.records.set_outcome(name, Outcome.LEFT)
+
+    def dissolve(self, place: OpenRoom) -> None:
+        """Sends the people of a session that did not begin, as not all of them came, back to the waiting room."""
+        row = place.session
+        assert row is not None
+        logger.info("session %s did not begin: not everybody came", row.id)
+        self.rooms.close(place)
+        with self.records.transaction():
+            for name in place.people.values():
+                if self.records.participant(name) is not None:
+                    self.records.set_stage(name, Stage.LOBBY)
+            if row.position == 0:
+                self.records.dissolve(row.group)
+            else:
+                self.records.set_group_state(row.group, "broken")
+
+    def forget_undecided(self) -> None:
+        """Deletes people who neither agreed nor declined and have not been seen for long."""
+        for name in self.records.undecided():
+            erase(self.records, name)
+
+    # --- withdrawal -------------------------------------------------------------------------------------------------
+
+    async def withdraw(self, person: Participant) -> None:
+        """Deletes everything of a person; a session in progress ends for everybody."""
+        tutorial = self.rooms.tutorial_of(person.id)
+        if tutorial is not None:
+            await self.rooms.stop(tutorial, EndReason.LEFT)
+        row = self.session_of(person) if person.stage is Stage.SESSION else None
+        place = None if row is None else self.rooms.of_session(row.id)
+        if place is not None:
+            await self.rooms.stop(place, EndReason.LEFT)
+        self.waiting.forget(person.id)
+        erase(self.records, person.id)
+        logger.info("a participant has withdrawn")

@@ -1,0 +1,283 @@
+"""Records of a study folder: participants, answers, groups, sessions, invitations, ids of the recruiting platform."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Final
+
+from dorothie_gym.ontology import Role
+from dorothie_gym.studies.assignment import Slot
+from dorothie_gym.studies.database import Database
+from dorothie_gym.studies.items import Answer
+from dorothie_gym.studies.record_types import (
+    DATABASE_FILE,
+    RECRUITMENT_FILE,
+    RECRUITMENT_SCHEMA,
+    SCHEMA,
+    SESSIONS_FOLDER,
+    Group,
+    Participant,
+    SessionRow,
+)
+from dorothie_gym.studies.stages import Outcome, Stage
+
+ABANDONED_SECONDS: Final = 1800.0
+"""Time without a sign of a person after which the role is given to somebody else, or what is known is deleted [s].
+
+The first holds before the first session, the second before the consent.
+"""
+
+
+class StudyRecords:
+    """Records of a study folder.
+
+    Args:
+        folder: the folder, created for its owner only if it is missing.
+        writable: whether records are changed; otherwise the folder must exist.
+
+    Attributes:
+        folder: see above.
+        data: pseudonymous data.
+        recruitment: ids of the recruiting platform.
+
+    Raises:
+        SessionError: a database is missing or damaged.
+    """
+
+    def __init__(self, folder: Path, *, writable: bool = True) -> None:
+        self.folder = folder
+        if writable:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            (folder / SESSIONS_FOLDER).mkdir(exist_ok=True)
+        self.data = Database(folder / DATABASE_FILE, SCHEMA, writable=writable)
+        self.recruitment = Database(folder / RECRUITMENT_FILE, RECRUITMENT_SCHEMA, writable=writable)
+
+    def close(self) -> None:
+        """Closes the files."""
+        self.data.close()
+        self.recruitment.close()
+
+    def transaction(self) -> AbstractContextManager[None]:
+        """Makes the changes of a block to the pseudonymous data in one step."""
+        return self.data.transaction()
+
+    # --- participants -----------------------------------------------------------------------------------------------
+
+    def add_participant(self, parameters: Mapping[str, str]) -> tuple[str, str]:
+        """Adds a person before the consent; returns the id and the secret of the person's browser.
+
+        Args:
+            parameters: parameters of the link, which are kept apart.
+        """
+        secret, name = secrets.token_urlsafe(32), self._new_id()
+        with self.recruitment.transaction():  # first: rows without a participant are removed at the next start
+            for key, value in parameters.items():
+                self.recruitment.run("INSERT INTO parameters VALUES (?, ?, ?)", name, key, value)
+        with self.data.transaction():
+            number = 1 + (self.data.value("SELECT max(number) FROM participants") or 0)
+            self.data.run(
+                "INSERT INTO participants (id, secret, stage, seen, number) VALUES (?, ?, ?, ?, ?)",
+                name, digest(secret), Stage.CONSENT.value, time.time(), number,
+            )  # fmt: skip
+        return name, secret
+
+    def _new_id(self) -> str:
+        """Returns an unused random id, which says nothing about the person or the order of arrival."""
+        while True:
+            name = "P" + "".join(secrets.choice("23456789ABCDEFGHJKLMNPQRSTUVWXYZ") for _ in range(7))
+            if self.participant(name) is None:
+                return name
+
+    def participant(self, name: str) -> Participant | None:
+        """Returns a participant by id; None if there is none."""
+        found = self.data.row("SELECT * FROM participants WHERE id = ?", name)
+        if found is None:
+            return None
+        return Participant(
+            id=found["id"],
+            role=None if found["role"] is None else Role(found["role"]),
+            stage=Stage(found["stage"]),
+            position=found["position"],
+            outcome=None if found["outcome"] is None else Outcome(found["outcome"]),
+            seen=found["seen"],
+        )
+
+    def find_secret(self, secret: str) -> str | None:
+        """Returns the id of the participant whose browser has a secret; None if there is none."""
+        name: str | None = self.data.value("SELECT id FROM participants WHERE secret = ?", digest(secret))
+        return name
+
+    def find_platform_id(self, key: str, value: str) -> str | None:
+        """Returns the id of the participant whose link had a parameter; None if there is none."""
+        query = "SELECT participant FROM parameters WHERE name = ? AND value = ?"
+        name: str | None = self.recruitment.value(query, key, value)
+        return name if name is not None and self.participant(name) is not None else None
+
+    def see(self, name: str) -> None:
+        """Notes that the browser of a participant was heard of."""
+        self.data.run("UPDATE participants SET seen = ? WHERE id = ?", time.time(), name)
+
+    def undecided(self) -> list[str]:
+        """Returns the ids of the people who neither agreed nor declined and have not been seen for long."""
+        limit = time.time() - ABANDONED_SECONDS
+        rows = self.data.rows("SELECT id FROM participants WHERE stage = ? AND seen < ?", Stage.CONSENT.value, limit)
+        return [row["id"] for row in rows]
+
+    def taken_tickets(self) -> set[int]:
+        """Returns the numbers of the people who have a role, without those who dropped out or are away for long."""
+        early = ", ".join(
+            f"'{stage.value}'" for stage in (Stage.BEFORE, Stage.INSTRUCTIONS, Stage.TUTORIAL, Stage.LOBBY)
+        )
+        rows = self.data.rows(
+            f"SELECT ticket FROM participants WHERE ticket IS NOT NULL AND (outcome IS NULL OR outcome = ?) "
+            f"AND NOT (stage IN ({early}) AND position = 0 AND seen < ?)",
+            Outcome.COMPLETED.value, time.time() - ABANDONED_SECONDS,
+        )  # fmt: skip
+        return {row["ticket"] for row in rows}
+
+    def set_role(self, name: str, role: Role, ticket: int) -> None:
+        """Gives a participant a role."""
+        self.data.run("UPDATE participants SET role = ?, ticket = ? WHERE id = ?", role.value, ticket, name)
+
+    def set_stage(
+        self, name: str, stage: Stage, *, outcome: Outcome | None = None, position: int | None = None
+    ) -> None:
+        """Moves a participant to a stage.
+
+        Args:
+            name: id of the participant.
+            stage: the stage.
+            outcome: outcome of the participation, if it is known now.
+            position: number of the next session, if it changes.
+        """
+        with self.data.transaction():
+            self.data.run("UPDATE participants SET stage = ? WHERE id = ?", stage.value, name)
+            self.data.run("INSERT INTO marks VALUES (?, ?, ?)", name, stage.value, time.time())
+            if outcome is not None:
+                self.set_outcome(name, outcome)
+            if position is not None:
+                self.data.run("UPDATE participants SET position = ? WHERE id = ?", position, name)
+
+    def set_outcome(self, name: str, outcome: Outcome) -> None:
+        """Sets the outcome of a participation."""
+        self.data.run("UPDATE participants SET outcome = ? WHERE id = ?", outcome.value, name)
+
+    def answer(self, name: str, questionnaire: str, position: int, answers: Mapping[str, Answer]) -> None:
+        """Stores the answers of a participant to a questionnaire."""
+        with self.data.transaction():
+            for item, value in answers.items():
+                self.data.run(
+                    "INSERT OR REPLACE INTO answers VALUES (?, ?, ?, ?, ?)",
+                    name, questionnaire, position, item, json.dumps(value, ensure_ascii=False),
+                )  # fmt: skip
+
+    # --- invitations ------------------------------------------------------------------------------------------------
+
+    def invite(self, count: int) -> list[str]:
+        """Returns new tokens of invitations; only their hashes are stored."""
+        tokens = [secrets.token_urlsafe(16) for _ in range(count)]
+        with self.data.transaction():
+            for token in tokens:
+                self.data.run("INSERT INTO invitations (token) VALUES (?)", digest(token))
+        return tokens
+
+    def is_unused(self, token: str) -> bool:
+        """Returns whether a token is valid and unused."""
+        query = "SELECT 1 FROM invitations WHERE token = ? AND used = 0"
+        return self.data.row(query, digest(token)) is not None
+
+    def use_invitation(self, token: str) -> bool:
+        """Uses a token up; returns whether it was valid and unused."""
+        with self.data.transaction():
+            valid = self.is_unused(token)
+            self.data.run("UPDATE invitations SET used = 1 WHERE token = ?", digest(token))
+        return valid
+
+    # --- groups and sessions ----------------------------------------------------------------------------------------
+
+    def taken_slots(self) -> set[int]:
+        """Returns the slots of groups that are in progress or have completed their sessions."""
+        return {row["slot"] for row in self.data.rows("SELECT slot FROM groups WHERE state != 'broken'")}
+
+    def add_group(self, slot: Slot, members: Mapping[Role, str]) -> Group:
+        """Adds a group and its sessions."""
+        with self.data.transaction():
+            self.data.run("INSERT INTO groups (slot, state) VALUES (?, 'playing')", slot.number)
+            number = int(self.data.value("SELECT last_insert_rowid()"))
+            for role, name in members.items():
+                self.data.run("INSERT INTO members VALUES (?, ?, ?)", number, name, role.value)
+            plan = zip(slot.conditions, slot.scenarios, slot.seeds, strict=True)
+            for position, (condition, scenario, seed) in enumerate(plan):
+                self.data.run(
+                    "INSERT INTO sessions (id, group_id, position, condition, town, storyboard, seed) "
+                    "VALUES (?, ?, ?, ?, ?, ?, ?)",
+                    f"S{number:05d}-{position + 1:02d}", number, position, condition, scenario.town,
+                    scenario.storyboard, seed,
+                )  # fmt: skip
+        return Group(id=number, slot=slot.number, members=dict(members))
+
+    def group_of(self, name: str) -> Group | None:
+        """Returns the last group of a participant that has not been dissolved; None if there is none."""
+        found = self.data.value("SELECT max(group_id) FROM members WHERE participant = ?", name)
+        return None if found is None else self.group(found)
+
+    def group(self, number: int) -> Group:
+        """Returns a group with the members that have not withdrawn."""
+        rows = self.data.rows("SELECT role, participant FROM members WHERE group_id = ?", number)
+        slot = self.data.value("SELECT slot FROM groups WHERE id = ?", number)
+        return Group(id=number, slot=slot, members={Role(row["role"]): row["participant"] for row in rows})
+
+    def is_broken(self, group: int) -> bool:
+        """Returns whether a group lost a member, so that it plays no further session."""
+        return bool(self.data.value("SELECT state FROM groups WHERE id = ?", group) == "broken")
+
+    def set_group_state(self, group: int, state: str) -> None:
+        """Sets the state of a group: "playing", "completed" or "broken"."""
+        self.data.run("UPDATE groups SET state = ? WHERE id = ?", state, group)
+
+    def dissolve(self, group: int) -> None:
+        """Removes a group whose first session has not begun."""
+        with self.data.transaction():
+            self.data.run("DELETE FROM sessions WHERE group_id = ?", group)
+            self.data.run("DELETE FROM groups WHERE id = ?", group)
+
+    def sessions(self, group: int | None = None) -> list[SessionRow]:
+        """Returns the sessions of a group, or of all groups, in order."""
+        rows = self.data.rows("SELECT * FROM sessions WHERE ? IS NULL OR group_id = ? ORDER BY id", group, group)
+        return [
+            SessionRow(
+                id=row["id"], group=row["group_id"], position=row["position"], condition=row["condition"],
+                town=row["town"], storyboard=row["storyboard"], seed=row["seed"], folder=row["folder"],
+                reason=row["reason"],
+            )
+            for row in rows
+        ]  # fmt: skip
+
+    def set_folder(self, session: str, folder: str | None) -> None:
+        """Notes the folder in which a session is recorded."""
+        self.data.run("UPDATE sessions SET folder = ? WHERE id = ?", folder, session)
+
+    def finish_session(self, session: str, reason: str, *, success: bool | None, seconds: float | None) -> None:
+        """Notes the end of a session."""
+        self.data.run(
+            "UPDATE sessions SET reason = ?, success = ?, seconds = ? WHERE id = ?",
+            reason, None if success is None else int(success), seconds, session,
+        )  # fmt: skip
+
+    # --- erasure ----------------------------------------------------------------------------------------------------
+
+    def erase_later(self, folders: Sequence[str]) -> None:
+        """Notes folders that are to be removed, also after a crash."""
+        for folder in folders:
+            self.data.run("INSERT OR IGNORE INTO erasures VALUES (?)", folder)
+
+
+def digest(secret: str) -> bytes:
+    """Returns the hash of a random secret, as which it is stored."""
+    return hashlib.sha256(secret.encode()).digest()

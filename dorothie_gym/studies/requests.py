@@ -1,0 +1,107 @@
+"""Bodies of the requests of participants' browsers: a closed set of types with checked fields."""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeAlias, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
+from starlette.requests import ClientDisconnect, Request
+
+from dorothie_gym.studies.items import MAX_TEXT
+from dorothie_gym.studies.stages import Stage
+
+
+class BodyError(Exception):
+    """The body of a request is refused.
+
+    Attributes:
+        status: status of the answer.
+    """
+
+    def __init__(self, status: int, reason: str) -> None:
+        super().__init__(reason)
+        self.status = status
+
+
+class Body(Struct, forbid_unknown_fields=True, frozen=True):
+    """Body of a request."""
+
+
+_Name: TypeAlias = Annotated[str, Meta(max_length=40)]
+_Option: TypeAlias = Annotated[str, Meta(max_length=200)]
+_Text: TypeAlias = Annotated[str, Meta(max_length=MAX_TEXT)]
+
+
+class Join(Body, frozen=True):
+    """Entry: parameters of the link, and the token of an invitation."""
+
+    parameters: Annotated[dict[_Name, Annotated[str, Meta(max_length=200)]], Meta(max_length=30)] = {}
+    invitation: Annotated[str, Meta(max_length=64)] | None = None
+
+
+class News(Body, frozen=True):
+    """Request for the view as soon as it differs from the one with the tag `have`."""
+
+    have: Annotated[str, Meta(max_length=64)] = ""
+
+
+class Consent(Body, frozen=True):
+    """Consent: what was agreed to, by statement; None declines."""
+
+    agreed: Annotated[list[bool], Meta(max_length=20)] | None
+
+
+class Answers(Body, frozen=True):
+    """Answers to the questionnaire of a stage, by item."""
+
+    stage: Stage
+    answers: Annotated[dict[_Name, _Text | int | float | list[_Option] | None], Meta(max_length=200)]
+
+
+class Proceed(Body, frozen=True):
+    """Wish to end a stage."""
+
+    stage: Stage
+
+
+class Wait(Body, frozen=True):
+    """Choice of a person who has waited in vain: to wait on, or to finish."""
+
+    on: bool
+
+
+class Withdraw(Body, frozen=True):
+    """Withdrawal, which the person must have confirmed."""
+
+    sure: bool
+
+
+_T = TypeVar("_T", bound=Body)
+
+
+async def read_body(request: Request, kind: type[_T], limit: int) -> _T:
+    """Returns the body of a request.
+
+    Args:
+        request: the request.
+        kind: type of the body.
+        limit: largest size [bytes]; no more is read.
+
+    Raises:
+        BodyError: it is too large, not sent as JSON, or malformed.
+    """
+    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
+        raise BodyError(415, "The body must be JSON.")
+    content = bytearray()
+    try:
+        async for part in request.stream():
+            content += part
+            if len(content) > limit:
+                raise BodyError(413, "The request is too large.")
+    except ClientDisconnect:
+        raise BodyError(400, "The request was not complete.") from None
+    try:
+        return msgspec.json.decode(bytes(content), type=kind)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        raise BodyError(400, "The request is malformed.") from None

@@ -1,0 +1,298 @@
+"""Web server of a study: the participants' page, its requests, and the seats of the console."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hashlib
+import logging
+import time
+from collections import OrderedDict
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+import msgspec
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from dorothie_gym.console.rate_limit import TokenBucket
+from dorothie_gym.console.server import Console, SecurityHeaders, is_same_origin
+from dorothie_gym.studies import requests as r
+from dorothie_gym.studies.erasure import finish_erasures
+from dorothie_gym.studies.items import AnswerError
+from dorothie_gym.studies.open_rooms import OpenRooms
+from dorothie_gym.studies.participant_view import entrance_view, participant_view
+from dorothie_gym.studies.presence import Presence
+from dorothie_gym.studies.progress import Progress
+from dorothie_gym.studies.record_types import Participant
+from dorothie_gym.studies.records import StudyRecords
+from dorothie_gym.studies.room_building import RoomBuilder
+from dorothie_gym.studies.stages import RefusedError
+from dorothie_gym.studies.study import Study
+
+logger = logging.getLogger(__name__)
+
+_T = TypeVar("_T", bound=r.Body)
+
+STATIC: Final = Path(__file__).parent / "static"
+
+COOKIE: Final = "dorothie_study"
+"""Cookie with the secret of a participant's browser; scripts of pages cannot read it."""
+
+COOKIE_SECONDS: Final = 14 * 86400
+
+MAX_BYTES: Final = 256 * 1024
+"""Largest body of a request [bytes]: 50 long texts of a questionnaire."""
+
+NEWS_SECONDS: Final = 20.0
+"""Longest time that a request for news waits [s]: below the time-outs of proxies."""
+
+PATIENCE: Final = 2.0
+"""Time after which a request for news looks again by itself, as time may have passed for its person [s]."""
+
+TICK: Final = 0.3
+"""Time between two looks at the waiting room and at the sessions [s]."""
+
+CLEANING_PERIOD: Final = 300.0
+"""Time between two deletions of people who did not decide to take part [s]."""
+
+REQUESTS: Final = (40.0, 4.0)
+"""Requests that a participant may send at once, and per second."""
+
+ENTRIES: Final = (60.0, 2.0)
+"""Requests without a participant that an address may send at once, and per second: a laboratory shares one."""
+
+MOST_BUCKETS: Final = 10_000
+"""Most participants and addresses whose requests are counted."""
+
+
+class StudyServer:
+    """Server of one study.
+
+    Args:
+        study: the study.
+        sources: folder of its file, for names of files in it.
+        records: records of the study.
+
+    Attributes:
+        console: rooms and seats.
+        progress: participants.
+    """
+
+    def __init__(self, study: Study, sources: Path, records: StudyRecords) -> None:
+        self.console = Console(suspends=True)
+        self._presence = Presence()
+        self._records = records
+        self.rooms = OpenRooms(
+            study, RoomBuilder(study, sources, records.folder), records, self.console, self._presence.tell
+        )
+        self.progress = Progress(study, records, self.rooms, self._presence)
+        self._buckets: OrderedDict[str, TokenBucket] = OrderedDict()
+        self._withdrawing: set[str] = set()
+
+    def app(self) -> Starlette:
+        """Returns the application, which plays the study while it runs."""
+
+        async def page(request: Request) -> Response:
+            return FileResponse(STATIC / "study.html")
+
+        @contextlib.asynccontextmanager
+        async def lifespan(app: Starlette) -> AsyncIterator[None]:
+            async with self.console.running():
+                finish_erasures(self._records)
+                self.progress.reopen()
+                task = asyncio.create_task(self._supervise())
+                try:
+                    yield
+                finally:
+                    task.cancel()
+                    await asyncio.gather(task, return_exceptions=True)
+                    self._presence.tell()
+
+        actions: dict[str, Callable[[Request], Awaitable[Response]]] = {
+            "join": self._join, "news": self._news, "consent": self._consent, "answers": self._answers,
+            "proceed": self._proceed, "wait": self._wait, "withdraw": self._withdraw,
+        }  # fmt: skip
+        routes = [
+            Route("/", page),
+            *(Route(f"/study/{name}", self._guarded(run), methods=["POST"]) for name, run in actions.items()),
+            Mount("/study-static", StaticFiles(directory=STATIC)),
+            *self.console.routes(),
+        ]
+        return Starlette(routes=routes, lifespan=lifespan, middleware=[Middleware(SecurityHeaders)])
+
+    async def _supervise(self) -> None:
+        """Pairs people, notes the ends of sessions, and deletes people who did not decide to take part."""
+        cleaned = 0.0
+        while True:
+            await asyncio.sleep(TICK)
+            try:
+                if time.monotonic() - cleaned > CLEANING_PERIOD:
+                    self.progress.forget_undecided()
+                    cleaned = time.monotonic()
+                changed = self.progress.note_ends()
+                for place in self.rooms.mind(time.monotonic()):
+                    self.progress.dissolve(place)
+                    changed = True
+                changed = self.progress.waiting.pair() or changed
+            except Exception:
+                logger.exception("the study could not go on; it tries again")
+                await asyncio.sleep(5.0)
+                continue
+            if changed:
+                self._presence.tell()
+
+    # --- requests ---------------------------------------------------------------------------------------------------
+
+    def _guarded(self, run: Callable[[Request], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
+        """Refuses requests of other pages, too many ones, and malformed ones."""
+
+        async def handle(request: Request) -> Response:
+            if not is_same_origin(request):
+                return _refusal(403, "This page belongs to another server.")
+            person = self._person(request)
+            if not self._admits(person.id if person else request.client.host if request.client else "", bool(person)):
+                return _refusal(429, "Too many requests. Please wait a moment.")
+            try:
+                return await run(request)
+            except r.BodyError as error:
+                return _refusal(error.status, str(error))
+            except _NobodyError:
+                return _refusal(401, "You do not take part in this study.")
+            except (RefusedError, AnswerError) as error:
+                return _refusal(409, str(error))
+
+        return handle
+
+    def _admits(self, key: str, known: bool) -> bool:
+        bucket = self._buckets.pop(key, None) or TokenBucket(*(REQUESTS if known else ENTRIES))
+        self._buckets[key] = bucket
+        while len(self._buckets) > MOST_BUCKETS:
+            self._buckets.popitem(last=False)
+        return bucket.admits(time.monotonic())
+
+    def _person(self, request: Request) -> Participant | None:
+        secret = request.cookies.get(COOKIE)
+        name = None if not secret else self._records.find_secret(secret)
+        return None if name is None or name in self._withdrawing else self._records.participant(name)
+
+    async def _read(self, request: Request, kind: type[_T]) -> tuple[Participant, _T]:
+        """Returns the participant and the body of a request."""
+        body = await r.read_body(request, kind, MAX_BYTES)
+        person = self._person(request)  # after the body has come, which may take long
+        if person is None:
+            raise _NobodyError
+        return person, body
+
+    def _view(self, person: Participant) -> Response:
+        """Answers with the present view of a participant."""
+        self._presence.tell()
+        found = self._records.participant(person.id)
+        return _answer(entrance_view(self.progress) if found is None else participant_view(self.progress, found))
+
+    async def _join(self, request: Request) -> Response:
+        body = await r.read_body(request, r.Join, MAX_BYTES)
+        person, given = self._person(request), (body.parameters, body.invitation)
+        if person is not None and not self.progress.is_other_person(person.id, *given):
+            return self._view(person)
+        name, secret = self.progress.join(*given)
+        answer = _answer(participant_view(self.progress, self._known(name)))
+        secure = request.url.scheme == "https"
+        answer.set_cookie(
+            COOKIE, secret, max_age=COOKIE_SECONDS, httponly=True, samesite="strict", secure=secure
+        )  # fmt: skip
+        return answer
+
+    def _known(self, name: str) -> Participant:
+        found = self._records.participant(name)
+        if found is None:
+            raise _NobodyError
+        return found
+
+    async def _news(self, request: Request) -> Response:
+        """Answers with the view of a participant as soon as it differs from the one that the browser has."""
+        person, body = await self._read(request, r.News)
+        if time.time() - person.seen > 60.0:
+            self._records.see(person.id)
+        end = time.monotonic() + NEWS_SECONDS
+        async with self._presence.asking(person.id):
+            while True:
+                answer = _answer(participant_view(self.progress, self._known(person.id)))
+                left = end - time.monotonic()
+                if answer.headers["etag"] != body.have or left <= 0.0:
+                    return answer
+                try:
+                    await self._presence.wait_for_news(min(left, PATIENCE))
+                except asyncio.CancelledError:
+                    return answer  # the server stops
+                if await request.is_disconnected():
+                    return answer
+
+    async def _consent(self, request: Request) -> Response:
+        person, body = await self._read(request, r.Consent)
+        if body.agreed is None:
+            self.progress.decline(person)
+            return _farewell(self.progress.study.texts.declined)
+        self.progress.consent(person, body.agreed)
+        return self._view(person)
+
+    async def _answers(self, request: Request) -> Response:
+        person, body = await self._read(request, r.Answers)
+        self.progress.answer(person, body.stage, body.answers)
+        return self._view(person)
+
+    async def _proceed(self, request: Request) -> Response:
+        person, body = await self._read(request, r.Proceed)
+        self.progress.proceed(person, body.stage)
+        return self._view(person)
+
+    async def _wait(self, request: Request) -> Response:
+        person, body = await self._read(request, r.Wait)
+        if body.on:
+            self.progress.waiting.wait_on(person)
+        else:
+            self.progress.waiting.give_up(person)
+        return self._view(person)
+
+    async def _withdraw(self, request: Request) -> Response:
+        person, body = await self._read(request, r.Withdraw)
+        if not body.sure:
+            raise RefusedError("Please confirm that you want to withdraw.")
+        self._withdrawing.add(person.id)
+        try:
+            await asyncio.shield(self.progress.withdraw(person))  # also if the browser has gone meanwhile
+        finally:
+            self._withdrawing.discard(person.id)
+        self._presence.tell()
+        return _farewell(self.progress.study.texts.withdrawn)
+
+
+class _NobodyError(Exception):
+    """A request needs a participant and has none."""
+
+
+def _answer(view: dict[str, Any]) -> Response:
+    content = msgspec.json.encode(view)
+    return Response(
+        content,
+        media_type="application/json",
+        headers={"Cache-Control": "no-store", "ETag": hashlib.sha256(content).hexdigest()[:24]},
+    )
+
+
+def _farewell(text: str) -> Response:
+    """Answers a person whose data have been deleted."""
+    answer = _answer({"gone": text})
+    answer.delete_cookie(COOKIE, httponly=True, samesite="strict")
+    return answer
+
+
+def _refusal(status: int, reason: str) -> Response:
+    answer = _answer({"error": reason})
+    answer.status_code = status
+    return answer

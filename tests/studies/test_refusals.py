@@ -1,0 +1,181 @@
+"""Requests that a study refuses: strangers, other pages, malformed and large bodies, floods, and steps out of order."""
+
+from __future__ import annotations
+
+import json
+import random
+import resource
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("uvicorn", reason="needs the extra console")
+
+from dorothie_gym.studies.server import ENTRIES, MAX_BYTES, REQUESTS
+from tests.studies.content import SOLO, write_study
+from tests.studies.serving import Client, ServedStudy
+
+JSON = {"Content-Type": "application/json"}
+ACTIONS = "join", "news", "consent", "answers", "proceed", "wait", "withdraw"
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedStudy]:
+    folder = tmp_path_factory.mktemp("study")
+    with ServedStudy(write_study(folder, SOLO), folder / "data") as running:
+        yield running
+
+
+@pytest.fixture
+def person(served: ServedStudy, monkeypatch: pytest.MonkeyPatch) -> Client:
+    monkeypatch.setattr("dorothie_gym.studies.server.ENTRIES", (1e6, 1e6))
+    assert served.study is not None
+    served.study._buckets.clear()
+    made = Client(served.port)
+    made.do("join")
+    return made
+
+
+def test_strangers_and_wrong_cookies_learn_nothing(served: ServedStudy, person: Client) -> None:
+    for cookie in (
+        "",
+        "dorothie_study=",
+        "dorothie_study=nonsense",
+        f"other={person.cookie}",
+        "dorothie_study=\xff\xfe",
+    ):
+        stranger = Client(served.port)
+        stranger.cookie = cookie
+        for action in ("news", "withdraw"):
+            assert stranger.post(action, {"sure": True} if action == "withdraw" else None) == 401
+            assert set(stranger.answer) == {"error"}
+
+
+def test_pages_of_other_hosts_are_refused(served: ServedStudy, person: Client) -> None:
+    for origin in ("https://example.org", "null", "http://[", f"http://127.0.0.1:{served.port + 1}"):
+        person.headers = {"Origin": origin}
+        assert person.post("news") == 403
+    person.headers = {"Origin": served.address}
+    assert person.post("news") == 200
+
+
+def test_steps_out_of_order_are_refused(person: Client) -> None:
+    for action, body in (
+        ("answers", {"stage": "before", "answers": {"age": 30}}),
+        ("proceed", {"stage": "session"}),
+        ("proceed", {"stage": "consent"}),
+        ("wait", {"on": False}),
+        ("consent", {"agreed": [True]}),
+        ("consent", {"agreed": [True, False]}),
+        ("withdraw", {"sure": False}),
+    ):
+        assert person.post(action, body) == 409, action
+    person.do("consent", {"agreed": [True, True]})
+    for answers in ({}, {"age": 5}, {"age": "30"}, {"age": 30, "other": 1}):
+        assert person.post("answers", {"stage": "before", "answers": answers}) == 409
+    assert person.post("answers", {"stage": "after", "answers": {"trust": 1}}) == 409
+    person.do("answers", {"stage": "before", "answers": {"age": 30}})
+    assert person.post("answers", {"stage": "before", "answers": {"age": 31}}) == 409, "sent twice"
+
+
+def test_large_bodies_are_not_read(served: ServedStudy, person: Client) -> None:
+    status, _, _ = person.send("POST", "/study/answers", b"a" * (MAX_BYTES + 1), JSON)
+    assert status == 413
+    with socket.create_connection(("127.0.0.1", served.port), timeout=10) as raw:  # a body without an end
+        raw.sendall(b"POST /study/join HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n")
+        raw.sendall(b"Transfer-Encoding: chunked\r\n\r\n")
+        chunk = b"10000\r\n" + b"a" * 65536 + b"\r\n"
+        try:
+            for _ in range(200):
+                raw.sendall(chunk)
+        except OSError:
+            return
+        assert b"413" in raw.recv(100)
+
+
+def test_other_types_and_methods_are_refused(served: ServedStudy, person: Client) -> None:
+    for kind in ("text/plain", "application/x-www-form-urlencoded", ""):
+        assert person.send("POST", "/study/news", b"{}", {"Content-Type": kind})[0] == 415
+    for action in ACTIONS:
+        assert person.send("GET", f"/study/{action}")[0] == 405
+    for path in (
+        "/study-static/../server.py",
+        "/study-static/%2e%2e/server.py",
+        "/study-static//etc/passwd",
+        "/study/",
+    ):
+        assert person.send("GET", path)[0] == 404
+    assert person.send("GET", "/study.sqlite")[0] == 404
+
+
+def test_answers_forbid_foreign_content_and_are_not_stored(person: Client) -> None:
+    status, headers, _ = person.send("GET", "/?PROLIFIC_PID=x")
+    assert status == 200 and "script-src 'self'" in headers["Content-Security-Policy"]
+    assert headers["Referrer-Policy"] == "no-referrer"
+    _, headers, _ = person.send("POST", "/study/news", b"{}", JSON)
+    assert headers["Cache-Control"] == "no-store"
+    joined = Client(person.port)
+    _, headers, _ = joined.send("POST", "/study/join", b"{}", JSON)
+    assert {"HttpOnly", "SameSite=strict"} <= set(headers["Set-Cookie"].split("; "))
+
+
+def test_floods_are_refused(served: ServedStudy, person: Client) -> None:
+    person.do("consent", {"agreed": [True, True]})
+    statuses = [person.post("consent", {"agreed": None}) for _ in range(int(REQUESTS[0]) + 20)]
+    assert statuses[0] == 409 and statuses[-1] == 429
+
+
+def test_entries_of_one_address_are_limited(tmp_path: Path) -> None:
+    with ServedStudy(write_study(tmp_path, SOLO), tmp_path / "data") as served:
+        statuses = [Client(served.port).post("join") for _ in range(int(ENTRIES[0]) + 40)]
+        assert statuses[0] == 200 and statuses[-1] == 429
+
+
+VALUES = [None, True, 0, -1, 2**70, 1.5, "", "a" * 5000, "\x00", "../..", [], {}, [[]] * 40, {"a": {"a": {}}}]
+NAMES = ["parameters", "invitation", "have", "agreed", "stage", "answers", "on", "sure", "x", ""]
+
+
+def body(drawn: random.Random) -> bytes:
+    """Returns a body: malformed, or of random fields."""
+    kind = drawn.random()
+    if kind < 0.2:
+        return drawn.randbytes(drawn.randrange(200))
+    if kind < 0.3:
+        return b"[" * drawn.randrange(1, 20_000)
+    fields = {drawn.choice(NAMES): drawn.choice([*VALUES, "session", "before"]) for _ in range(drawn.randrange(4))}
+    text = json.dumps(fields).encode()
+    return text[: drawn.randrange(len(text))] if kind < 0.4 else text
+
+
+def peak() -> float:
+    """Returns the largest memory that this process has had [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+
+
+@pytest.mark.parametrize("seed", [1])
+def test_random_requests_are_refused_and_leave_no_traces(
+    served: ServedStudy, person: Client, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    monkeypatch.setattr("dorothie_gym.studies.server.REQUESTS", (1e6, 1e6))
+    monkeypatch.setattr("dorothie_gym.studies.server.NEWS_SECONDS", 0.0)
+    assert served.study is not None
+    served.study._buckets.clear()
+    drawn, before = random.Random(seed), peak()
+    known = person.view["id"]
+    for _ in range(600):
+        action, content = drawn.choice(ACTIONS[1:]), body(drawn)
+        if (action == "consent" and content == b'{"agreed": null}') or action == "withdraw":
+            continue  # what a person may do
+        status, _, _ = person.send("POST", f"/study/{action}", content, JSON)
+        assert status in (200, 400, 409, 413), (action, content[:200])
+        assert status != 200 or action == "news", (action, content[:200])
+    large = b'{"have": "' + b"a" * 2**20 + b'"}'
+    for action in ACTIONS:
+        for _ in range(5):
+            assert person.send("POST", f"/study/{action}", large, JSON)[0] == 413
+    person.tag = ""
+    person.do("news")
+    assert person.view["id"] == known and person.stage == "consent"
+    assert peak() - before < 60.0
