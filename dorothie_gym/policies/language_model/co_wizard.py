@@ -41,6 +41,9 @@ JUNCTION_DISTANCE = 40.0
 HELD_UP = 6.0
 """Standstill before a hazard, other than a red light, that is worth a call [s]."""
 
+ARRIVED = 2.0
+"""Distance to the goal at which a standing car is there [m]."""
+
 ORDER_LIFETIME = 4.0
 """Time for which an action is kept that is not possible yet [s]."""
 
@@ -62,6 +65,7 @@ class CoWizardMemory(Memory):
         told_held_up: whether the present standstill before a hazard was pointed out.
         told_step: step that was pointed out last, and when [s].
         told_junction: junction that was pointed out last.
+        visited: goals at which the car has stopped.
     """
 
     goal: LandmarkName | None = None
@@ -76,6 +80,7 @@ class CoWizardMemory(Memory):
     told_held_up: bool = False
     told_step: tuple[tuple[int, int, int], float] = ((0, 0, 0), -math.inf)
     told_junction: int = -1
+    visited: frozenset[Place] = frozenset()
 
 
 class CoWizardInterface(RoleInterface[CoWizardMemory]):
@@ -101,6 +106,9 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         events = [f'The passenger said: "{said}"'] if said else []
         memory, noticed = _notice_motion(memory, view)
         events += noticed
+        goal = navigator.goal
+        if goal is not None and view.standing and abs(navigator.left(view)) <= ARRIVED and goal not in memory.visited:
+            memory = replace(memory, visited=memory.visited | {goal})
         if found_block:
             events.append("The road ahead is blocked; the navigator has planned around it.")
         memory, noticed = _notice_way(memory, view)
@@ -113,7 +121,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
         view = CoWizardView.read(observation, memory.town)
         text = prompt_text(
             view, memory.town, memory.navigator, memory.step, events, goal=memory.goal_name, talk=memory.talk,
-            note=memory.note, mark=_mark(memory) is not None,
+            note=memory.note, mark=_mark(memory) is not None, visited=memory.visited,
         )  # fmt: skip
         return text, answer_schema(view, memory.town)
 

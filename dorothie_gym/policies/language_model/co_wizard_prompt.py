@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import LinkType
@@ -25,7 +25,6 @@ from dorothie_gym.policies.language_model.role_interface import (
     weather_words,
     words_fields,
 )
-from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.route_progress import direction_of, lanes_ahead, streets_named
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.spaces import ExitColumn, Motion, Physical
@@ -38,6 +37,9 @@ AHEAD = (5, 10, 20, 30, 50, 80)
 
 SHOWN_OBJECTS = 6
 """Number of objects in sight that a prompt shows."""
+
+SHARED_NAMES = (LandmarkName.HOUSE, LandmarkName.PERSON)
+"""Names of several places, of which some may be missing from the map."""
 
 STRAIGHT_ANGLE = 180
 """Index of the angle 0 in the mask of angles."""
@@ -96,9 +98,12 @@ def goal_options(view: CoWizardView, town: Town) -> dict[str, tuple[LandmarkName
     options: dict[str, tuple[LandmarkName, Place | None]] = {
         label: (mark.name, mark.place) for label, mark in named_places(view.raw, town).items()
     }
-    for label in ALL_NAMES:
-        if label not in options:
-            options[label] = next(name for name in LandmarkName if name.label == label), None
+    on_map = {name for name, _ in options.values()}
+    for name in ALL_NAMES:
+        if name not in on_map:
+            options[name.label] = name, None
+        elif name in SHARED_NAMES:
+            options[f"another {name.label}"] = name, None
     return options
 
 
@@ -184,6 +189,7 @@ def prompt_text(
     talk: Sequence[Line],
     note: str,
     mark: bool,
+    visited: Collection[Place],
 ) -> str:
     """Returns the user's part of the prompt.
 
@@ -197,6 +203,7 @@ def prompt_text(
         talk: the conversation.
         note: note of the model to itself.
         mark: whether the place of the goal is a mark.
+        visited: places of the map at which the car has stopped.
     """
     lines = [
         f"Time: {clock(view.time)}",
@@ -211,7 +218,7 @@ def prompt_text(
         lines.append(f"Prepared: {view.manoeuvre.label}{angle}")
     lines += section("Exits of the next junction", _exit_lines(view, town))
     lines += section("In sight", _object_lines(view))
-    lines += section("Places on your map", _place_lines(view, town, navigator))
+    lines += section("Places on your map", _place_lines(view, town, visited))
     lines.append(_goal_line(view, navigator, goal, mark))
     if step is not None:
         lines.append(f"Route: {'now' if step.due else 'next'}: {step_words(step, view, town)}")
@@ -247,13 +254,13 @@ def _object_lines(view: CoWizardView) -> list[str]:
     return lines
 
 
-def _place_lines(view: CoWizardView, town: Town, navigator: Navigator) -> list[str]:
-    x, y = view.position
-    return [
-        f"- {label}, on {street_name(street_of(view.raw, town, mark.lane))}, {math.hypot(mark.x - x, mark.y - y):.0f} m "
-        "away as the crow flies"
-        for label, mark in named_places(view.raw, town).items()
-    ]
+def _place_lines(view: CoWizardView, town: Town, visited: Collection[Place]) -> list[str]:
+    (x, y), lines = view.position, []
+    for label, mark in named_places(view.raw, town).items():
+        away = math.hypot(mark.x - x, mark.y - y)
+        been = "; you have stopped there" if mark.place in visited else ""
+        lines.append(f"- {label}, on {street_name(mark.street)}, {away:.0f} m away as the crow flies{been}")
+    return lines
 
 
 def _goal_line(view: CoWizardView, navigator: Navigator, goal: str, mark: bool) -> str:

@@ -248,7 +248,5 @@ def named_places(observation: ObservationMapping, town: Town) -> dict[str, SeenL
     return found
 
 
-ALL_NAMES: Final = tuple(
-    name.label for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
-)
+ALL_NAMES: Final = tuple(name for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED))
 """Names of places, by which also those can be goals that are not on the map."""

@@ -15,8 +15,12 @@ from dorothie_gym.dialogue import Direction, ParsedText, guess_spans, understand
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, Slot, StreetName
 
 USUAL_SPEED = 40
+SLOW_TIME = 25.0
 NAMES = [name for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED)]
 SAME_EVERYWHERE = (LandmarkName.HOUSE, LandmarkName.PERSON)
+STEERING = (ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH)
+WRONG = re.compile(r"wrong (way|direction|turn)|passed it|past it|missed it|other way|the other one")
+HERE = re.compile(r"right here|this is it|here we are|we're here|there it is|this is the place|that's it")
 QUESTIONS = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueMove.ALIGN)
 
 
@@ -32,6 +36,7 @@ class Page:
     prepared: str
     exits: list[tuple[int, str, str, float]]  # angle, direction, street, distance
     places: dict[str, str]  # street by label
+    visited: list[str]
     goal: str
     there: bool
     routed: bool
@@ -67,10 +72,12 @@ def read_page(text: str) -> Page:
         found = re.match(r"JTurn (-?\d+): (\w+), into (.*), in (\d+) m", line)
         assert found is not None, line
         exits.append((int(found[1]), found[2], found[3], float(found[4])))
-    places = {}
+    places, visited = {}, list[str]()
     for line in listed("Places"):
-        label, street = re.match(r"(.*), on (.*), \d+ m away", line).groups()  # type: ignore[union-attr]
+        label, street, been = re.match(r"(.*), on (.*), \d+ m away[^;]*(;.*)?", line).groups()  # type: ignore[union-attr]
         places[label] = street
+        if been:
+            visited.append(label)
     talk = [re.match(r"(\d+):(\d\d) (\w+): (.*)", line) for line in listed("Conversation")]
     said = [60 * int(line[1]) + int(line[2]) for line in talk if line is not None and line[3] == "you"]
     events = listed("Just now")
@@ -84,6 +91,7 @@ def read_page(text: str) -> Page:
         prepared=after("Prepared:"),
         exits=exits,
         places=places,
+        visited=visited,
         goal=goal.split(",")[0],
         there="you are there" in goal,
         routed="by the route" in goal or "you are there" in goal,
@@ -110,7 +118,7 @@ class CoWizardReader:
             self._hear(page, text, note, answer)
         self._drive(page, note, answer)
         answer["note"] = "; ".join(f"{name}={value}" for name, value in note.items() if value)
-        if any(name in note for name in ("turn", "wish", "speed", "go")):
+        if any(name in note for name in ("turn", "wish", "go")):
             answer["again"] = "1"
         return answer
 
@@ -118,12 +126,20 @@ class CoWizardReader:
 
     def _hear(self, page: Page, text: str, note: dict[str, str], answer: dict[str, str]) -> None:
         words = understand(text)
+        if WRONG.search(text.lower()):
+            self._doubt(page, note, answer)
+            return
+        if HERE.search(text.lower()) and page.off_map and page.speed > 0:
+            self._obey(page, ActionValue.STOP, DialogueAct.of(DialogueMove.INSTRUCT), words, note, answer)
+            return
         for span in guess_spans(text):
             self._take(page, span.act, words, note, answer)
         if not answer["say"] and text.rstrip().endswith("?"):
             answer["say"] = "Yes."
 
-    def _take(self, page: Page, act: DialogueAct, words: ParsedText, note: dict[str, str], answer: dict[str, str]) -> None:
+    def _take(
+        self, page: Page, act: DialogueAct, words: ParsedText, note: dict[str, str], answer: dict[str, str]
+    ) -> None:  # fmt: skip
         landmarks = [name for name in act.values(Slot.LANDMARK) if name in NAMES]
         actions = [value for value in act.values(Slot.ACTION) if value is not ActionValue.QUERIED]
         statuses = act.values(Slot.STATUS)
@@ -137,36 +153,59 @@ class CoWizardReader:
                 note.clear()
                 note["halt"] = "1"
             return
-        if landmarks and GoalStatus.PENDING not in statuses:
-            near = words.distance is not None and act.move is not DialogueMove.INSTRUCT
-            if (act.move in (DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY) or near) and not (
-                actions and set(actions) & {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH}
-            ):
-                self._aim(page, landmarks[0], words, note, answer)
+        turns = [action for action in actions if action in STEERING]
+        if landmarks and not turns and GoalStatus.PENDING not in statuses:
+            self._aim(page, landmarks[0], words, note, answer)
+        if turns and page.routed and answer["goal"] == "keep" and not self._is_on_route(page, words, turns[0]):
+            self._doubt(page, note, answer)
         for action in actions:
-            if act.move in (DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY, DialogueMove.REPLY_Y):
-                self._obey(page, action, act, words, note, answer)
+            self._obey(page, action, act, words, note, answer)
         if not actions and words.distance is not None and page.off_map:
             answer["mark"] = _ahead(words.distance)
 
-    def _aim(self, page: Page, name: LandmarkName, words: ParsedText, note: dict[str, str], answer: dict[str, str]) -> None:
+    def _is_on_route(self, page: Page, words: ParsedText, action: ActionValue) -> bool:
+        """Whether an instruction is the next step of the route that the prompt shows."""
+        if action is not ActionValue.J_TURN:
+            return action.label in page.step
+        return words.direction is None or f"({words.direction.value}," in page.step
+
+    def _doubt(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
+        """Drops a place that the passenger does not mean."""
+        name = re.match(r"(another )?(House|Person)?", page.goal)
+        if page.routed and name is not None and name[2]:
+            note.clear()
+            answer["goal"] = f"another {name[2]}"
+        elif page.there:
+            note.clear()
+            answer["goal"] = "none"
+
+    def _aim(
+        self, page: Page, name: LandmarkName, words: ParsedText, note: dict[str, str], answer: dict[str, str]
+    ) -> None:  # fmt: skip
         streets = [f"{street.label} Street" for street in words.streets if isinstance(street, StreetName)]
-        known = {label: street for label, street in page.places.items() if label.split(" on ")[0] == name.label}
+        known = {
+            label: street
+            for label, street in page.places.items()
+            if label.split(" on ")[0] == name.label and not (name in SAME_EVERYWHERE and label in page.visited)
+        }
         fitting = [label for label, street in known.items() if street in streets]
-        if fitting or (known and (not streets or name not in SAME_EVERYWHERE)):
+        guided = page.off_map and page.goal.removeprefix("another ") == name.label
+        if (fitting or (known and (not streets or name not in SAME_EVERYWHERE))) and not guided:
             label = (fitting or list(known))[0]
-            if page.goal != label or page.off_map:
+            if page.goal != label:
                 note.clear()
                 note["go"] = "1"
                 answer.update(goal=label, say=f"Okay, to the {label}.")
             return
+        label = f"another {name.label}" if name in SAME_EVERYWHERE and _is_on_map(page, name) else name.label
+        label = label if label not in page.places else f"another {name.label}"
         if words.distance is not None and not page.routed:
-            answer.update(goal=name.label if page.goal != name.label else "keep", mark=_ahead(words.distance))
+            answer.update(goal=label if page.goal != label else "keep", mark=_ahead(words.distance))
             answer["say"] = answer["say"] or "Okay."
-        elif page.goal != name.label:
+        elif page.goal != label:
             note.clear()
             note["go"] = "1"
-            answer.update(goal=name.label, say="It is not on my map. Which way should I go?")
+            answer.update(goal=label, say="It is not on my map. Which way should I go?")
 
     def _obey(
         self, page: Page, action: ActionValue, act: DialogueAct, words: ParsedText, note: dict[str, str],
@@ -205,6 +244,7 @@ class CoWizardReader:
             else:
                 asked = round(words.speed) if words.speed is not None else page.cruise + (10 if words.faster else -10)
                 note["speed"] = str(min(max(5 * round(asked / 5), 10), 60))
+                note["until"] = f"{page.time + SLOW_TIME:.0f}"
         elif action is ActionValue.LIGHT_CHANGE:
             label = "LightChange off" if words.lights is False else "LightChange on"
             answer["drive"] = label if label in page.drives else "none"
@@ -249,14 +289,13 @@ class CoWizardReader:
         note.pop("go", None)
         if waiting and not page.routed and "turn" not in note and page.time - page.last_said > 6:
             answer["say"] = answer["say"] or "Which way should I go?"
+        if page.time > float(note.get("until", 0)):
+            note.pop("speed", None)
+            note.pop("until", None)
         speed = int(note.get("speed", USUAL_SPEED))
         if abs(page.cruise - speed) > 2:
             label = f"SpeedChange {'up' if page.cruise < speed else 'down'}"
-            answer["drive"] = label if label in page.drives else "none"
-            if "speed" not in note:
-                answer["again"] = "1"
-        elif "speed" in note:
-            note.pop("speed")
+            answer.update(drive=label if label in page.drives else "none", again="1")
 
     def _turn(self, page: Page, note: dict[str, str]) -> str:
         straight = [f"JTurn {angle}" for angle, way, _, _ in page.exits if way == "straight"]
@@ -282,6 +321,10 @@ class CoWizardReader:
             note.pop(name, None)
         label = f"JTurn {angle}"
         return label if label in page.drives else ""
+
+
+def _is_on_map(page: Page, name: LandmarkName) -> bool:
+    return any(label.split(" on ")[0] == name.label for label in page.places)
 
 
 def _ahead(metres: float) -> str:
