@@ -223,8 +223,8 @@ def _with_goal(memory: CoWizardMemory, view: CoWizardView, label: str) -> CoWiza
         return replace(memory, navigator=memory.navigator.to(memory.town, view, None), step=None)
     name, place = goal_options(view, memory.town)[label]
     memory = replace(memory, goal=name, goal_name=label, updates=(*memory.updates, _goal_update((name,))))
-    if place is None:
-        place = _mark(memory)
+    marks = tuple(pair for pair in memory.marks if pair[0] is not name)  # a goal that is named again is not at its mark
+    memory = replace(memory, marks=marks)
     return replace(memory, navigator=memory.navigator.to(memory.town, view, place), step=None)
 
 

@@ -37,6 +37,7 @@ class Page:
     exits: list[tuple[int, str, str, float]]  # angle, direction, street, distance
     places: dict[str, str]  # street by label
     visited: list[str]
+    others: list[str]
     goal: str
     there: bool
     routed: bool
@@ -92,6 +93,7 @@ def read_page(text: str) -> Page:
         exits=exits,
         places=places,
         visited=visited,
+        others=[f"another {label.split(' on ')[0]}" for label in places],
         goal=goal.split(",")[0],
         there="you are there" in goal,
         routed="by the route" in goal or "you are there" in goal,
@@ -174,7 +176,7 @@ class CoWizardReader:
         name = re.match(r"(another )?(House|Person)?", page.goal)
         if page.routed and name is not None and name[2]:
             note.clear()
-            answer["goal"] = f"another {name[2]}"
+            answer["goal"] = f"another {name[2]}" if f"another {name[2]}" in page.others else name[2]
         elif page.there:
             note.clear()
             answer["goal"] = "none"
@@ -198,7 +200,6 @@ class CoWizardReader:
                 answer.update(goal=label, say=f"Okay, to the {label}.")
             return
         label = f"another {name.label}" if name in SAME_EVERYWHERE and _is_on_map(page, name) else name.label
-        label = label if label not in page.places else f"another {name.label}"
         if words.distance is not None and not page.routed:
             answer.update(goal=label if page.goal != label else "keep", mark=_ahead(words.distance))
             answer["say"] = answer["say"] or "Okay."
