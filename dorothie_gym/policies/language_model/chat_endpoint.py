@@ -13,6 +13,7 @@ from types import ModuleType
 from typing import Any, Final
 
 from dorothie_gym.errors import InputFileError, PolicyLoadError, one_line
+from dorothie_gym.files import JsonValue
 from dorothie_gym.input_files import parse_json
 from dorothie_gym.policies.language_model.faults import CallError, Fault
 
@@ -163,13 +164,11 @@ def _completion(status: int, headers: Mapping[str, str], body: bytes) -> Complet
         page = parse_json(body.decode("utf-8"), "the completion", unique=False)
     except (InputFileError, UnicodeDecodeError):
         raise CallError(Fault.NOT_A_COMPLETION, f"the server sent no JSON: {_shown(body)}") from None
-    tokens = _tokens(page)
-    try:
-        choice = page["choices"][0]  # type: ignore[call-overload,index]
-        message, ended = choice["message"], choice.get("finish_reason")
-        text, refusal = message.get("content"), message.get("refusal")
-    except (KeyError, IndexError, TypeError, AttributeError):
-        raise CallError(Fault.NOT_A_COMPLETION, f"the server sent no chat completion: {_shown(body)}") from None
+    tokens, choice = _tokens(page), _first_choice(page)
+    message = choice.get("message")
+    if not isinstance(message, Mapping):
+        raise CallError(Fault.NOT_A_COMPLETION, f"the server sent no chat completion: {_shown(body)}")
+    text, refusal, ended = message.get("content"), message.get("refusal"), choice.get("finish_reason")
     if refusal or ended == "content_filter":
         raise IncompleteError(Fault.REFUSED, f"the model declined to answer: {one_line(refusal or ended)}", tokens)
     if ended == "length":
@@ -177,6 +176,13 @@ def _completion(status: int, headers: Mapping[str, str], body: bytes) -> Complet
     if not isinstance(text, str) or not text.strip():
         raise IncompleteError(Fault.REFUSED, "the answer is empty", tokens)
     return Completion(text=text, tokens=tokens)
+
+
+def _first_choice(page: JsonValue) -> Mapping[str, JsonValue]:
+    """Returns the first choice of a completion; empty if there is none."""
+    choices = page.get("choices") if isinstance(page, Mapping) else None
+    first = choices[0] if isinstance(choices, list) and choices else None
+    return first if isinstance(first, Mapping) else {}
 
 
 def _status_error(status: int, headers: Mapping[str, str], body: bytes) -> CallError:

@@ -58,33 +58,34 @@ _SIDES = {LinkType.LANE_CHANGE_LEFT: (90, "left"), LinkType.LANE_CHANGE_RIGHT: (
 
 def drive_options(view: CoWizardView, town: Town) -> dict[str, Physical | None]:
     """Returns the physical actions that the mask allows, with their arguments, by their labels; "none" first."""
-    mask = view.raw["action_mask"]
-    possible, angles = mask["physical"], mask["angle"]
+    possible = view.raw["action_mask"]["physical"]
     options: dict[str, Physical | None] = {NONE: None}
-
-    def add(label: str, action: PhysicalAction, angle: int = 0, up: bool = True) -> None:
-        options[label] = Physical(action=action, angle=angle, up=up)
-
     for action in PhysicalAction:
-        if not possible[action]:
-            continue
-        if action is PhysicalAction.J_TURN:
-            for angle in exit_angles(view):
-                if angles[angle + STRAIGHT_ANGLE]:
-                    add(f"{action.label} {angle}", action, angle)
-        elif action is PhysicalAction.LANE_SWITCH:
-            for side, (angle, word) in _SIDES.items():
-                if angles[angle + STRAIGHT_ANGLE] and town.neighbour(view.lane, side) is not None:
-                    add(f"{action.label} {word}", action, angle)
-        elif action is PhysicalAction.SPEED_CHANGE:
-            for up, word in ((True, "up"), (False, "down")):
-                if may_change_cruise(view.cruise, up):
-                    add(f"{action.label} {word}", action, up=up)
-        elif action is PhysicalAction.LIGHT_CHANGE:
-            add(f"{action.label} {'off' if view.lights else 'on'}", action, up=not view.lights)
-        else:
-            add(action.label, action)
+        if possible[action]:
+            options |= {
+                f"{action.label} {argument}".strip(): order for argument, order in _orders(action, view, town).items()
+            }
     return options
+
+
+def _orders(action: PhysicalAction, view: CoWizardView, town: Town) -> dict[str, Physical]:
+    """Returns a physical action with each argument that the mask allows, by the argument in words."""
+    angles = view.raw["action_mask"]["angle"]
+    if action is PhysicalAction.J_TURN:
+        allowed = [angle for angle in exit_angles(view) if angles[angle + STRAIGHT_ANGLE]]
+        return {f"{angle}": Physical(action=action, angle=angle) for angle in allowed}
+    if action is PhysicalAction.LANE_SWITCH:
+        return {
+            word: Physical(action=action, angle=angle)
+            for side, (angle, word) in _SIDES.items()
+            if angles[angle + STRAIGHT_ANGLE] and town.neighbour(view.lane, side) is not None
+        }
+    if action is PhysicalAction.SPEED_CHANGE:
+        steps = [up for up in (True, False) if may_change_cruise(view.cruise, up)]
+        return {"up" if up else "down": Physical(action=action, up=up) for up in steps}
+    if action is PhysicalAction.LIGHT_CHANGE:
+        return {"off" if view.lights else "on": Physical(action=action, up=not view.lights)}
+    return {"": Physical(action=action)}
 
 
 def exit_angles(view: CoWizardView) -> tuple[int, ...]:

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import enum
 import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 from urllib.parse import urlsplit
 
 from dorothie_gym.copying import shared
+
+URL_VARIABLE: Final = "OPENAI_BASE_URL"
+"""Environment variable with the address of the endpoint, where none is given; as of OpenAI's own client."""
 
 
 class SimulatedTime(enum.StrEnum):
@@ -72,6 +77,18 @@ class LanguageModelConfig:
         if self.prices is not None and not all(0.0 <= price < math.inf for price in self.prices):
             raise ValueError(f"prices are {self.prices}; they must be at least 0")
         object.__setattr__(self, "time", SimulatedTime(self.time))
+
+    @classmethod
+    def usual(cls, model: str) -> LanguageModelConfig:
+        """Returns the default settings of a model at the endpoint that the environment names (`OPENAI_BASE_URL`).
+
+        Raises:
+            ValueError: the variable is not set, or the model has no name.
+        """
+        url = os.environ.get(URL_VARIABLE, "")
+        if not url:
+            raise ValueError(f"llm:{model} has no endpoint; give --llm-url, or set the variable {URL_VARIABLE}")
+        return cls(model=model, url=url)
 
     def record(self) -> dict[str, object]:
         """Returns in JSON types what answers and actions follow from: neither address nor cassette."""

@@ -139,5 +139,3 @@ def _with_error(request: Mapping[str, object], text: str, error: CallError) -> d
         {"role": "user", "content": f"This was refused: {error.reason}. Answer with one JSON object of the schema."}
     )
     return {**request, "messages": messages}
-
-

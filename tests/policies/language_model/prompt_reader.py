@@ -1,7 +1,7 @@
 """Rule program that plays the Co-Wizard by reading prompts, as a language model does: it sees nothing but the text.
 
-It understands the passenger by the package's own parser of words, and keeps what it has to remember in its note. It shows
-that a prompt says enough to drive by: what it cannot do, a language model can hardly do.
+It understands the passenger by the package's own parser of words, and keeps what it has to remember in its note. It
+shows that a prompt says enough to drive by: what it cannot do, a language model can hardly do.
 """
 
 from __future__ import annotations
@@ -50,6 +50,10 @@ class Page:
     events: list[str]
     drives: list[str]
     lines: list[str] = field(repr=False)
+
+    @property
+    def stopped(self) -> bool:
+        return self.car.startswith("told to stop")
 
 
 def read_page(text: str) -> Page:
@@ -114,7 +118,15 @@ class CoWizardReader:
 
     def __call__(self, prompt: str) -> dict[str, str]:
         page = read_page(prompt)
-        answer = {"drive": "none", "goal": "keep", "mark": "none", "status": "keep", "say": "", "note": "", "again": "10"}
+        answer = {
+            "drive": "none",
+            "goal": "keep",
+            "mark": "none",
+            "status": "keep",
+            "say": "",
+            "note": "",
+            "again": "10",
+        }
         note = page.note
         for text in page.heard:
             self._hear(page, text, note, answer)
@@ -255,41 +267,49 @@ class CoWizardReader:
     def _drive(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
         if answer["drive"] != "none":
             return
-        stopped, waiting = page.car.startswith("told to stop"), page.car.startswith("waiting")
-        if page.due and not any(name in note for name in ("turn", "wish")) and answer["goal"] == "keep":
-            label = re.match(r"(JTurn -?\d+|LaneSwitch \w+|\w+)", page.step)[0]  # type: ignore[index]
-            if label in page.drives:
-                answer["drive"] = label
-                if label == "Stop":
-                    note["halt"] = "1"
-                    note.pop("go", None)
-                return
-        if "halt" in note:
-            if stopped and page.time - page.last_said > 12 and not page.heard:
+        label = self._route_step(page, note, answer)
+        if not label and "halt" in note:
+            if page.stopped and page.time - page.last_said > 12 and not page.heard:
                 answer["say"] = answer["say"] or "Where should I go now?"
             return
+        answer["drive"] = label or self._wish(page, note) or self._go(page, note) or "none"
+        if answer["drive"] != "none":
+            return
+        note.pop("go", None)
+        lost = page.car.startswith("waiting") and not page.routed and "turn" not in note
+        if lost and page.time - page.last_said > 6:
+            answer["say"] = answer["say"] or "Which way should I go?"
+        self._set_speed(page, note, answer)
+
+    def _route_step(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> str:
+        if not page.due or "turn" in note or "wish" in note or answer["goal"] != "keep":
+            return ""
+        label = re.match(r"(JTurn -?\d+|LaneSwitch \w+|\w+)", page.step)[0]  # type: ignore[index]
+        if label not in page.drives:
+            return ""
+        if label == "Stop":
+            note["halt"] = "1"
+            note.pop("go", None)
+        return label
+
+    def _wish(self, page: Page, note: dict[str, str]) -> str:
         wish = note.get("wish")
         if wish and wish in page.drives:
-            answer["drive"] = wish
             note.pop("wish")
-            return
+            return wish
         if wish == "UTurn" and "LaneSwitch left" in page.drives and page.speed > 1:
-            answer["drive"] = "LaneSwitch left"
-            return
+            return "LaneSwitch left"
         if "turn" in note and page.exits and not page.prepared.startswith(("LaneSwitch", "UTurn")):
-            label = self._turn(page, note)
-            if label:
-                answer["drive"] = label
-                return
-        if stopped:
-            for label in ("Start", "LaneFollow"):
-                if label in page.drives:
-                    answer["drive"] = label
-                    note.pop("go", None)
-                    return
-        note.pop("go", None)
-        if waiting and not page.routed and "turn" not in note and page.time - page.last_said > 6:
-            answer["say"] = answer["say"] or "Which way should I go?"
+            return self._turn(page, note)
+        return ""
+
+    def _go(self, page: Page, note: dict[str, str]) -> str:
+        starts = [label for label in ("Start", "LaneFollow") if page.stopped and label in page.drives]
+        if starts:
+            note.pop("go", None)
+        return next(iter(starts), "")
+
+    def _set_speed(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
         if page.time > float(note.get("until", 0)):
             note.pop("speed", None)
             note.pop("until", None)
