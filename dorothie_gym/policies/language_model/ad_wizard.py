@@ -23,7 +23,7 @@ from dorothie_gym.policies.language_model.role_interface import (
     weather_words,
     with_heard,
 )
-from dorothie_gym.policies.observation_parser import place_on_path, read_subgoals, scalar
+from dorothie_gym.policies.observation_parser import place_on_path, read_subgoals, scalar, weather
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, ObservationMapping, PropColumn
 
@@ -35,6 +35,12 @@ MESSAGE_LENGTH = 200
 
 PROPS_AHEAD = (60, 100)
 """Distances ahead on the car's path at which a prop can be placed, or actors spawned [m]."""
+
+PROP_MARGINS = (30.0, 8.0)
+"""Least distances of a prop from the beginning and the end of its lane, nearer to which it is refused [m]."""
+
+SAME_WEATHER = 0.02
+"""Difference, as a share of the range of a parameter, below which the weather is so already."""
 
 SPAWNED = 5
 """Number of vehicles or pedestrians that appear."""
@@ -67,11 +73,11 @@ class AdWizardMemory(Memory):
 
     Attributes:
         order: change that is to be made; None for none.
-        state: tasks, and what is reached, as they were last.
+        tasks: tasks, and what is reached, as they were last.
     """
 
     order: AdWizardAction | None = None
-    state: bytes = b""
+    tasks: bytes = b""
 
 
 class AdWizardInterface(RoleInterface[AdWizardMemory]):
@@ -91,9 +97,9 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
         memory = replace(memory, clock=memory.clock.ticked(scalar(observation, "time")))
         memory, _ = with_heard(memory, observation, Role.PARTICIPANT, "participant")
         memory, _ = with_heard(memory, observation, Role.CO_WIZARD, "driver")
-        state = observation["subgoals"].tobytes()
-        events = ("The tasks have changed, or one is done.",) if memory.state and state != memory.state else ()
-        return replace(memory, state=state), events
+        tasks = observation["subgoals"].tobytes()
+        events = ("The tasks have changed, or one is done.",) if memory.tasks and tasks != memory.tasks else ()
+        return replace(memory, tasks=tasks), events
 
     def prompt(
         self, observation: ObservationMapping, memory: AdWizardMemory, events: Sequence[str]
@@ -146,6 +152,9 @@ def exception_options(observation: ObservationMapping, town: Town) -> dict[str, 
     options: dict[str, AdWizardAction | None] = {NONE: None}
     options["message"] = AdWizardAction(exception=ExceptionKind.MESSAGE)
     for words, (parameter, share) in _WEATHERS.items():
+        now = (weather(observation, parameter) - parameter.low) / (parameter.high - parameter.low)
+        if abs(now - share) < SAME_WEATHER:
+            continue
         options[f"weather: {words}"] = AdWizardAction(exception=ExceptionKind.WEATHER, weather=parameter, share=share)
     for sensor, faulty in zip(Sensor, observation["sensors"], strict=True):
         word = "repair" if faulty else "break"
@@ -164,8 +173,9 @@ def _road_options(observation: ObservationMapping, town: Town) -> dict[str, AdWi
         place = place_on_path(town, observation, float(ahead))
         if place is None or town.lanes[place[0]].in_junction:
             continue
-        where = LanePosition(lane=place[0], metres=round(place[1]))
-        for kind in (PropKind.STREET_BARRIER, PropKind.CONSTRUCTION_CONE):
+        where, length = LanePosition(lane=place[0], metres=int(place[1])), town.lanes[place[0]].length
+        fits = PROP_MARGINS[0] <= where.metres <= length - PROP_MARGINS[1]
+        for kind in (PropKind.STREET_BARRIER, PropKind.CONSTRUCTION_CONE) if fits else ():
             options[f"put a {kind} {ahead} m ahead"] = AdWizardAction(
                 exception=ExceptionKind.PLACE_PROP, prop=kind, place=where
             )

@@ -234,7 +234,7 @@ def _with_mark(memory: CoWizardMemory, view: CoWizardView, label: str) -> CoWiza
         return memory
     place = mark_options(view, memory.town)[label]
     name = memory.goal if memory.goal is not None else LandmarkName.UNKNOWN
-    where = LanePosition(lane=place[0], metres=round(place[1]))
+    where = LanePosition(lane=place[0], metres=int(place[1]))
     mark = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=where)
     marks = (*(pair for pair in memory.marks if pair[0] is not name), (name, place))
     navigator = memory.navigator.to(memory.town, view, place)
