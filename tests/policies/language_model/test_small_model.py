@@ -17,7 +17,7 @@ MISSING = [name for name in NEEDED if find_spec(name) is None]
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1500)
 @pytest.mark.skipif(bool(MISSING), reason=f"not installed: pip install --no-deps {' '.join(MISSING)}".replace("_", "-"))
 def test_small_model_answers_under_the_schema(tmp_path: Path) -> None:
     import xllamacpp
@@ -27,12 +27,13 @@ def test_small_model_answers_under_the_schema(tmp_path: Path) -> None:
     params = xllamacpp.CommonParams()
     params.model.path = str(next(Path(package.origin).parent.glob("*.gguf")))
     params.n_ctx, params.n_parallel, params.warmup, params.port = 8192, 1, False, 0
+    params.cpuparams.n_threads = params.cpuparams_batch.n_threads = 1  # several wait for each other on a busy machine
     server = xllamacpp.Server(params)
     config = LanguageModelConfig(
-        model="smollm2", url=f"{server.listening_address}/v1", timeout=120.0, max_tokens=300,
+        model="smollm2", url=f"{server.listening_address}/v1", timeout=300.0, max_tokens=300,
         cassette=tmp_path / "tape.jsonl",
     )  # fmt: skip
-    summary = play({Role.CO_WIZARD: config}, config=EnvConfig(max_seconds=12.0))
+    summary = play({Role.CO_WIZARD: config}, config=EnvConfig(max_seconds=8.0))
     usage = summary["usage"]["co_wizard"]
     print(usage)
     assert usage["calls"] >= 2
