@@ -25,7 +25,7 @@ A_FEW = 8
 
 GROUPS = (
     ("native", "release", "sample", "hub"),
-    ("corpus", "annotations", "predictions", "storyboard", "rollout", "opendrive", "cache", "audio"),
+    ("corpus", "annotations", "predictions", "storyboard", "rollout", "cassette", "opendrive", "cache", "audio"),
     ("yaml",),
     ("rl", "selfplay", "run", "benchmark"),
 )
