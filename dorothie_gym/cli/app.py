@@ -29,6 +29,7 @@ from dorothie_gym.cli.run import run
 from dorothie_gym.cli.sessions import compare, film, replay, show
 from dorothie_gym.cli.stats import stats
 from dorothie_gym.cli.study import study
+from dorothie_gym.cli.submit import submit
 from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl
 from dorothie_gym.cli.warm_up import warm_up
@@ -93,6 +94,7 @@ app.command(cls=PictureCommand)(stats)
 app.command()(generate)
 app.command()(rollout)
 app.command()(leaderboard)
+app.command()(submit)
 app.command()(replay)
 app.command()(film)
 app.command()(frames)

@@ -25,18 +25,34 @@ class TargetLayout(enum.StrEnum):
     SDN = "sdn"
     NATIVE = "native"
     TABLES = "tables"
+    MINARI = "minari"
+    HUGGING_FACE = "hf"
+
+
+class ExportedRole(enum.StrEnum):
+    """Role whose view is exported."""
+
+    PARTICIPANT = "participant"
+    CO_WIZARD = "co_wizard"
+    AD_WIZARD = "ad_wizard"
 
 
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="A session, or a folder of sessions or of folds.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder to write, without sessions of these names.")],
-    to: Annotated[TargetLayout, typer.Option("--to", help="Layout: SDN release, native, or two Parquet tables.")],
+    to: Annotated[
+        TargetLayout, typer.Option("--to", help="Layout: SDN release, native, two Parquet tables, or a role's view.")
+    ],
+    role: Annotated[
+        ExportedRole, typer.Option(help="Role whose observations, actions and rewards --to minari and hf write.")
+    ] = ExportedRole.CO_WIZARD,
     maps: Maps = None,
     as_json: AsJson = False,
 ) -> None:
     """Convert sessions between SDN (release, sample or hub layout) and the native layout, with a report of losses.
 
-    With --to tables it writes utterances.parquet and decision_points.parquet, for pandas and datasets.
+    With --to tables it writes utterances.parquet and decision_points.parquet, for pandas and datasets. With --to minari
+    or hf, sessions of this package are simulated again and written as one role lived through them, with a card.
 
     The files of IN determine its layout. Unreadable sessions are listed, and the exit code is then 2.
     """
@@ -49,6 +65,9 @@ def convert(
         _check_out(source, out)
         if to is TargetLayout.TABLES:
             _write_tables(corpus, out, as_json=as_json)
+            return
+        if to in (TargetLayout.MINARI, TargetLayout.HUGGING_FACE):
+            _write_role(corpus, out, to, role, maps, as_json=as_json)
             return
         is_one = [entry.path for entry in corpus.entries] == [source]
         rows = _convert(corpus, out, to, maps, is_one=is_one, quiet=as_json)
@@ -79,6 +98,29 @@ def _write_tables(corpus: Corpus, out: Path, *, as_json: bool) -> None:
         print_json({"to": TargetLayout.TABLES.value, "in": str(corpus.root), "out": str(out), "tables": paths})
     else:
         stdout().print(f"{len(corpus)} sessions: {', '.join(paths)}", markup=False, soft_wrap=True)
+
+
+def _write_role(
+    corpus: Corpus, out: Path, to: TargetLayout, role: ExportedRole, maps: Path | None, *, as_json: bool
+) -> None:  # fmt: skip
+    """Writes the view of a role on all sessions; a session that cannot be simulated again fails the command."""
+    from dorothie_gym.ontology import Role
+    from dorothie_gym.rollout.replay import ReplaySources
+    from dorothie_gym.rollout.role_export import export_hugging_face, export_minari, role_episodes
+
+    whose = Role(role.value)
+    with _progress(len(corpus), quiet=as_json) as advance:
+        episodes = role_episodes(corpus.entries, whose, ReplaySources(maps=maps))
+        if to is TargetLayout.MINARI:
+            name = export_minari(episodes, whose, out, advance)
+        else:
+            name = str(export_hugging_face(episodes, whose, out, advance))
+    facts = {"to": to.value, "in": str(corpus.root), "out": str(out), "role": role.value, "dataset": name}
+    if as_json:
+        print_json({**facts, "sessions": len(corpus)})
+    else:
+        text = f"{len(corpus)} sessions of the {role.value}: dataset {name} in {out}"
+        stdout().print(text, markup=False, soft_wrap=True)
 
 
 def _convert(

@@ -279,11 +279,24 @@ def summary(facts: Facts, files: dict[str, str], console: Console) -> Renderable
         "talk": f"{facts['utterances']} utterances, {facts['acts']} acts",
         "driving": f"{facts['physical_actions']} physical actions",
         "exceptions": str(facts["exceptions"]),
+        **{f"llm {role}": _usage_words(usage) for role, usage in facts.get("usage", {}).items()},
         **files,
     }
     for name, value in rows.items():
         table.add_row(Text(name, style="dim"), Text(value, overflow="fold"))
     return Group(_rule(console), headline, table)
+
+
+def _usage_words(usage: Facts) -> str:
+    """Returns calls, tokens, latency and silent actions of a language model on one line."""
+    words = (
+        f"{usage['calls']} calls of {usage['model']}, {usage['prompt_tokens']} + {usage['completion_tokens']} tokens, "
+        f"{usage['latency']:.1f} s"
+    )
+    if usage["cost"] is not None:
+        words += f", {usage['cost']:.4f} $"
+    silences = ", ".join(f"{count} x {name}" for name, count in usage["silences"].items())
+    return f"{words}; silent: {silences}" if silences else words
 
 
 def _opening(session: LiveSession, console: Console, width: int) -> RenderableType:

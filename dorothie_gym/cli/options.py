@@ -14,6 +14,7 @@ from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.render_view import RenderView
 
 if TYPE_CHECKING:
+    from dorothie_gym.cli.language_model import LanguageModelOptions
     from dorothie_gym.engine.config import EnvConfig
     from dorothie_gym.ontology import Role
     from dorothie_gym.policies import Player
@@ -53,7 +54,7 @@ Players = Annotated[int | None, typer.Option(min=1, help="Number of worker proce
 Participant = Annotated[
     str,
     typer.Option(
-        metavar="scripted[:TRAITS]|silent|random|FILE",
+        metavar="scripted[:TRAITS]|silent|random|llm:MODEL|FILE",
         help="Policy of the participant; a file holds a learned policy. Traits fix the persona: "
         "scripted:patience=0..0.2,directions=vague.",
         autocompletion=complete_policy("participant"),
@@ -65,7 +66,7 @@ CoWizard = Annotated[
     typer.Option(
         metavar="NAME|FILE",
         help="Policy of the Co-Wizard: scripted (also with traits), silent, random, lane-follow, "
-        "pretrained:maskable-ppo (see `policies`), or the folder of a learned policy.",
+        "pretrained:maskable-ppo (see `policies`), llm:MODEL, or the folder of a learned policy.",
         autocompletion=complete_policy("co_wizard"),
     ),
 ]
@@ -73,7 +74,7 @@ CoWizard = Annotated[
 AdWizard = Annotated[
     str,
     typer.Option(
-        metavar="scripted|silent|random|FILE",
+        metavar="scripted|silent|random|llm:MODEL|FILE",
         help="Policy of the Ad-Wizard; a file holds a learned policy.",
         autocompletion=complete_policy("ad_wizard"),
     ),
@@ -123,7 +124,7 @@ Ray = Annotated[
 
 def env_config(
     max_seconds: float | None, word_errors: float | None, perception: PerceptionModel = PerceptionModel.SYMBOLIC,
-    speech: bool = False,
+    speech: bool = False, *, pictures: bool = False,
 ) -> EnvConfig:  # fmt: skip
     """Returns the engine settings of a command line.
 
@@ -132,7 +133,9 @@ def env_config(
         word_errors: word error rate of the speech recogniser; None keeps the default.
         perception: what participant and Co-Wizard see.
         speech: whether they speak; a word error rate is then refused.
+        pictures: whether they observe the picture of the car's camera.
     """
+    from dorothie_gym.camera.config import CameraConfig
     from dorothie_gym.engine.channel_kind import ChannelKind
     from dorothie_gym.engine.config import EnvConfig
 
@@ -152,6 +155,7 @@ def env_config(
         max_seconds=usual.max_seconds if max_seconds is None else max_seconds,
         word_error_rate=usual.word_error_rate if word_errors is None else word_errors,
         perception=perception,
+        camera=CameraConfig() if pictures else None,
         channel=ChannelKind.SPEECH if speech else ChannelKind.TEXT,
     )
 
@@ -159,31 +163,37 @@ def env_config(
 # --- Players ----------------------------------------------------------------------------------------------------------
 
 
-def find_cast(participant: str, co_wizard: str, ad_wizard: str) -> dict[Role, Player]:
+def find_cast(
+    participant: str, co_wizard: str, ad_wizard: str, language_model: LanguageModelOptions
+) -> dict[Role, Player]:  # fmt: skip
     """Returns the player of each role; exits if a name or file is unknown.
 
     Args:
         participant: name of a policy, or file of a learned policy.
         co_wizard: as for the participant.
         ad_wizard: as for the participant.
+        language_model: options of the policies `llm:MODEL`.
     """
     from dorothie_gym.errors import PolicyLoadError
     from dorothie_gym.ontology import AGENT_ROLES
     from dorothie_gym.policies import find_player
+    from dorothie_gym.policies.policy_loader import LANGUAGE_MODEL
 
     given = dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True))
+    asks = any(name.startswith(LANGUAGE_MODEL) for name in given.values())
+    config = language_model.config() if asks else None
     try:
-        cast = {role: find_player(name, role) for role, name in given.items()}
+        cast = {role: find_player(name, role, config) for role, name in given.items()}
     except PolicyLoadError as error:
         fail(str(error))
     for role, player in cast.items():
-        if player.trained:
+        if player.trained or player.language_model is not None:
             _check_loads(player, role)
     return cast
 
 
 def _check_loads(player: Player, role: Role) -> None:
-    """Loads a learned policy once, so that a damaged file is reported before the first session."""
+    """Makes a policy once, so that a damaged file or a missing package is reported before the first session."""
     from dorothie_gym.spaces import SpaceLimits
 
     try:

@@ -11,6 +11,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dorothie_gym.cli.completion import complete_towns
+from dorothie_gym.cli.language_model import (
+    LanguageModelOptions,
+    LlmCassette,
+    LlmPictures,
+    LlmPrices,
+    LlmReplay,
+    LlmTime,
+    LlmTimeout,
+    LlmTokens,
+    LlmUrl,
+)
 from dorothie_gym.cli.options import (
     AdWizard,
     AsJson,
@@ -38,6 +49,7 @@ from dorothie_gym.cli.output import (
 )
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.engine.perception_model import PerceptionModel
+from dorothie_gym.policies.language_model.config import SimulatedTime
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
@@ -65,6 +77,14 @@ def rollout(
     word_errors: WordErrors = None,
     perception: Perception = PerceptionModel.SYMBOLIC,
     speech: Speech = False,
+    llm_url: LlmUrl = None,
+    llm_timeout: LlmTimeout = 30.0,
+    llm_tokens: LlmTokens = 300,
+    llm_time: LlmTime = SimulatedTime.WAITS,
+    llm_pictures: LlmPictures = False,
+    llm_cassette: LlmCassette = None,
+    llm_replay: LlmReplay = False,
+    llm_prices: LlmPrices = None,
     ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:
@@ -75,12 +95,22 @@ def rollout(
     with reporting_errors():
         from dorothie_gym.rollout.closed_loop import RolloutSettings, parse_towns
 
-        cast = find_cast(participant, co_wizard, ad_wizard)
+        asked = LanguageModelOptions(
+            url=llm_url,
+            timeout=llm_timeout,
+            tokens=llm_tokens,
+            time=llm_time,
+            pictures=llm_pictures,
+            cassette=llm_cassette,
+            replay=llm_replay,
+            prices=llm_prices,
+        )
+        cast = find_cast(participant, co_wizard, ad_wizard, asked)
         try:
             chosen = parse_towns(towns)
         except ValueError as error:
             fail(str(error))
-        config = env_config(max_seconds, word_errors, perception, speech)
+        config = env_config(max_seconds, word_errors, perception, speech, pictures=llm_pictures)
         settings = RolloutSettings(cast=cast, towns=chosen, sessions=sessions, seed=seed, config=config)
         result = _play(settings, out, workers or available_processors(), ray, quiet=as_json)
     if as_json:
@@ -100,7 +130,9 @@ def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | 
 
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out
     try:
-        compile_first(pictures=settings.config.perception is PerceptionModel.CAMERA)
+        compile_first(
+            pictures=settings.config.perception is PerceptionModel.CAMERA or settings.config.camera is not None
+        )
         with session_progress(quiet=quiet) as on_session:
             result = roll_out(settings, folder, workers=workers, ray=ray, on_session=on_session)
     except KeyboardInterrupt:

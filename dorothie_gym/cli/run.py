@@ -12,6 +12,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dorothie_gym.cli.completion import complete_town
+from dorothie_gym.cli.language_model import (
+    LanguageModelOptions,
+    LlmCassette,
+    LlmPictures,
+    LlmPrices,
+    LlmReplay,
+    LlmTime,
+    LlmTimeout,
+    LlmTokens,
+    LlmUrl,
+)
 from dorothie_gym.cli.options import (
     AdWizard,
     AsJson,
@@ -38,6 +49,7 @@ from dorothie_gym.cli.output import (
 )
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.engine.perception_model import PerceptionModel
+from dorothie_gym.policies.language_model.config import SimulatedTime
 from dorothie_gym.render_view import RenderView
 
 if TYPE_CHECKING:
@@ -66,6 +78,7 @@ class _Plan:
     word_errors: float | None
     perception: PerceptionModel
     speech: bool
+    language_model: LanguageModelOptions
     speed: float | None
 
 
@@ -97,6 +110,14 @@ def run(
     word_errors: WordErrors = None,
     perception: Perception = PerceptionModel.SYMBOLIC,
     speech: Speech = False,
+    llm_url: LlmUrl = None,
+    llm_timeout: LlmTimeout = 30.0,
+    llm_tokens: LlmTokens = 300,
+    llm_time: LlmTime = SimulatedTime.WAITS,
+    llm_pictures: LlmPictures = False,
+    llm_cassette: LlmCassette = None,
+    llm_replay: LlmReplay = False,
+    llm_prices: LlmPrices = None,
     speed: Annotated[
         float | None,
         typer.Option(
@@ -127,6 +148,16 @@ def run(
         word_errors=word_errors,
         perception=perception,
         speech=speech,
+        language_model=LanguageModelOptions(
+            url=llm_url,
+            timeout=llm_timeout,
+            tokens=llm_tokens,
+            time=llm_time,
+            pictures=llm_pictures,
+            cassette=llm_cassette,
+            replay=llm_replay,
+            prices=llm_prices,
+        ),
         speed=speed,
     )
     _check_outputs(plan)
@@ -154,10 +185,13 @@ def _play(plan: _Plan, *, quiet: bool) -> Facts:
     from dorothie_gym.engine.session_engine import SessionEngine
     from dorothie_gym.rollout import play_session
 
-    cast = find_cast(*plan.players)
+    cast = find_cast(*plan.players, plan.language_model)
     filmed = plan.video is not None and plan.view is not RenderView.MAP
-    compile_first(pictures=filmed or plan.perception is PerceptionModel.CAMERA)
-    config = env_config(plan.max_seconds, plan.word_errors, plan.perception, plan.speech)
+    drawn = plan.perception is PerceptionModel.CAMERA or plan.language_model.pictures
+    compile_first(pictures=filmed or drawn)
+    config = env_config(
+        plan.max_seconds, plan.word_errors, plan.perception, plan.speech, pictures=plan.language_model.pictures
+    )
     engine = SessionEngine(plan.town, plan.storyboard, config=config)
     engine.reset(seed=plan.seed)
     try:
@@ -234,6 +268,7 @@ def _facts(engine: SessionEngine, ending: SessionSummary, wall: float, out: Path
         **{key: ending[key] for key in ("success", "subgoals", "arrived", "collisions", "seconds")},
         "wall_seconds": round(wall, 3),
         **{key: ending[key] for key in ("utterances", "acts", "physical_actions", "exceptions")},
+        **({"usage": ending["usage"]} if "usage" in ending else {}),
         "session": None if out is None else str(out),
     }
 

@@ -49,7 +49,10 @@ class SessionCounts(TypedDict):
 
 
 class SessionSummary(SessionCounts):
-    """State of a session; `reason` is there when it is over ("arrived", "out of time" and the like)."""
+    """State of a session; `reason` is there when it is over ("arrived", "out of time" and the like).
+
+    `usage` is there for played sessions in which policies have cost something (calls, tokens), by role.
+    """
 
     success: bool
     arrived: bool
@@ -60,6 +63,7 @@ class SessionSummary(SessionCounts):
     exchanges: int
     transactions: int
     reason: NotRequired[str]
+    usage: NotRequired[Mapping[str, Mapping[str, object]]]
 
 
 class EventLog:

@@ -71,6 +71,10 @@ class Policy(ABC, Generic[State]):
         """Returns the traits of the persona that a state belongs to, in JSON types, for the record; None for none."""
         return None
 
+    def usage_of(self, state: State) -> Mapping[str, object] | None:
+        """Returns what a session has cost so far (calls, tokens), in JSON types, for the record; None for nothing."""
+        return None
+
     @abstractmethod
     def step(self, observation: ObservationMapping, state: State) -> tuple[ActionDict, State]:
         """Chooses an action.

@@ -16,6 +16,7 @@ from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, ra
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard
+from dorothie_gym.policies.language_model import LanguageModelConfig, LanguageModelPolicy
 from dorothie_gym.policies.participant import ScriptedParticipant
 from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy
@@ -28,6 +29,9 @@ POLICY_NAMES = ("scripted", "silent", "random")
 
 WITH_TRAITS: Final = "scripted:"
 """Beginning of the name of a scripted policy whose personas have given traits."""
+
+LANGUAGE_MODEL: Final = "llm:"
+"""Beginning of the name of a policy that asks a language model; the name of the model follows."""
 
 LANE_FOLLOW = "lane-follow"
 """Name of the Co-Wizard's policy that drives and never talks."""
@@ -46,7 +50,8 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
         name: "scripted", "silent" (does nothing) or "random" (samples the action space); for participant and Co-Wizard
             also "scripted:" with traits of the persona ("scripted:talkativeness=0.8..1", see
             `dorothie_gym.policies.persona`); for the Co-Wizard also "lane-follow" (drives on, never talks), or a
-            shipped model such as "pretrained:maskable-ppo".
+            shipped model such as "pretrained:maskable-ppo"; "llm:" with the name of a language model at the endpoint
+            `OPENAI_BASE_URL`.
         role: role of the policy.
         limits: sizes of the spaces.
 
@@ -61,6 +66,8 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
         if role is Role.PARTICIPANT:
             return ScriptedParticipant(limits, traits=traits)
         return ScriptedCoWizard(limits, traits=traits)
+    if name.startswith(LANGUAGE_MODEL):
+        return LanguageModelPolicy(role, LanguageModelConfig.usual(name.removeprefix(LANGUAGE_MODEL)), limits)
     if name == "silent":
         return SilentPolicy(role, limits)
     if name == "random":
@@ -144,6 +151,7 @@ class Player:
         loader: function that reads it.
         sha256: hash of the file, or of the model files ("model.*") of the folder; identifies the policy of a rollout.
         training: cost of the training in `steps` and `seconds`, where the JSON of the file has them.
+        language_model: settings of a language model; None for other policies.
     """
 
     name: str
@@ -151,6 +159,7 @@ class Player:
     loader: Loader | None = None
     sha256: str | None = None
     training: Mapping[str, float] = field(default_factory=dict)
+    language_model: LanguageModelConfig | None = None
 
     @property
     def trained(self) -> bool:
@@ -163,6 +172,8 @@ class Player:
         Raises:
             ValueError: the role has no policy of this name, the file cannot be read, or a library is not installed.
         """
+        if self.language_model is not None:
+            return LanguageModelPolicy(role, self.language_model, limits)
         if self.path is None or self.loader is None:
             return make_policy(self.name, role, limits)
         with _reporting_missing_library(self.name):
@@ -176,12 +187,14 @@ ALL_SCRIPTED: Final[Mapping[Role, Player]] = MappingProxyType(
 """Scripted policies for all roles."""
 
 
-def find_player(given: str, role: Role) -> Player:
+def find_player(given: str, role: Role, language_model: LanguageModelConfig | None = None) -> Player:
     """Returns the source of a policy by name or path.
 
     Args:
         given: name of a policy, or path of a file or folder; a name has precedence ("./scripted" is a path).
         role: role of the policy.
+        language_model: settings of a policy "llm:MODEL", whose name replaces that in the settings; None for the usual
+            ones (`LanguageModelConfig.usual`).
 
     Raises:
         PolicyLoadError: there is no such policy for the role, no such file, or none that can be played.
@@ -192,6 +205,8 @@ def find_player(given: str, role: Role) -> Player:
         except ValueError as error:
             raise PolicyLoadError(f"{role}: {error}") from None
         return Player(name=given)
+    if given.startswith(LANGUAGE_MODEL):
+        return _language_model(given, role, language_model)
     if given in policy_names(role):
         return _shipped_player(given, role) if is_pretrained(given) else Player(name=given)
     path = Path(given)
@@ -201,6 +216,16 @@ def find_player(given: str, role: Role) -> Player:
             f"{did_you_mean(given, policy_names(role))}the policies are {', '.join(policy_names(role))}"
         )
     return _trained_player(given, path, role)
+
+
+def _language_model(given: str, role: Role, settings: LanguageModelConfig | None) -> Player:
+    """Returns the source of a language model; raises `PolicyLoadError` if its settings are incomplete."""
+    model = given.removeprefix(LANGUAGE_MODEL)
+    try:
+        config = LanguageModelConfig.usual(model) if settings is None else replace(settings, model=model)
+    except ValueError as error:
+        raise PolicyLoadError(f"{role}: {error}") from None
+    return Player(name=given, language_model=config)
 
 
 def _shipped_player(name: str, role: Role) -> Player:

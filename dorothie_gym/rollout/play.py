@@ -6,19 +6,24 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_log import SessionSummary
-from dorothie_gym.files import noticing_deletion
+from dorothie_gym.files import noticing_deletion, write_atomically
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.recording import SessionHeader, SessionWriter
+from dorothie_gym.recording.json_io import to_page
 from dorothie_gym.spaces import ActionMapping
 
 PERSONAS: Final = "personas"
 """Field of a header with the personas of the scripted speakers, by role; see `dorothie_gym.policies.persona`."""
+
+
+USAGE_FILE: Final = "usage.json"
+"""What the policies have cost in a session (calls, tokens), by role; not part of the record, and absent for nothing."""
 
 
 class SessionHost(Protocol):
@@ -57,7 +62,7 @@ def play_session(
         on_step: called with the engine after the reset and after each decision.
 
     Returns:
-        The summary of the session.
+        The summary of the session; with `usage`, by role, if a policy has any (`Policy.usage_of`).
 
     Raises:
         ValueError: a role has no policy.
@@ -89,9 +94,19 @@ def play_session(
                 recorder.record(actions)
             if on_step is not None:
                 on_step(engine)
+        usage = usage_of(policies, states)
         if writer is not None:
+            if usage:
+                write_atomically(writer.folder / USAGE_FILE, to_page(usage))
             writer.finish(engine.summary())
-    return engine.summary()
+    summary = engine.summary()
+    return {**summary, "usage": usage} if usage else summary
+
+
+def usage_of(policies: Mapping[Role, AnyPolicy], states: Mapping[Role, Any]) -> dict[str, Mapping[str, object]]:
+    """Returns what the policies of a session have cost, by role; empty for nothing."""
+    found = {str(role): policy.usage_of(states[role]) for role, policy in policies.items()}
+    return {role: usage for role, usage in found.items() if usage is not None}
 
 
 def with_personas(

@@ -362,6 +362,26 @@ def _read_model(folder: Path) -> None:
         find_player(str(path), Role.CO_WIZARD).make(Role.CO_WIZARD, SpaceLimits())
 
 
+def _cassette(folder: Path) -> None:
+    from dorothie_gym.policies.language_model.cassette import Cassette, Reply
+    from dorothie_gym.policies.language_model.faults import Fault
+    from dorothie_gym.policies.language_model.usage import ModelUsage
+
+    tape = Cassette(folder / "tape.jsonl")
+    tape.add({"model": "m", "seed": 1}, Reply(answer='{"drive": "Stop"}', tokens=(900, 20), latency=0.5))
+    tape.add({"model": "m", "seed": 2}, Reply(fault=Fault.TIMEOUT, reason="no answer", retried=True, latency=30.0))
+    usage = ModelUsage(model="m", calls=2, answers=1, cost=0.01, silences={"timeout": 1})
+    (folder / "usage.json").write_text(json.dumps({"co_wizard": usage.to_json()}))
+
+
+def _read_cassette(folder: Path) -> None:
+    from dorothie_gym.policies.language_model.cassette import Cassette
+    from dorothie_gym.rollout.closed_loop.usage import read_usage
+
+    Cassette(folder / "tape.jsonl").find({"model": "m", "seed": 1})
+    read_usage(folder)
+
+
 # --- Caches, with correct checksums ----------------------------------------------------------------------------------
 
 
@@ -479,6 +499,7 @@ SUBJECTS: Final = MappingProxyType(
         "storyboard": Subject(_storyboard, _read_storyboard),
         "study": Subject(_study, _read_study),
         "rollout": Subject(_rollout, _read_rollout),
+        "cassette": Subject(_cassette, _read_cassette),
         "cache": Subject(_cache, _read_cache),
         "rl": Subject(_rl_model, _read_model, slow=True),
         "selfplay": Subject(_selfplay_model, _read_model, slow=True),

@@ -25,7 +25,18 @@ A_FEW = 8
 
 GROUPS = (
     ("native", "release", "sample", "hub"),
-    ("corpus", "annotations", "predictions", "storyboard", "study", "rollout", "opendrive", "cache", "audio"),
+    (
+        "corpus",
+        "annotations",
+        "predictions",
+        "storyboard",
+        "study",
+        "rollout",
+        "cassette",
+        "opendrive",
+        "cache",
+        "audio",
+    ),
     ("yaml",),
     ("rl", "selfplay", "run", "benchmark"),
 )

@@ -191,6 +191,7 @@ def leaderboard_page(
         "",
         *_costs(entries, labels),
         "",
+        *_language_models(entries, labels),
         "## Commands",
         "",
         "These commands reproduce the tables:",
@@ -229,6 +230,27 @@ def _costs(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> li
             ]
         )
     return _table(rows)
+
+
+def _language_models(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> list[str]:
+    """Returns the section on the usage of language models; empty for rollouts without any."""
+    rows = [["Co-Wizard", "towns", "role", "calls", "answered", "tokens in, out", "seconds / call", "cost / session"]]
+    for entry in entries:
+        for role, usage in entry.result.usage().items():
+            calls = max(usage.calls, 1)
+            rows.append(
+                [
+                    labels[entry.policy],
+                    entry.part,
+                    role.replace("_", "-"),
+                    f"{usage.calls:,}",
+                    f"{100 * usage.answers / calls:.1f} %",
+                    f"{usage.prompt_tokens:,}, {usage.completion_tokens:,}",
+                    f"{usage.latency / calls:.2f}",
+                    "-" if usage.cost is None else f"{usage.cost / max(entry.table.sessions, 1):.4f} $",
+                ]
+            )
+    return ["## Language models", "", *_table(rows), ""] if len(rows) > 1 else []
 
 
 def _table(rows: Sequence[Sequence[str]]) -> list[str]:

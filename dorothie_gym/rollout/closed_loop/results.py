@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, NotRequired, TypedDict
 
@@ -16,6 +16,7 @@ from dorothie_gym.errors import InputFileError, RolloutError
 from dorothie_gym.files import JsonValue
 from dorothie_gym.input_files import MAX_RESULT_JSON, checked, raising, read_json
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind
+from dorothie_gym.policies.language_model.usage import UsagePage
 from dorothie_gym.rollout.closed_loop.metrics import (
     BOOTSTRAP_SEED,
     METRICS,
@@ -26,6 +27,13 @@ from dorothie_gym.rollout.closed_loop.metrics import (
     figures_of,
 )
 from dorothie_gym.rollout.closed_loop.session_record import SessionRecord, SessionRecordPage
+from dorothie_gym.rollout.closed_loop.usage import (
+    SessionUsage,
+    total_usage,
+    usage_from_json,
+    usage_table,
+    usage_to_json,
+)
 
 RESULT_FILE: Final = "rollout.json"
 """File of rows and table in the folder of a rollout."""
@@ -46,6 +54,7 @@ class RolloutRow:
         seed: seed of the session.
         record: measures of the session; None if it ended in an error.
         error: the error, if any.
+        usage: usage of language models, by role; empty for none.
     """
 
     number: int
@@ -53,11 +62,13 @@ class RolloutRow:
     seed: int
     record: SessionRecord | None = None
     error: str | None = None
+    usage: SessionUsage = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
-        """Returns the fields in JSON types."""
+        """Returns the fields in JSON types; `usage` is left out if there is none."""
         record = None if self.record is None else self.record.to_json()
-        return {"number": self.number, "town": self.town, "seed": self.seed, "error": self.error, "record": record}
+        page = {"number": self.number, "town": self.town, "seed": self.seed, "error": self.error, "record": record}
+        return {**page, "usage": usage_to_json(self.usage)} if self.usage else page
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +131,7 @@ class RolloutResult:
 
     def to_json(self) -> dict[str, object]:
         """Returns the table and the rows in JSON types; they do not depend on the number of workers."""
+        usage = self.usage()
         return {
             "version": RESULT_VERSION,
             "settings": dict(self.settings),
@@ -127,6 +139,7 @@ class RolloutResult:
             **self.table().to_json(),
             "per_town": {town: table.to_json() for town, table in self.per_town().items()},
             "per_exception": {kind: table.to_json() for kind, table in self.per_exception().items()},
+            **({"usage": usage_to_json(usage)} if usage else {}),
             "seeds": [row.seed for row in self.rows],
             "interval": {"share": CONFIDENCE, "resamples": RESAMPLES, "seed": BOOTSTRAP_SEED},
             "rows": [row.to_json() for row in self.rows],
@@ -135,6 +148,10 @@ class RolloutResult:
     def table(self) -> RolloutTable:
         """Returns the table of all sessions."""
         return RolloutTable.of(self.rows)
+
+    def usage(self) -> SessionUsage:
+        """Returns the usage of language models in all sessions, by role; empty for none."""
+        return total_usage([row.usage for row in self.rows])
 
     def per_town(self) -> dict[str, RolloutTable]:
         """Returns the table of each town, in the order of their first sessions."""
@@ -163,6 +180,7 @@ class _RowPage(TypedDict):
     seed: Annotated[int, Meta(ge=0)]
     error: str | None
     record: SessionRecordPage | None
+    usage: NotRequired[dict[str, UsagePage]]
 
 
 class _ConfigPage(TypedDict):
@@ -217,6 +235,7 @@ def result_from_json(page: JsonValue, where: str) -> RolloutResult:
                 seed=row["seed"],
                 record=None if row["record"] is None else SessionRecord.from_json(row["record"]),
                 error=row["error"],
+                usage=usage_from_json(row.get("usage", {})),
             )
             for row in found["rows"]
         ]
@@ -294,6 +313,8 @@ def print_result(result: RolloutResult, console: Console) -> None:
     ):
         for part in _parts(name, parts, keys, console.width):
             console.print(part)
+    if usage := result.usage():
+        console.print(usage_table(usage, table.sessions))
     seeds = [str(row.seed) for row in result.rows]
     more = "" if len(seeds) <= MAX_PRINTED_SEEDS else f", ... ({len(seeds)} in all, see --json)"
     console.print(f"Seeds (of --seed {settings['seed']}): {', '.join(seeds[:MAX_PRINTED_SEEDS])}{more}", soft_wrap=True)

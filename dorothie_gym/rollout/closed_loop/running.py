@@ -16,10 +16,12 @@ from dorothie_gym.files import write_atomically
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
+from dorothie_gym.policies.language_model import LanguageModelConfig
 from dorothie_gym.recording import safe_name
 from dorothie_gym.recording.json_io import to_page
 from dorothie_gym.rollout.closed_loop.results import RESULT_FILE, RolloutResult, RolloutRow
 from dorothie_gym.rollout.closed_loop.session_record import SessionRecord, measure
+from dorothie_gym.rollout.closed_loop.usage import SessionUsage, read_usage
 from dorothie_gym.rollout.runner import PlayedSession, SessionJob, run_sessions
 
 SESSIONS_FOLDER: Final = "sessions"
@@ -95,10 +97,16 @@ class RolloutSettings:
 
     def to_json(self) -> dict[str, object]:
         """Returns the settings in JSON types, with SHA-256 and training cost of learned players."""
+        models = {
+            str(role): player.language_model.record()
+            for role, player in self.cast.items()
+            if player.language_model is not None
+        }
         return {
             **{str(role): self.cast[role].name for role in AGENT_ROLES},
             "sha256": {str(role): self.cast[role].sha256 for role in AGENT_ROLES if self.cast[role].sha256},
             "training": {str(role): dict(self.cast[role].training) for role in AGENT_ROLES if self.cast[role].training},
+            **({"language_models": models} if models else {}),
             "towns": list(self.towns),
             "sessions_planned": self.sessions,
             "seed": self.seed,
@@ -124,7 +132,22 @@ def command_of(settings: Mapping[str, Any]) -> str:
         words += ["--perception", perception]
     if config.get("channel") == ChannelKind.SPEECH:
         words += ["--speech"]
+    words += _language_model_options(settings.get("language_models", {}))
     return shlex.join(words)
+
+
+def _language_model_options(models: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Returns the options of the language models of a rollout, whose settings are the same for all roles."""
+    if not models:
+        return []
+    usual, found = LanguageModelConfig(model="usual", url="http://localhost/v1").record(), next(iter(models.values()))
+    words = ["--llm-url", "URL"]
+    for option, name in (("--llm-time", "time"), ("--llm-timeout", "timeout"), ("--llm-tokens", "max_tokens")):
+        if found[name] != usual[name]:
+            words += [option, f"{found[name]}"]
+    if found["pictures"]:
+        words += ["--llm-pictures"]
+    return words
 
 
 def parse_towns(text: str) -> tuple[str, ...]:
@@ -201,9 +224,15 @@ def roll_out(
         try:
             for outcome in outcomes:
                 plan = outcome.plan
+                record, usage = outcome.result or (None, {})
                 rows.append(
                     RolloutRow(
-                        number=plan.number, town=plan.town, seed=plan.seed, record=outcome.result, error=outcome.error
+                        number=plan.number,
+                        town=plan.town,
+                        seed=plan.seed,
+                        record=record,
+                        error=outcome.error,
+                        usage=usage,
                     )
                 )
         finally:
@@ -212,5 +241,5 @@ def roll_out(
     return result
 
 
-def _measure(played: PlayedSession) -> SessionRecord:
-    return measure(played.session, played.town)
+def _measure(played: PlayedSession) -> tuple[SessionRecord, SessionUsage]:
+    return measure(played.session, played.town), read_usage(played.folder)

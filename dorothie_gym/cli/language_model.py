@@ -1,0 +1,107 @@
+"""Options of language models as policies (`llm:MODEL`), which `run` and `rollout` share."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dorothie_gym.cli.options import needs
+from dorothie_gym.cli.output import fail
+from dorothie_gym.policies.language_model.config import URL_VARIABLE, SimulatedTime
+
+if TYPE_CHECKING:
+    from dorothie_gym.policies.language_model import LanguageModelConfig
+
+_PANEL = "Language models (llm:MODEL)"
+
+LlmUrl = Annotated[
+    str | None,
+    typer.Option(
+        metavar="URL",
+        help=f"Endpoint with OpenAI's chat interface, such as http://localhost:8000/v1; default: ${URL_VARIABLE}. The "
+        f"key is read from $OPENAI_API_KEY ({needs('llm')}).",
+        rich_help_panel=_PANEL,
+    ),
+]
+LlmTimeout = Annotated[
+    float, typer.Option(min=0.1, max=3600.0, help="Longest time of a call, retry included [s].", rich_help_panel=_PANEL)
+]
+LlmTokens = Annotated[
+    int, typer.Option(min=16, max=100_000, help="Largest number of tokens of an answer.", rich_help_panel=_PANEL)
+]
+LlmTime = Annotated[
+    SimulatedTime,
+    typer.Option(
+        help="The session waits for answers, or goes on: an answer then takes effect after the time of the call.",
+        rich_help_panel=_PANEL,
+    ),
+]
+LlmPictures = Annotated[
+    bool,
+    typer.Option("--llm-pictures", help="Send the picture of the car's camera too.", rich_help_panel=_PANEL),
+]
+LlmCassette = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.jsonl", help="Record calls in a file, and answer recorded ones from it.", rich_help_panel=_PANEL
+    ),
+]
+LlmReplay = Annotated[
+    bool,
+    typer.Option("--llm-replay", help="Answer from --llm-cassette only, without network.", rich_help_panel=_PANEL),
+]
+LlmPrices = Annotated[
+    str | None,
+    typer.Option(
+        metavar="IN,OUT", help="Price of a million tokens of prompts and of answers [$].", rich_help_panel=_PANEL
+    ),
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LanguageModelOptions:
+    """Options of language models as given on the command line."""
+
+    url: str | None
+    timeout: float
+    tokens: int
+    time: SimulatedTime
+    pictures: bool
+    cassette: Path | None
+    replay: bool
+    prices: str | None
+
+    def config(self) -> LanguageModelConfig:
+        """Returns the settings; the name of the model is a placeholder. Exits if they are incomplete or wrong."""
+        from dorothie_gym.policies.language_model import LanguageModelConfig
+
+        url = self.url or os.environ.get(URL_VARIABLE, "")
+        if not url and not self.replay:
+            fail(f"llm:MODEL needs an endpoint: give --llm-url, or set the variable {URL_VARIABLE}")
+        try:
+            return LanguageModelConfig(
+                model="MODEL",
+                url=url,
+                timeout=self.timeout,
+                max_tokens=self.tokens,
+                time=self.time,
+                pictures=self.pictures,
+                cassette=self.cassette,
+                offline=self.replay,
+                prices=self._prices(),
+            )
+        except ValueError as error:
+            fail(f"language model: {error}")
+
+    def _prices(self) -> tuple[float, float] | None:
+        if self.prices is None:
+            return None
+        try:
+            first, second = map(float, self.prices.split(","))
+        except ValueError:
+            fail(f"--llm-prices is {self.prices!r}; give two numbers separated by a comma, such as 0.15,0.60")
+        return first, second

@@ -1,0 +1,219 @@
+"""One request to an endpoint with OpenAI's chat interface, over httpx, with a deadline that holds for every fault."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import import_module
+from types import ModuleType
+from typing import Any, Final
+
+from dorothie_gym.errors import InputFileError, PolicyLoadError, one_line
+from dorothie_gym.files import JsonValue
+from dorothie_gym.input_files import parse_json
+from dorothie_gym.policies.language_model.faults import CallError, Fault
+
+KEY_VARIABLE: Final = "OPENAI_API_KEY"
+"""Environment variable with the secret for the header `Authorization`; unset for servers without one."""
+
+_LARGEST_ANSWER: Final = 4_000_000
+"""Largest body that is read [bytes]."""
+
+_LONGEST_WAIT: Final = 3600.0
+"""Longest `Retry-After` that is believed [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Completion:
+    """Answer of a model.
+
+    Attributes:
+        text: the answer.
+        tokens: number of tokens of prompt and answer, as the endpoint counts them; 0 if it does not.
+    """
+
+    text: str
+    tokens: tuple[int, int]
+
+
+class IncompleteError(CallError):
+    """A completion that is no answer; it has cost tokens all the same.
+
+    Attributes:
+        tokens: as of `Completion`.
+    """
+
+    def __init__(self, fault: Fault, reason: str, tokens: tuple[int, int]) -> None:
+        super().__init__(fault, reason)
+        self.tokens = tokens
+
+
+def httpx_module() -> ModuleType:
+    """Returns the package httpx; raises `PolicyLoadError` if it is not installed."""
+    try:
+        return import_module("httpx")
+    except ModuleNotFoundError:
+        raise PolicyLoadError(
+            "language models need httpx, which is not installed; run: pip install 'dorothie-gym[llm]'"
+        ) from None
+
+
+class ChatEndpoint:
+    """Endpoint with the route `chat/completions`.
+
+    Args:
+        url: address before the route.
+
+    Raises:
+        PolicyLoadError: httpx is not installed.
+    """
+
+    def __init__(self, url: str) -> None:
+        self._url = f"{url.rstrip('/')}/chat/completions"
+        self._httpx: Any = httpx_module()
+
+    def complete(self, request: Mapping[str, object], timeout: float) -> Completion:
+        """Returns the answer to a request.
+
+        The exchange runs in a thread of its own, which is given up at the deadline: timeouts of a connection hold
+        between two bytes, so that a server could otherwise trickle for hours.
+
+        Args:
+            request: body of the request, in JSON types.
+            timeout: time in which the answer must be complete [s].
+
+        Raises:
+            CallError: there is no answer; the reason never contains the key.
+        """
+        exchange = _Exchange(self._httpx, self._url, request, timeout)
+        exchange.start()
+        exchange.join(timeout)
+        if exchange.is_alive():
+            exchange.cancel()
+            raise CallError(Fault.TIMEOUT, f"no answer within {timeout:.1f} s")
+        return _completion(*exchange.result())
+
+
+class _Exchange(threading.Thread):
+    """Thread of one request."""
+
+    def __init__(self, httpx: Any, url: str, request: Mapping[str, object], timeout: float) -> None:
+        super().__init__(name="language-model", daemon=True)
+        self._httpx, self._url, self._request = httpx, url, request
+        self._timeout = timeout
+        self._cancelled = threading.Event()
+        self._status, self._headers, self._body = 0, dict[str, str](), b""
+        self._error: CallError | None = None
+
+    def run(self) -> None:
+        """Sends the request and keeps the answer or the error."""
+        key = os.environ.get(KEY_VARIABLE, "")
+        headers = {"Authorization": f"Bearer {key}"} if key else {}
+        httpx = self._httpx
+        try:
+            with (
+                httpx.Client(timeout=self._timeout, verify=_certificates(self._url)) as client,
+                client.stream("POST", self._url, json=self._request, headers=headers) as answer,
+            ):
+                self._status, self._headers = answer.status_code, dict(answer.headers)
+                for block in answer.iter_bytes():
+                    self._body += block
+                    if self._cancelled.is_set():
+                        return
+                    if len(self._body) > _LARGEST_ANSWER:
+                        raise CallError(Fault.NOT_A_COMPLETION, f"the answer has more than {_LARGEST_ANSWER} bytes")
+        except CallError as error:
+            self._error = error
+        except httpx.TimeoutException:
+            self._error = CallError(Fault.TIMEOUT, f"no answer within {self._timeout:.1f} s")
+        except httpx.DecodingError as error:
+            self._error = CallError(Fault.NOT_A_COMPLETION, f"the answer cannot be decoded: {_safe(error, key)}")
+        except (httpx.HTTPError, httpx.InvalidURL, OSError, UnicodeError) as error:
+            self._error = CallError(Fault.NO_CONNECTION, f"{type(error).__name__}: {_safe(error, key)}")
+
+    def cancel(self) -> None:
+        """Ends the exchange at its next byte."""
+        self._cancelled.set()
+
+    def result(self) -> tuple[int, dict[str, str], bytes]:
+        """Returns status, headers and body; raises the error of the exchange."""
+        if self._error is not None:
+            raise self._error
+        return self._status, self._headers, self._body
+
+
+def _certificates(url: str) -> Any:
+    """Returns the context that checks certificates; False for a server without TLS, which needs none."""
+    return _ssl_context() if url.startswith("https:") else False
+
+
+@lru_cache(maxsize=1)
+def _ssl_context() -> Any:
+    return httpx_module().create_ssl_context()  # reads the certificates of the authorities, which takes 30 ms
+
+
+def _completion(status: int, headers: Mapping[str, str], body: bytes) -> Completion:
+    """Returns the answer in a body; raises `CallError` if there is none."""
+    if status != 200:
+        raise _status_error(status, headers, body)
+    try:
+        page = parse_json(body.decode("utf-8"), "the completion", unique=False)
+    except (InputFileError, UnicodeDecodeError):
+        raise CallError(Fault.NOT_A_COMPLETION, f"the server sent no JSON: {_shown(body)}") from None
+    tokens, choice = _tokens(page), _first_choice(page)
+    message = choice.get("message")
+    if not isinstance(message, Mapping):
+        raise CallError(Fault.NOT_A_COMPLETION, f"the server sent no chat completion: {_shown(body)}")
+    text, refusal, ended = message.get("content"), message.get("refusal"), choice.get("finish_reason")
+    if refusal or ended == "content_filter":
+        raise IncompleteError(Fault.REFUSED, f"the model declined to answer: {one_line(refusal or ended)}", tokens)
+    if ended == "length":
+        raise IncompleteError(Fault.CUT_OFF, "the answer was too long and was cut off", tokens)
+    if not isinstance(text, str) or not text.strip():
+        raise IncompleteError(Fault.REFUSED, "the answer is empty", tokens)
+    return Completion(text=text, tokens=tokens)
+
+
+def _first_choice(page: JsonValue) -> Mapping[str, JsonValue]:
+    """Returns the first choice of a completion; empty if there is none."""
+    choices = page.get("choices") if isinstance(page, Mapping) else None
+    first = choices[0] if isinstance(choices, list) and choices else None
+    return first if isinstance(first, Mapping) else {}
+
+
+def _status_error(status: int, headers: Mapping[str, str], body: bytes) -> CallError:
+    fault = Fault.RATE_LIMITED if status == 429 else Fault.SERVER_ERROR if status >= 500 else Fault.REJECTED
+    try:
+        wait = min(max(float(headers.get("retry-after", "0")), 0.0), _LONGEST_WAIT)
+    except ValueError:
+        wait = 0.0  # a date: the server's clock is not known
+    return CallError(fault, f"status {status}: {_shown(body)}", wait)
+
+
+def _tokens(page: object) -> tuple[int, int]:
+    usage = page.get("usage") if isinstance(page, Mapping) else None
+    counts = [usage.get(name) if isinstance(usage, Mapping) else None for name in _TOKEN_FIELDS]
+    first, second = (count if type(count) is int and 0 <= count < 2**31 else 0 for count in counts)
+    return first, second
+
+
+_TOKEN_FIELDS: Final = ("prompt_tokens", "completion_tokens")
+
+
+def _shown(body: bytes) -> str:
+    return _safe(body[:1000].decode("utf-8", "replace"), os.environ.get(KEY_VARIABLE, "")) or "nothing"
+
+
+def _safe(text: object, key: str) -> str:
+    """Returns a text on one line, without the key: servers repeat it in messages."""
+    words = str(text)
+    return one_line(words.replace(key, "[key]") if key else words, 200)
+
+
+def canonical(request: Mapping[str, object]) -> str:
+    """Returns a request as JSON that is the same for equal requests."""
+    return json.dumps(request, sort_keys=True, separators=(",", ":"))

@@ -1,0 +1,255 @@
+"""The Co-Wizard's interface to a language model: when it is asked, and what its answers do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import Place
+from dorothie_gym.ontology import GoalStatus, LandmarkName, MentalAction, ObjectClass, PhysicalAction, Role
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
+from dorothie_gym.policies.language_model.co_wizard_prompt import (
+    KEEP,
+    answer_schema,
+    drive_options,
+    goal_options,
+    mark_options,
+    prompt_text,
+    step_words,
+)
+from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
+from dorothie_gym.policies.language_model.role_interface import (
+    NONE,
+    Memory,
+    RoleInterface,
+    next_speech,
+    with_heard,
+    with_talk,
+)
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.spaces import ActionDict, CoWizardAction, LanePosition, Mental, Motion, ObservationMapping, Physical
+
+REPEAT_AFTER = 3.0
+"""Time after which a step that is still due is pointed out once more [s]."""
+
+JUNCTION_DISTANCE = 40.0
+"""Distance to a junction at which its turn is asked for if none is prepared [m]."""
+
+HELD_UP = 6.0
+"""Standstill before a hazard, other than a red light, that is worth a call [s]."""
+
+ARRIVED = 2.0
+"""Distance to the goal at which a standing car is there [m]."""
+
+ORDER_LIFETIME = 4.0
+"""Time for which an action is kept that is not possible yet [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoWizardMemory(Memory):
+    """Memory of the Co-Wizard.
+
+    Attributes:
+        goal: place where the Co-Wizard is going; None for none.
+        goal_name: name of the goal in prompts.
+        marks: places that were marked on the map, by landmark.
+        navigator: route to the goal.
+        step: next step on the route; None without a route.
+        drive: action that is to be carried out, with the time until which it is kept [s]; None for none.
+        updates: belief updates that are to be sent, the next first.
+        motion: state of motion at the last decision.
+        standing_since: time since which the car stands [s]; None if it drives.
+        told_held_up: whether the present standstill before a hazard was pointed out.
+        told_step: step that was pointed out last, and when [s].
+        told_junction: junction that was pointed out last.
+        visited: goals at which the car has stopped.
+    """
+
+    goal: LandmarkName | None = None
+    goal_name: str = ""
+    marks: tuple[tuple[LandmarkName, Place], ...] = ()
+    navigator: Navigator = Navigator()
+    step: RouteStep | None = None
+    drive: tuple[Physical, float] | None = None
+    updates: tuple[Mental, ...] = ()
+    motion: Motion = Motion.DRIVING
+    standing_since: float | None = None
+    told_held_up: bool = False
+    told_step: tuple[tuple[int, int, int], float] = ((0, 0, 0), -math.inf)
+    told_junction: int = -1
+    visited: frozenset[Place] = frozenset()
+
+
+class CoWizardInterface(RoleInterface[CoWizardMemory]):
+    """Interface of the Co-Wizard."""
+
+    role = Role.CO_WIZARD
+
+    def begin(self, town: Town) -> CoWizardMemory:
+        """Returns the memory before the first decision."""
+        return CoWizardMemory(town=town)
+
+    def attend(
+        self, observation: ObservationMapping, memory: CoWizardMemory, delay: float
+    ) -> tuple[CoWizardMemory, tuple[str, ...]]:  # fmt: skip
+        """Follows the route, and notices what is worth a call."""
+        view = CoWizardView.read(observation, memory.town)
+        memory = replace(memory, clock=memory.clock.ticked(view.time))
+        navigator = memory.navigator.followed(memory.town, view)
+        step = navigator.step(memory.town, view, memory.clock.interval, delay)
+        found_block = navigator.blocked_at > memory.navigator.blocked_at
+        memory = replace(memory, navigator=navigator, step=step)
+        memory, said = with_heard(memory, observation, Role.PARTICIPANT, "passenger")
+        events = [f'The passenger said: "{said}"'] if said else []
+        memory, noticed = _notice_motion(memory, view)
+        events += noticed
+        goal = navigator.goal
+        if goal is not None and view.standing and abs(navigator.left(view)) <= ARRIVED and goal not in memory.visited:
+            memory = replace(memory, visited=memory.visited | {goal})
+        if found_block:
+            events.append("The road ahead is blocked; the navigator has planned around it.")
+        memory, noticed = _notice_way(memory, view)
+        return replace(memory, motion=view.motion), (*events, *noticed)
+
+    def prompt(
+        self, observation: ObservationMapping, memory: CoWizardMemory, events: Sequence[str]
+    ) -> tuple[str, AnswerSchema]:  # fmt: skip
+        """Returns the prompt of a call and the schema of its answer."""
+        view = CoWizardView.read(observation, memory.town)
+        text = prompt_text(
+            view, memory.town, memory.navigator, memory.step, events, goal=memory.goal_name, talk=memory.talk,
+            note=memory.note, mark=_mark(memory) is not None, visited=memory.visited,
+        )  # fmt: skip
+        return text, answer_schema(view, memory.town)
+
+    def accept(
+        self, observation: ObservationMapping, memory: CoWizardMemory, answer: Mapping[str, str]
+    ) -> tuple[CoWizardMemory, int]:  # fmt: skip
+        """Takes in goal, mark, status, words, and the action to carry out."""
+        view = CoWizardView.read(observation, memory.town)
+        memory = with_talk(memory, answer, view.time)
+        memory = _with_goal(memory, view, answer["goal"])
+        memory = _with_mark(memory, view, answer["mark"])
+        memory = _with_status(memory, answer["status"])
+        chosen = drive_options(view, memory.town).get(answer["drive"])
+        expired = answer["drive"] != NONE and chosen is None
+        if chosen is not None:
+            memory = replace(memory, drive=(chosen, view.time + ORDER_LIFETIME))
+        return memory, int(expired)
+
+    def act(
+        self, observation: ObservationMapping, memory: CoWizardMemory
+    ) -> tuple[ActionDict, CoWizardMemory, int]:  # fmt: skip
+        """Speaks the next span, sends the next belief update, and carries out the action."""
+        speech, memory = next_speech(observation, memory)
+        mental, physical, expired = None, None, 0
+        if memory.updates:
+            mental, memory = memory.updates[0], replace(memory, updates=memory.updates[1:])
+        if memory.drive is not None:
+            view = CoWizardView.read(observation, memory.town)
+            order, until = memory.drive
+            if order in drive_options(view, memory.town).values():
+                physical, memory = order, replace(memory, drive=None)
+            elif view.time > until:
+                memory, expired = replace(memory, drive=None), 1
+        action = CoWizardAction(speech=speech, physical=physical, mental=mental)
+        return action.encode(self.limits), memory, expired
+
+
+# --- What is worth a call ---------------------------------------------------------------------------------------------
+
+
+def _notice_motion(memory: CoWizardMemory, view: CoWizardView) -> tuple[CoWizardMemory, list[str]]:
+    """Notices that the car has stopped, waits, or is held up."""
+    events = []
+    since = (memory.standing_since if memory.standing_since is not None else view.time) if view.standing else None
+    held_up = since is not None and view.motion is Motion.HAZARD
+    told = memory.told_held_up and held_up
+    if view.motion is not memory.motion and view.motion is Motion.STOPPED:
+        events.append("The car has been told to stop.")
+    if view.motion is not memory.motion and view.motion is Motion.WAITING:
+        events.append("The car waits at the end of its lane for a turn.")
+    lights = view.hazard is ObjectClass.TRAFFIC_LIGHT
+    if held_up and not told and not lights and since is not None and view.time - since >= HELD_UP:
+        told = True
+        events.append(f"The car has been standing for {HELD_UP:.0f} s because of what is ahead: {view.hazard.label}.")
+    return replace(memory, standing_since=since, told_held_up=told), events
+
+
+def _notice_way(memory: CoWizardMemory, view: CoWizardView) -> tuple[CoWizardMemory, list[str]]:
+    """Notices a step of the route that is due, or a junction for which no turn is prepared."""
+    step, options = memory.step, drive_options(view, memory.town)
+    if step is not None and step.due and _order_of(step) in options.values():
+        key, told_at = memory.told_step
+        if key != step.key or view.time - told_at >= REPEAT_AFTER:
+            words = step_words(step, view, memory.town)
+            return replace(memory, told_step=(step.key, view.time)), [f"Due now on the route: {words}"]
+    choice = view.choice
+    near = choice is not None and choice.distance <= JUNCTION_DISTANCE
+    prepared = view.manoeuvre is PhysicalAction.J_TURN or (memory.navigator.arrives and not _lost(memory))
+    if choice is not None and near and not prepared and choice.junction != memory.told_junction:
+        memory = replace(memory, told_junction=choice.junction)
+        return memory, [f"A junction is {choice.distance:.0f} m ahead and no turn is prepared."]
+    if choice is not None and not near and memory.told_junction != -1:
+        memory = replace(memory, told_junction=-1)
+    return memory, []
+
+
+def _lost(memory: CoWizardMemory) -> bool:
+    return memory.step is None
+
+
+def _order_of(step: RouteStep) -> Physical:
+    return Physical(action=step.action, angle=step.angle)
+
+
+# --- What an answer does ----------------------------------------------------------------------------------------------
+
+
+def _mark(memory: CoWizardMemory) -> Place | None:
+    """Returns the marked place of the goal; None if it has none."""
+    return next((place for name, place in memory.marks if name is memory.goal), None)
+
+
+def _with_goal(memory: CoWizardMemory, view: CoWizardView, label: str) -> CoWizardMemory:
+    """Sets another goal, or none."""
+    if label == KEEP:
+        return memory
+    if label == NONE:
+        memory = replace(memory, goal=None, goal_name="", updates=(*memory.updates, _goal_update(())))
+        return replace(memory, navigator=memory.navigator.to(memory.town, view, None), step=None)
+    name, place = goal_options(view, memory.town)[label]
+    memory = replace(memory, goal=name, goal_name=label, updates=(*memory.updates, _goal_update((name,))))
+    marks = tuple(pair for pair in memory.marks if pair[0] is not name)  # a goal that is named again is not at its mark
+    memory = replace(memory, marks=marks)
+    return replace(memory, navigator=memory.navigator.to(memory.town, view, place), step=None)
+
+
+def _with_mark(memory: CoWizardMemory, view: CoWizardView, label: str) -> CoWizardMemory:
+    """Marks where the goal is supposed to be; the car drives there, and slows down when it comes near."""
+    if label == NONE:
+        return memory
+    place = mark_options(view, memory.town)[label]
+    name = memory.goal if memory.goal is not None else LandmarkName.UNKNOWN
+    where = LanePosition(lane=place[0], metres=int(place[1]))
+    mark = Mental(action=MentalAction.KNOWLEDGE_UPDATE, landmark=name, place=where)
+    marks = (*(pair for pair in memory.marks if pair[0] is not name), (name, place))
+    navigator = memory.navigator.to(memory.town, view, place)
+    updates = (*memory.updates, mark, _goal_update((name,)))
+    return replace(memory, goal=name, marks=marks, updates=updates, navigator=navigator, step=None)
+
+
+def _with_status(memory: CoWizardMemory, label: str) -> CoWizardMemory:
+    """Sends the status of the goal."""
+    if label == KEEP or memory.goal is None:
+        return memory
+    status = next(status for status in GoalStatus if status.label == label)
+    update = Mental(action=MentalAction.STATUS_UPDATE, landmark=memory.goal, status=status)
+    return replace(memory, updates=(*memory.updates, update))
+
+
+def _goal_update(goals: tuple[LandmarkName, ...]) -> Mental:
+    return Mental(action=MentalAction.GOAL_UPDATE, goals=goals)

@@ -1,0 +1,293 @@
+"""The Co-Wizard's prompt: what it observes, in words, and the choices that its answer may take."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.model import LinkType
+from dorothie_gym.maps.routing import Place
+from dorothie_gym.ontology import GoalStatus, LandmarkName, ObjectClass, PhysicalAction, StreetName
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, distinct
+from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
+from dorothie_gym.policies.language_model.role_interface import (
+    ALL_NAMES,
+    NONE,
+    Line,
+    clock,
+    named_places,
+    section,
+    street_here,
+    street_name,
+    talk_lines,
+    weather_words,
+    words_fields,
+)
+from dorothie_gym.policies.route_progress import direction_of, lanes_ahead, streets_named
+from dorothie_gym.sim.ego.feasibility import may_change_cruise
+from dorothie_gym.spaces import ExitColumn, Motion, Physical
+
+KEEP = "keep"
+"""Label of leaving goal or status as it is."""
+
+AHEAD = (5, 10, 20, 30, 50, 80)
+"""Distances ahead at which a place can be marked [m]."""
+
+SHOWN_OBJECTS = 6
+"""Number of objects in sight that a prompt shows."""
+
+SHARED_NAMES = (LandmarkName.HOUSE, LandmarkName.PERSON)
+"""Names of several places, of which some may be missing from the map."""
+
+STRAIGHT_ANGLE = 180
+"""Index of the angle 0 in the mask of angles."""
+
+_MOTION = {
+    Motion.DRIVING: "driving",
+    Motion.STOPPED: "told to stop; it stays so until Start, LaneFollow or a manoeuvre",
+    Motion.WAITING: "waiting at the end of its lane: choose a turn",
+    Motion.HAZARD: "braking or standing because of what is ahead",
+}
+_SIDES = {LinkType.LANE_CHANGE_LEFT: (90, "left"), LinkType.LANE_CHANGE_RIGHT: (-90, "right")}
+
+
+# --- Choices ----------------------------------------------------------------------------------------------------------
+
+
+def drive_options(view: CoWizardView, town: Town) -> dict[str, Physical | None]:
+    """Returns the physical actions that the mask allows, with their arguments, by their labels; "none" first."""
+    possible = view.raw["action_mask"]["physical"]
+    options: dict[str, Physical | None] = {NONE: None}
+    for action in PhysicalAction:
+        if possible[action]:
+            options |= {
+                f"{action.label} {argument}".strip(): order for argument, order in _orders(action, view, town).items()
+            }
+    return options
+
+
+def _orders(action: PhysicalAction, view: CoWizardView, town: Town) -> dict[str, Physical]:
+    """Returns a physical action with each argument that the mask allows, by the argument in words."""
+    angles = view.raw["action_mask"]["angle"]
+    if action is PhysicalAction.J_TURN:
+        allowed = [angle for angle in exit_angles(view) if angles[angle + STRAIGHT_ANGLE]]
+        return {f"{angle}": Physical(action=action, angle=angle) for angle in allowed}
+    if action is PhysicalAction.LANE_SWITCH:
+        return {
+            word: Physical(action=action, angle=angle)
+            for side, (angle, word) in _SIDES.items()
+            if angles[angle + STRAIGHT_ANGLE] and town.neighbour(view.lane, side) is not None
+        }
+    if action is PhysicalAction.SPEED_CHANGE:
+        steps = [up for up in (True, False) if may_change_cruise(view.cruise, up)]
+        return {"up" if up else "down": Physical(action=action, up=up) for up in steps}
+    if action is PhysicalAction.LIGHT_CHANGE:
+        return {"off" if view.lights else "on": Physical(action=action, up=not view.lights)}
+    return {"": Physical(action=action)}
+
+
+def exit_angles(view: CoWizardView) -> tuple[int, ...]:
+    """Returns the angles of the exits of the next junction [degrees, positive left], from left to right."""
+    rows = view.raw["exits"]
+    return tuple(sorted({int(row[ExitColumn.ANGLE]) for row in rows if row[ExitColumn.PRESENT] > 0}, reverse=True))
+
+
+def goal_options(view: CoWizardView, town: Town) -> dict[str, tuple[LandmarkName, Place | None]]:
+    """Returns name and place of each possible goal by its label: those on the map, and names without a place."""
+    options: dict[str, tuple[LandmarkName, Place | None]] = {
+        label: (mark.name, mark.place) for label, mark in named_places(view.raw, town).items()
+    }
+    on_map = {name for name, _ in options.values()}
+    for name in ALL_NAMES:
+        if name not in on_map:
+            options[name.label] = name, None
+        elif name in SHARED_NAMES:
+            options[f"another {name.label}"] = name, None
+    return options
+
+
+def mark_options(view: CoWizardView, town: Town) -> dict[str, Place]:
+    """Returns the places that can be marked by their labels: ahead, beside places on the map, and on streets."""
+    options = {"here": (view.lane, view.station)}
+    options |= {f"{metres} m ahead": _place_ahead(town, view, float(metres)) for metres in AHEAD}
+    options |= {f"beside {label}": mark.place for label, mark in named_places(view.raw, town).items()}
+    names = sorted({int(value) for value in view.raw["street_names"]} - {StreetName.UNKNOWN.value})
+    for street in (StreetName(value) for value in names):
+        place = _middle_of(town, view, street)
+        if place is not None:
+            options[f"on {street_name(street)}"] = place
+    return options
+
+
+def _place_ahead(town: Town, view: CoWizardView, distance: float) -> Place:
+    """Returns the place some way ahead on the default lanes [m]; the end of the last lane before a junction."""
+    left = view.station + distance
+    lanes = lanes_ahead(town, view.lane, view.station, distance)
+    for lane in lanes[:-1]:
+        if left <= town.lanes[lane].length:
+            return lane, left
+        left -= town.lanes[lane].length
+    return lanes[-1], min(left, town.lanes[lanes[-1]].length)
+
+
+def _middle_of(town: Town, view: CoWizardView, street: StreetName) -> Place | None:
+    """Returns the middle of the lane of a street that is nearest to the car as the crow flies."""
+    indices, (x, y) = streets_named(view.raw["street_names"], street), view.position
+    found = []
+    for lane in town.lanes:
+        if lane.street in indices and not lane.in_junction:
+            middle = lane.position(lane.length / 2)
+            found.append((math.hypot(middle[0] - x, middle[1] - y), lane.id))
+    if not found:
+        return None
+    nearest = min(found)[1]
+    return nearest, town.lanes[nearest].length / 2
+
+
+def answer_schema(view: CoWizardView, town: Town) -> AnswerSchema:
+    """Returns the schema of the answer to a prompt at this moment."""
+    statuses = [status.label for status in GoalStatus if status is not GoalStatus.QUERIED]
+    say, note, again = words_fields()
+    return AnswerSchema(
+        name="co_wizard",
+        fields=(
+            ChoiceField(
+                name="drive",
+                labels=tuple(drive_options(view, town)),
+                meaning="what the car does now; none to go on as before",
+            ),
+            ChoiceField(
+                name="goal",
+                labels=distinct((KEEP, NONE, *goal_options(view, town))),
+                meaning="the place that you drive to",
+            ),
+            ChoiceField(
+                name="mark",
+                labels=distinct((NONE, *mark_options(view, town))),
+                meaning="where you suppose the goal if it is not on your map; you drive there and slow down near it",
+            ),
+            ChoiceField(name="status", labels=(KEEP, *statuses), meaning="status of the goal, for your records"),
+            say,
+            note,
+            again,
+        ),
+    )
+
+
+# --- Words ------------------------------------------------------------------------------------------------------------
+
+
+def prompt_text(
+    view: CoWizardView,
+    town: Town,
+    navigator: Navigator,
+    step: RouteStep | None,
+    events: Sequence[str],
+    *,
+    goal: str,
+    talk: Sequence[Line],
+    note: str,
+    mark: bool,
+    visited: Collection[Place],
+) -> str:
+    """Returns the user's part of the prompt.
+
+    Args:
+        view: observation of the Co-Wizard, with its action mask.
+        town: the map.
+        navigator: route to the goal.
+        step: next step on it.
+        events: what has happened.
+        goal: name of the goal; empty for none.
+        talk: the conversation.
+        note: note of the model to itself.
+        mark: whether the place of the goal is a mark.
+        visited: places of the map at which the car has stopped.
+    """
+    lines = [
+        f"Time: {clock(view.time)}",
+        f"Car: {_MOTION[view.motion]}; {view.speed * 3.6:.0f} km/h, cruise speed {view.cruise:.0f} km/h, "
+        f"head lights {'on' if view.lights else 'off'}",
+        f"Place: {street_here(view.raw, town, view.lane)}; weather: {weather_words(view.raw)}",
+    ]
+    if view.hazard is not ObjectClass.UNLABELED:
+        lines.append(f"Ahead: {view.hazard.label}, {float(view.raw['hazard_distance'][0]):.0f} m")
+    if view.manoeuvre is not None:
+        angle = f" {view.angle:.0f}" if view.manoeuvre is PhysicalAction.J_TURN else ""
+        lines.append(f"Prepared: {view.manoeuvre.label}{angle}")
+    lines += section("Exits of the next junction", _exit_lines(view, town))
+    lines += section("In sight", _object_lines(view))
+    lines += section("Places on your map", _place_lines(view, town, visited))
+    lines.append(_goal_line(view, navigator, goal, mark))
+    if step is not None:
+        lines.append(f"Route: {'now' if step.due else 'next'}: {step_words(step, view, town)}")
+    if note:
+        lines.append(f"Your note: {note}")
+    lines += section("Conversation, the latest last", talk_lines(talk))
+    lines += section("Just now", [f"- {event}" for event in events])
+    lines.append(f"You can drive: {', '.join(drive_options(view, town))}")
+    return "\n".join(lines)
+
+
+def _exit_lines(view: CoWizardView, town: Town) -> list[str]:
+    lines, names = [], view.raw["street_names"]
+    words = {} if view.choice is None else {way.angle: direction_of(way).value for way in view.choice.exits}
+    rows = [row for row in view.raw["exits"] if row[ExitColumn.PRESENT] > 0]
+    for row in sorted(rows, key=lambda row: -row[ExitColumn.ANGLE]):
+        angle, street = int(row[ExitColumn.ANGLE]), int(row[ExitColumn.STREET])
+        name = StreetName(int(names[street])) if 0 <= street < len(names) else StreetName.UNKNOWN
+        way = words.get(angle) or _side(angle)
+        lines.append(f"- JTurn {angle}: {way}, into {street_name(name)}, in {row[ExitColumn.DISTANCE]:.0f} m")
+    return lines
+
+
+def _side(angle: int) -> str:
+    return "straight" if abs(angle) < 45 else "left" if angle > 0 else "right"
+
+
+def _object_lines(view: CoWizardView) -> list[str]:
+    lines = []
+    for thing in view.objects[:SHOWN_OBJECTS]:
+        name = thing.kind.label if thing.prop is None else thing.prop.name.lower().replace("_", " ")
+        lines.append(f"- {name}, {thing.distance:.0f} m away")
+    return lines
+
+
+def _place_lines(view: CoWizardView, town: Town, visited: Collection[Place]) -> list[str]:
+    (x, y), lines = view.position, []
+    for label, mark in named_places(view.raw, town).items():
+        away = math.hypot(mark.x - x, mark.y - y)
+        been = "; you have stopped there" if mark.place in visited else ""
+        lines.append(f"- {label}, on {street_name(mark.street)}, {away:.0f} m away as the crow flies{been}")
+    return lines
+
+
+def _goal_line(view: CoWizardView, navigator: Navigator, goal: str, mark: bool) -> str:
+    if not goal and not mark:
+        return "Goal: none"
+    name = goal or "an unknown place"
+    if navigator.goal is None:
+        return f"Goal: {name}, which is not on your map: the passenger has to show the way"
+    left = navigator.left(view)
+    where = "where you have marked it" if mark else "on your map"
+    if not math.isfinite(left):
+        return f"Goal: {name}, {where}; there is no route to it"
+    if abs(left) <= 2.0 and view.standing:
+        return f"Goal: {name}, {where}; you are there"
+    return f"Goal: {name}, {where}; {left:.0f} m by the route"
+
+
+def step_words(step: RouteStep, view: CoWizardView, town: Town) -> str:
+    """Returns a step of the route in words, beginning with the label of its action."""
+    where = f"in {step.distance:.0f} m"
+    if step.action is PhysicalAction.J_TURN:
+        way = next((way for way in town.exits(step.place) if way.angle == step.angle), None)
+        into = "" if way is None else f" ({direction_of(way).value}, into {street_here(view.raw, town, way.lane)})"
+        return f"JTurn {step.angle}{into} {where}"
+    if step.action is PhysicalAction.LANE_SWITCH:
+        return f"LaneSwitch {'left' if step.angle > 0 else 'right'} {where}"
+    if step.action is PhysicalAction.STOP:
+        return f"Stop at the goal {where}"
+    return f"{step.action.label} {where}"

@@ -1,0 +1,118 @@
+"""Settings of a language model as a policy."""
+
+from __future__ import annotations
+
+import enum
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+from urllib.parse import urlsplit
+
+from dorothie_gym.copying import shared
+
+URL_VARIABLE: Final = "OPENAI_BASE_URL"
+"""Environment variable with the address of the endpoint, where none is given; as of OpenAI's own client."""
+
+
+class SimulatedTime(enum.StrEnum):
+    """What happens to the session while the model answers."""
+
+    WAITS = "waits"
+    """Simulated time stands still: an answer takes effect in the decision in which it was asked for."""
+    CHARGED = "charged"
+    """The session goes on: an answer takes effect after as much simulated time as the call took."""
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
+class LanguageModelConfig:
+    """Settings of a language model as a policy.
+
+    The key is no setting: the environment variable `OPENAI_API_KEY` is read at each call, and never recorded.
+
+    Attributes:
+        model: name of the model, as the endpoint knows it.
+        url: address before `/chat/completions`, such as "http://localhost:8000/v1". May be empty if `offline` is set.
+        timeout: longest time of a call, retry included [s].
+        max_tokens: largest number of tokens of an answer.
+        temperature: temperature of sampling; 0 for the most likely answer.
+        quiet_time: longest time between two calls [s]; the model may ask for a shorter one.
+        time: what happens to the session while the model answers.
+        pictures: whether prompts contain the picture of the camera, where the role observes one.
+        cassette: file in which calls are recorded, and from which recorded ones are answered; None for none.
+        offline: whether only recorded calls are answered; a call that is not in the cassette is an error.
+        prices: price of a million tokens of prompts and of answers [US dollars]; None if unknown.
+
+    Raises:
+        ValueError: a field is out of range; names the field.
+    """
+
+    model: str
+    url: str = ""
+    timeout: float = 30.0
+    max_tokens: int = 300
+    temperature: float = 0.0
+    quiet_time: float = 10.0
+    time: SimulatedTime = SimulatedTime.WAITS
+    pictures: bool = False
+    cassette: Path | None = None
+    offline: bool = False
+    prices: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.model or not self.model.isprintable():
+            raise ValueError(f"model is {self.model!r}; give the name of a model of the endpoint")
+        if self.offline and self.cassette is None:
+            raise ValueError("offline is set without a cassette; give the file with the recorded calls")
+        if not self.offline:
+            _check_url(self.url)
+        for name, low, high in (("timeout", 0.1, 3600.0), ("temperature", 0.0, 2.0), ("quiet_time", 1.0, 3600.0)):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} is {value}; it must be in {low:g}..{high:g}")
+        if not 16 <= self.max_tokens <= 100_000:
+            raise ValueError(f"max_tokens is {self.max_tokens}; it must be in 16..100000")
+        if self.prices is not None and not all(0.0 <= price < math.inf for price in self.prices):
+            raise ValueError(f"prices are {self.prices}; they must be at least 0")
+        object.__setattr__(self, "time", SimulatedTime(self.time))
+
+    @classmethod
+    def usual(cls, model: str) -> LanguageModelConfig:
+        """Returns the default settings of a model at the endpoint that the environment names (`OPENAI_BASE_URL`).
+
+        Raises:
+            ValueError: the variable is not set, or the model has no name.
+        """
+        url = os.environ.get(URL_VARIABLE, "")
+        if not url:
+            raise ValueError(f"llm:{model} has no endpoint; give --llm-url, or set the variable {URL_VARIABLE}")
+        return cls(model=model, url=url)
+
+    def record(self) -> dict[str, object]:
+        """Returns in JSON types what answers and actions follow from: neither address nor cassette."""
+        return {
+            "max_tokens": self.max_tokens,
+            "temperature": self.temperature,
+            "quiet_time": self.quiet_time,
+            "time": str(self.time),
+            "timeout": self.timeout,
+            "pictures": self.pictures,
+            **({} if self.prices is None else {"prices": list(self.prices)}),
+        }
+
+
+def _check_url(url: str) -> None:
+    """Raises `ValueError` for an address that is none, or that contains a secret."""
+    if not url:
+        raise ValueError("url is empty; give the address of the endpoint, such as http://localhost:8000/v1")
+    try:
+        parts = urlsplit(url)
+        host = parts.hostname
+    except ValueError as error:
+        raise ValueError(f"url is no address ({error}); it must be like http://localhost:8000/v1") from None
+    if parts.username is not None or parts.password is not None or parts.query or parts.fragment:
+        raise ValueError("url contains a user, a password or a query; give the key by the variable OPENAI_API_KEY")
+    if parts.scheme not in ("http", "https") or not host:
+        raise ValueError(f"url is {url!r}; it must begin with http:// or https://")

@@ -1,0 +1,53 @@
+"""Faults of an endpoint or of its answers: the names of the silent actions that they end in."""
+
+from __future__ import annotations
+
+import enum
+
+from dorothie_gym.errors import one_line
+
+
+class Fault(enum.StrEnum):
+    """Reason for which a call has brought no answer; the role then does nothing."""
+
+    TIMEOUT = "timeout"
+    """No complete answer within the time of the call; slow and hanging servers."""
+    NO_CONNECTION = "no connection"
+    """The server cannot be reached, or closes the connection; TLS errors included."""
+    RATE_LIMITED = "rate limited"
+    """Status 429, also after waiting as the server asks."""
+    SERVER_ERROR = "server error"
+    """Status 500 or above."""
+    REJECTED = "rejected"
+    """Another status than 200: a wrong key or model, or a request that the server does not support."""
+    NOT_A_COMPLETION = "not a completion"
+    """Content that is no chat completion, such as a page of a gateway."""
+    REFUSED = "refused"
+    """The model declined to answer."""
+    CUT_OFF = "cut off"
+    """The answer ended at the limit of tokens."""
+    NOT_JSON = "not JSON"
+    """The answer is no JSON object."""
+    WRONG_SCHEMA = "wrong schema"
+    """The answer is JSON of another schema, or names what is not possible now."""
+
+
+ABOUT_THE_ANSWER = frozenset({Fault.REFUSED, Fault.CUT_OFF, Fault.NOT_JSON, Fault.WRONG_SCHEMA})
+"""Faults of the model rather than of the server; the model is told of them and asked once more."""
+
+WORTH_REPEATING = ABOUT_THE_ANSWER | {Fault.RATE_LIMITED, Fault.SERVER_ERROR, Fault.NOT_A_COMPLETION}
+"""Faults after which a second attempt is made, if there is time."""
+
+
+class CallError(Exception):
+    """A call has brought no usable answer.
+
+    Attributes:
+        fault: kind of the fault.
+        reason: what is wrong, on one line; the model reads it when it is asked once more.
+        wait: time after which the server wants to be asked again [s].
+    """
+
+    def __init__(self, fault: Fault, reason: str, wait: float = 0.0) -> None:
+        super().__init__(fault, reason, wait)
+        self.fault, self.reason, self.wait = fault, one_line(reason), wait

@@ -1,0 +1,234 @@
+"""The participant's interface to a language model: tasks, the way to the place it guides to, and what it says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import LaneEntry
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, distinct
+from dorothie_gym.policies.language_model.role_interface import (
+    NONE,
+    Memory,
+    RoleInterface,
+    clock,
+    named_places,
+    next_speech,
+    section,
+    street_here,
+    street_name,
+    talk_lines,
+    weather_words,
+    with_heard,
+    with_talk,
+    words_fields,
+)
+from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.route_progress import RouteProgress, stopping_distance
+from dorothie_gym.policies.turn_lanes import next_turn
+from dorothie_gym.spaces import ActionDict, ObservationMapping, ParticipantAction
+
+KEEP = "keep"
+
+ANNOUNCED = 70.0
+"""Distance to a junction at which its turn is due to be announced [m]; a car at 40 km/h takes 6 s for it."""
+
+NEAR = 60.0
+"""Distance to the place on the last stretch at which the car can be told to slow down [m]."""
+
+SAYING_STOP = 1.0
+"""Time that it takes to say stop [s]."""
+
+LONG_STANDSTILL = 8.0
+"""Standstill that is worth a call [s]."""
+
+REPLAN_AFTER = 2
+"""Decisions off the route after which another one is planned."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParticipantMemory(Memory):
+    """Memory of the participant.
+
+    Attributes:
+        guide: name of the place that it guides the car to; empty for none.
+        progress: route to that place; None for none.
+        told: step of the route that was pointed out last: kind, and lane.
+        tasks: the list of tasks, with what is reached, as it was last.
+        standing_since: time since which the car stands [s]; None if it drives.
+        told_standing: whether the present standstill was pointed out.
+    """
+
+    guide: str = ""
+    progress: RouteProgress | None = None
+    told: tuple[str, int] = ("", -1)
+    tasks: tuple[str, ...] = ()
+    standing_since: float | None = None
+    told_standing: bool = False
+
+
+class ParticipantInterface(RoleInterface[ParticipantMemory]):
+    """Interface of the participant."""
+
+    role = Role.PARTICIPANT
+
+    def begin(self, town: Town) -> ParticipantMemory:
+        """Returns the memory before the first decision."""
+        return ParticipantMemory(town=town)
+
+    def attend(
+        self, observation: ObservationMapping, memory: ParticipantMemory, delay: float
+    ) -> tuple[ParticipantMemory, tuple[str, ...]]:  # fmt: skip
+        """Follows the route, and notices what is worth a call."""
+        view = ParticipantView.read(observation, memory.town)
+        memory = replace(memory, clock=memory.clock.ticked(view.time))
+        memory = replace(memory, progress=_followed(memory, view))
+        memory, said = with_heard(memory, observation, Role.CO_WIZARD, "driver")
+        events = [f'The driver said: "{said}"'] if said else []
+        if message := str(observation["message"]).strip():
+            events.append(f'A message has arrived: "{message}"')
+        tasks = tuple(task_lines(observation, view))
+        if memory.tasks and tasks != memory.tasks:
+            events.append("Your tasks have changed.")
+        memory = replace(memory, tasks=tasks)
+        memory, noticed = _notice_standstill(memory, view)
+        events += noticed
+        memory, noticed = _notice_step(memory, view)
+        return memory, (*events, *noticed)
+
+    def prompt(
+        self, observation: ObservationMapping, memory: ParticipantMemory, events: Sequence[str]
+    ) -> tuple[str, AnswerSchema]:  # fmt: skip
+        """Returns the prompt of a call and the schema of its answer."""
+        view, town = ParticipantView.read(observation, memory.town), memory.town
+        lines = [
+            f"Time: {clock(view.time)}",
+            f"Story: {str(observation['story']).strip()}",
+            *section("Your tasks, in order", task_lines(observation, view)),
+            f"Car: {view.speed * 3.6:.0f} km/h, on {street_here(observation, town, view.lane)}; "
+            f"weather: {weather_words(observation)}",
+            *section("Places", _place_lines(observation, view, town)),
+            f"You guide to: {memory.guide or 'no place'}",
+        ]
+        if memory.progress is not None:
+            step = _next_step(memory, view)
+            lines.append(f"Way there: {_left_words(memory.progress, view)}; {step[1]}" if step else "Way there: none")
+        if memory.note:
+            lines.append(f"Your note: {memory.note}")
+        lines += section("Conversation, the latest last", talk_lines(memory.talk))
+        lines += section("Just now", [f"- {event}" for event in events])
+        return "\n".join(lines), _schema(observation, town)
+
+    def accept(
+        self, observation: ObservationMapping, memory: ParticipantMemory, answer: Mapping[str, str]
+    ) -> tuple[ParticipantMemory, int]:  # fmt: skip
+        """Takes in words, and the place to guide to."""
+        view = ParticipantView.read(observation, memory.town)
+        memory = with_talk(memory, answer, view.time)
+        label = answer["guide"]
+        if label == KEEP:
+            return memory, 0
+        if label == NONE:
+            return replace(memory, guide="", progress=None), 0
+        place = named_places(observation, memory.town)[label].place
+        progress = RouteProgress.plan(memory.town, view.place, place)
+        return replace(memory, guide=label, progress=progress, told=("", -1)), 0
+
+    def act(
+        self, observation: ObservationMapping, memory: ParticipantMemory
+    ) -> tuple[ActionDict, ParticipantMemory, int]:  # fmt: skip
+        """Speaks the next span."""
+        speech, memory = next_speech(observation, memory)
+        return ParticipantAction(speech=speech).encode(self.limits), memory, 0
+
+
+def _schema(observation: ObservationMapping, town: Town) -> AnswerSchema:
+    say, note, again = words_fields()
+    labels = distinct((KEEP, NONE, *named_places(observation, town)))
+    guide = ChoiceField(name="guide", labels=labels, meaning="the place that you guide the car to; you see the way")
+    return AnswerSchema(name="participant", fields=(guide, say, note, again))
+
+
+def task_lines(observation: ObservationMapping, view: ParticipantView) -> list[str]:
+    """Returns the live tasks with their state, a line each."""
+    lines = []
+    live = [goal for goal in view.subgoals if goal.live]
+    for goal, text in zip(live, str(observation["tasks"]).split("\n"), strict=False):
+        state = "done" if goal.reached else "can be done now" if goal.allowed else "later"
+        mark = view.landmark(goal.landmark)
+        where = "" if mark is None else f" (place: {mark.name.label} on {street_name(mark.street)})"
+        lines.append(f"- {text}{where}: {state}")
+    return lines
+
+
+def _place_lines(observation: ObservationMapping, view: ParticipantView, town: Town) -> list[str]:
+    x, y = view.position
+    return [
+        f"- {label}, on {street_name(mark.street)}, {math.hypot(mark.x - x, mark.y - y):.0f} m away as the crow flies"
+        for label, mark in named_places(observation, town).items()
+    ]
+
+
+# --- The way ----------------------------------------------------------------------------------------------------------
+
+
+def _followed(memory: ParticipantMemory, view: ParticipantView) -> RouteProgress | None:
+    """Returns the progress on the route, or another route where the car has left the former one."""
+    progress = memory.progress
+    if progress is None or view.turning:
+        return progress
+    progress = progress.followed(memory.town, view.lane, view.station)
+    return progress.replanned(memory.town, view.place) if progress.astray >= REPLAN_AFTER else progress
+
+
+def _next_step(memory: ParticipantMemory, view: ParticipantView) -> tuple[tuple[str, int], str, bool] | None:
+    """Returns identity, words and urgency of the next step of the route; None without a route."""
+    progress, town = memory.progress, memory.town
+    if progress is None or progress.route is None:
+        return None
+    crossing, manoeuvre = next_turn(progress, town, view.station), progress.next_manoeuvre(view.station)
+    if manoeuvre is not None and (crossing is None or manoeuvre[1] < crossing.distance):
+        entry, distance = manoeuvre
+        if entry is LaneEntry.U_TURN:
+            soon = distance < 3.0 * view.speed + 15.0
+            return ("round", view.lane), f"next: turn round in {max(distance, 0.0):.0f} m", soon
+        side = "left" if entry is LaneEntry.CHANGE_LEFT else "right"
+        return ("lane", view.lane), f"next: change to the {side} lane", distance < ANNOUNCED
+    if crossing is not None:
+        onto = street_here(view.raw, town, crossing.exit.lane)
+        way = "straight on" if crossing.direction.value == "straight" else crossing.direction.value
+        words = f"next: {way} in {crossing.distance:.0f} m, onto {onto}"
+        return ("turn", crossing.lane), words, crossing.distance < ANNOUNCED
+    left = progress.left(view.station)
+    room = stopping_distance(view.speed) + SAYING_STOP * view.speed
+    if view.standing or left > NEAR:
+        return ("ahead", view.lane), "the place is straight ahead", False
+    if left <= room:
+        return ("stop", view.lane), "say stop now", True
+    return ("near", view.lane), "the place is near: say how far, or to slow down", True
+
+
+def _left_words(progress: RouteProgress, view: ParticipantView) -> str:
+    return f"{progress.left(view.station):.0f} m by the route"
+
+
+def _notice_step(memory: ParticipantMemory, view: ParticipantView) -> tuple[ParticipantMemory, list[str]]:
+    """Notices a step of the route that is to be announced."""
+    step = _next_step(memory, view)
+    if step is None or not step[2] or step[0] == memory.told:
+        return memory, []
+    return replace(memory, told=step[0]), [f"On the way: {step[1]}"]
+
+
+def _notice_standstill(memory: ParticipantMemory, view: ParticipantView) -> tuple[ParticipantMemory, list[str]]:
+    """Notices that the car has been standing for long."""
+    since = (memory.standing_since if memory.standing_since is not None else view.time) if view.standing else None
+    told, events = memory.told_standing and since is not None, []
+    if since is not None and not told and view.time - since >= LONG_STANDSTILL:
+        told = True
+        events.append(f"The car has been standing for {LONG_STANDSTILL:.0f} s.")
+    return replace(memory, standing_since=since, told_standing=told), events

@@ -1,0 +1,364 @@
+"""Rule program that plays the Co-Wizard by reading prompts, as a language model does: it sees nothing but the text.
+
+It understands the passenger by the package's own parser of words, and keeps what it has to remember in its note. It
+shows that a prompt says enough to drive by: what it cannot do, a language model can hardly do.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from dorothie_gym.dialogue import Direction, ParsedText, guess_spans, understand
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, Slot, StreetName
+
+USUAL_SPEED = 40
+SLOW_TIME = 25.0
+NAMES = [name for name in LandmarkName if name not in (LandmarkName.UNKNOWN, LandmarkName.QUERIED)]
+SAME_EVERYWHERE = (LandmarkName.HOUSE, LandmarkName.PERSON)
+STEERING = (ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH)
+WRONG = re.compile(r"wrong (way|direction|turn)|passed it|past it|missed it|other way|the other one")
+HERE = re.compile(r"right here|this is it|here we are|we're here|there it is|this is the place|that's it")
+QUESTIONS = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK, DialogueMove.ALIGN)
+
+
+@dataclass
+class Page:
+    """Prompt, read into fields."""
+
+    time: float
+    car: str
+    speed: float
+    cruise: int
+    street: str
+    prepared: str
+    exits: list[tuple[int, str, str, float]]  # angle, direction, street, distance
+    places: dict[str, str]  # street by label
+    visited: list[str]
+    others: list[str]
+    goal: str
+    there: bool
+    routed: bool
+    off_map: bool
+    step: str
+    due: bool
+    note: dict[str, str]
+    heard: list[str]
+    last_said: float
+    events: list[str]
+    drives: list[str]
+    lines: list[str] = field(repr=False)
+
+    @property
+    def stopped(self) -> bool:
+        return self.car.startswith("told to stop")
+
+
+def read_page(text: str) -> Page:
+    lines = text.split("\n")
+
+    def after(title: str) -> str:
+        return next((line[len(title) :].strip() for line in lines if line.startswith(title)), "")
+
+    def listed(title: str) -> list[str]:
+        start = next((k for k, line in enumerate(lines) if line.startswith(title)), None)
+        found: list[str] = []
+        for line in lines[start + 1 :] if start is not None else []:
+            if not line.startswith("- "):
+                break
+            found.append(line[2:])
+        return found
+
+    car, goal, route = after("Car:"), after("Goal:"), after("Route:")
+    exits = []
+    for line in listed("Exits"):
+        found = re.match(r"JTurn (-?\d+): (\w+), into (.*), in (\d+) m", line)
+        assert found is not None, line
+        exits.append((int(found[1]), found[2], found[3], float(found[4])))
+    places, visited = {}, list[str]()
+    for line in listed("Places"):
+        label, street, been = re.match(r"(.*), on (.*), \d+ m away[^;]*(;.*)?", line).groups()  # type: ignore[union-attr]
+        places[label] = street
+        if been:
+            visited.append(label)
+    talk = [re.match(r"(\d+):(\d\d) (\w+): (.*)", line) for line in listed("Conversation")]
+    said = [60 * int(line[1]) + int(line[2]) for line in talk if line is not None and line[3] == "you"]
+    events = listed("Just now")
+    minutes, seconds = after("Time:").split(":")
+    return Page(
+        time=60.0 * int(minutes) + int(seconds),
+        car=car,
+        speed=float(re.search(r"(\d+) km/h, cruise", car)[1]),  # type: ignore[index]
+        cruise=int(re.search(r"cruise speed (\d+)", car)[1]),  # type: ignore[index]
+        street=after("Place:").split(";")[0],
+        prepared=after("Prepared:"),
+        exits=exits,
+        places=places,
+        visited=visited,
+        others=[f"another {label.split(' on ')[0]}" for label in places],
+        goal=goal.split(",")[0],
+        there="you are there" in goal,
+        routed="by the route" in goal or "you are there" in goal,
+        off_map="not on your map" in goal,
+        step=route.partition(": ")[2],
+        due=route.startswith("now"),
+        note=dict(part.split("=", 1) for part in after("Your note:").split("; ") if "=" in part),
+        heard=[event[21:-1] for event in events if event.startswith("The passenger said")],
+        last_said=float(max(said, default=-100)),
+        events=events,
+        drives=after("You can drive:").split(", "),
+        lines=lines,
+    )
+
+
+class CoWizardReader:
+    """Answers prompts of the Co-Wizard."""
+
+    def __call__(self, prompt: str) -> dict[str, str]:
+        page = read_page(prompt)
+        answer = {
+            "drive": "none",
+            "goal": "keep",
+            "mark": "none",
+            "status": "keep",
+            "say": "",
+            "note": "",
+            "again": "10",
+        }
+        note = page.note
+        for text in page.heard:
+            self._hear(page, text, note, answer)
+        self._drive(page, note, answer)
+        answer["note"] = "; ".join(f"{name}={value}" for name, value in note.items() if value)
+        if any(name in note for name in ("turn", "wish", "go")):
+            answer["again"] = "1"
+        return answer
+
+    # --- listening --------------------------------------------------------------------------------------------------
+
+    def _hear(self, page: Page, text: str, note: dict[str, str], answer: dict[str, str]) -> None:
+        words = understand(text)
+        if WRONG.search(text.lower()):
+            self._doubt(page, note, answer)
+            return
+        if HERE.search(text.lower()) and page.off_map and page.speed > 0:
+            self._obey(page, ActionValue.STOP, DialogueAct.of(DialogueMove.INSTRUCT), words, note, answer)
+            return
+        for span in guess_spans(text):
+            self._take(page, span.act, words, note, answer)
+        if not answer["say"] and text.rstrip().endswith("?"):
+            answer["say"] = "Yes."
+
+    def _take(
+        self, page: Page, act: DialogueAct, words: ParsedText, note: dict[str, str], answer: dict[str, str]
+    ) -> None:  # fmt: skip
+        landmarks = [name for name in act.values(Slot.LANDMARK) if name in NAMES]
+        actions = [value for value in act.values(Slot.ACTION) if value is not ActionValue.QUERIED]
+        statuses = act.values(Slot.STATUS)
+        if act.move in QUESTIONS:
+            answer["say"] = answer["say"] or _reply(page, act)
+            return
+        if GoalStatus.COMPLETE in statuses or GoalStatus.ABANDONED in statuses:
+            done = GoalStatus.COMPLETE in statuses
+            if not landmarks or landmarks[0].label in page.goal:
+                answer.update(goal="none", status="Complete" if done else "Abandoned", say="All right.")
+                note.clear()
+                note["halt"] = "1"
+            return
+        turns = [action for action in actions if action in STEERING]
+        if landmarks and not turns and GoalStatus.PENDING not in statuses:
+            self._aim(page, landmarks[0], words, note, answer)
+        if turns and page.routed and answer["goal"] == "keep" and not self._is_on_route(page, words, turns[0]):
+            self._doubt(page, note, answer)
+        for action in actions:
+            self._obey(page, action, act, words, note, answer)
+        if not actions and words.distance is not None and page.off_map:
+            answer["mark"] = _ahead(words.distance)
+
+    def _is_on_route(self, page: Page, words: ParsedText, action: ActionValue) -> bool:
+        """Whether an instruction is the next step of the route that the prompt shows."""
+        if action is not ActionValue.J_TURN:
+            return action.label in page.step
+        return words.direction is None or f"({words.direction.value}," in page.step
+
+    def _doubt(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
+        """Drops a place that the passenger does not mean."""
+        name = re.match(r"(another )?(House|Person)?", page.goal)
+        if page.routed and name is not None and name[2]:
+            note.clear()
+            answer["goal"] = f"another {name[2]}" if f"another {name[2]}" in page.others else name[2]
+        elif page.there:
+            note.clear()
+            answer["goal"] = "none"
+
+    def _aim(
+        self, page: Page, name: LandmarkName, words: ParsedText, note: dict[str, str], answer: dict[str, str]
+    ) -> None:  # fmt: skip
+        streets = [f"{street.label} Street" for street in words.streets if isinstance(street, StreetName)]
+        known = {
+            label: street
+            for label, street in page.places.items()
+            if label.split(" on ")[0] == name.label and not (name in SAME_EVERYWHERE and label in page.visited)
+        }
+        fitting = [label for label, street in known.items() if street in streets]
+        guided = page.off_map and page.goal.removeprefix("another ") == name.label
+        if (fitting or (known and (not streets or name not in SAME_EVERYWHERE))) and not guided:
+            label = (fitting or list(known))[0]
+            if page.goal != label:
+                note.clear()
+                note["go"] = "1"
+                answer.update(goal=label, say=f"Okay, to the {label}.")
+            return
+        label = f"another {name.label}" if name in SAME_EVERYWHERE and _is_on_map(page, name) else name.label
+        if words.distance is not None and not page.routed:
+            answer.update(goal=label if page.goal != label else "keep", mark=_ahead(words.distance))
+            answer["say"] = answer["say"] or "Okay."
+        elif page.goal != label:
+            note.clear()
+            note["go"] = "1"
+            answer.update(goal=label, say="It is not on my map. Which way should I go?")
+
+    def _obey(
+        self, page: Page, action: ActionValue, act: DialogueAct, words: ParsedText, note: dict[str, str],
+        answer: dict[str, str],
+    ) -> None:  # fmt: skip
+        answer["say"] = answer["say"] or "Okay."
+        if action is ActionValue.STOP:
+            note.clear()
+            note["halt"] = "1"
+            answer["drive"] = "Stop" if "Stop" in page.drives else "none"
+            answer["say"] = ""
+            return
+        note.pop("halt", None)
+        note["go"] = "1"
+        if action is ActionValue.J_TURN:
+            streets = [value for value in act.values(Slot.STREET) if isinstance(value, StreetName)]
+            note.pop("wish", None)
+            note["turn"] = words.direction.value if words.direction is not None else "any"
+            note["onto"] = f"{streets[0].label} Street" if streets else ""
+            note["skip"] = str(words.ordinal - 1) if words.ordinal and words.ordinal > 1 else ""
+        elif action is ActionValue.LANE_FOLLOW:
+            note.pop("wish", None)
+            if words.further or (words.distance is not None and (page.speed < 1 or page.off_map)):
+                answer["mark"] = _ahead(words.distance or 6.0)
+            elif words.direction is Direction.STRAIGHT or (page.exits and page.exits[0][3] < 60):
+                note.update(turn="straight", onto="", skip="")
+        elif action is ActionValue.U_TURN:
+            note.pop("turn", None)
+            note["wish"] = "UTurn"
+        elif action is ActionValue.LANE_SWITCH:
+            side = "right" if words.direction is Direction.RIGHT else "left"
+            note["wish"] = f"LaneSwitch {side}"
+        elif action is ActionValue.SPEED_CHANGE:
+            if words.speed is None and words.faster is False and not page.routed:
+                answer["mark"] = "20 m ahead"
+            else:
+                asked = round(words.speed) if words.speed is not None else page.cruise + (10 if words.faster else -10)
+                note["speed"] = str(min(max(5 * round(asked / 5), 10), 60))
+                note["until"] = f"{page.time + SLOW_TIME:.0f}"
+        elif action is ActionValue.LIGHT_CHANGE:
+            label = "LightChange off" if words.lights is False else "LightChange on"
+            answer["drive"] = label if label in page.drives else "none"
+
+    # --- driving ----------------------------------------------------------------------------------------------------
+
+    def _drive(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
+        if answer["drive"] != "none":
+            return
+        label = self._route_step(page, note, answer)
+        if not label and "halt" in note:
+            if page.stopped and page.time - page.last_said > 12 and not page.heard:
+                answer["say"] = answer["say"] or "Where should I go now?"
+            return
+        answer["drive"] = label or self._wish(page, note) or self._go(page, note) or "none"
+        if answer["drive"] != "none":
+            return
+        note.pop("go", None)
+        lost = page.car.startswith("waiting") and not page.routed and "turn" not in note
+        if lost and page.time - page.last_said > 6:
+            answer["say"] = answer["say"] or "Which way should I go?"
+        self._set_speed(page, note, answer)
+
+    def _route_step(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> str:
+        if not page.due or "turn" in note or "wish" in note or answer["goal"] != "keep":
+            return ""
+        label = re.match(r"(JTurn -?\d+|LaneSwitch \w+|\w+)", page.step)[0]  # type: ignore[index]
+        if label not in page.drives:
+            return ""
+        if label == "Stop":
+            note["halt"] = "1"
+            note.pop("go", None)
+        return label
+
+    def _wish(self, page: Page, note: dict[str, str]) -> str:
+        wish = note.get("wish")
+        if wish and wish in page.drives:
+            note.pop("wish")
+            return wish
+        if wish == "UTurn" and "LaneSwitch left" in page.drives and page.speed > 1:
+            return "LaneSwitch left"
+        if "turn" in note and page.exits and not page.prepared.startswith(("LaneSwitch", "UTurn")):
+            return self._turn(page, note)
+        return ""
+
+    def _go(self, page: Page, note: dict[str, str]) -> str:
+        starts = [label for label in ("Start", "LaneFollow") if page.stopped and label in page.drives]
+        if starts:
+            note.pop("go", None)
+        return next(iter(starts), "")
+
+    def _set_speed(self, page: Page, note: dict[str, str], answer: dict[str, str]) -> None:
+        if page.time > float(note.get("until", 0)):
+            note.pop("speed", None)
+            note.pop("until", None)
+        speed = int(note.get("speed", USUAL_SPEED))
+        if abs(page.cruise - speed) > 2:
+            label = f"SpeedChange {'up' if page.cruise < speed else 'down'}"
+            answer.update(drive=label if label in page.drives else "none", again="1")
+
+    def _turn(self, page: Page, note: dict[str, str]) -> str:
+        straight = [f"JTurn {angle}" for angle, way, _, _ in page.exits if way == "straight"]
+        if note.get("skip"):
+            if page.prepared:
+                return ""
+            note["skip"] = str(int(note["skip"]) - 1) if int(note["skip"]) > 1 else ""
+            note["hold"] = "1"
+            return next((label for label in straight if label in page.drives), "")
+        if note.get("hold") and page.prepared:
+            return ""
+        note.pop("hold", None)
+        fitting = [(angle, street) for angle, way, street, _ in page.exits if note["turn"] in (way, "any")]
+        onto = [(angle, street) for angle, street in fitting if street == note.get("onto")]
+        if note.get("onto") and not onto and note["turn"] == "any":
+            return next((label for label in straight if label in page.drives), "")
+        chosen = onto or fitting
+        if not chosen:
+            return ""
+        canonical = {"left": 90, "right": -90, "straight": 0}.get(note["turn"], 0)
+        angle = min(chosen, key=lambda each: abs(each[0] - canonical))[0]
+        for name in ("turn", "onto", "skip", "hold"):
+            note.pop(name, None)
+        label = f"JTurn {angle}"
+        return label if label in page.drives else ""
+
+
+def _is_on_map(page: Page, name: LandmarkName) -> bool:
+    return any(label.split(" on ")[0] == name.label for label in page.places)
+
+
+def _ahead(metres: float) -> str:
+    return f"{min((5, 10, 20, 30, 50, 80), key=lambda each: abs(each - metres))} m ahead"
+
+
+def _reply(page: Page, act: DialogueAct) -> str:
+    if act.move is DialogueMove.QUERY_W:
+        return "I am on my way." if page.routed else "I need the way from you."
+    return "Yes."
+
+
+def answer_of(request: Mapping[str, Any]) -> dict[str, str]:
+    """Returns the reader's answer to the body of a request."""
+    content = request["messages"][1]["content"]
+    return CoWizardReader()(content if isinstance(content, str) else content[0]["text"])
