@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
+import wave
 from math import gcd
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -114,6 +115,17 @@ def encode_flac(samples: Samples, sample_rate: int = SAMPLE_RATE) -> bytes:
     """
     buffer = io.BytesIO()
     _soundfile().write(buffer, to_pcm(samples), sample_rate, format="FLAC", subtype="PCM_16")
+    return buffer.getvalue()
+
+
+def encode_wav(samples: Samples, sample_rate: int = SAMPLE_RATE) -> bytes:
+    """Returns audio as a WAV file of 16 bits, without the extra `speech`."""
+    buffer = io.BytesIO()
+    with wave.open(buffer, "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(sample_rate)
+        file.writeframes(to_pcm(samples).astype("<i2").tobytes())
     return buffer.getvalue()
 
 
