@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -65,14 +66,16 @@ def test_tones_are_in_the_bands_of_their_frequencies() -> None:
     assert levels.shape == (99, 32) and np.abs(levels.mean(axis=0)).max() < 1e-3
     first, second = levels[:45].mean(axis=0), levels[55:].mean(axis=0)
     assert first.argmax() < 10 < 18 < second.argmax()
-    louder = log_mel(np.float32(0.5) * sweep)
-    assert np.abs(louder - levels).max() < 0.1, "loudness is no feature"
+    noise = np.random.default_rng(2).standard_normal(16000).astype(np.float32) * np.float32(0.1)
+    assert np.abs(log_mel(np.float32(0.5) * noise) - log_mel(noise)).max() < 0.1, "loudness is no feature"
 
 
 def test_spectra_are_cut_and_filled_with_zeros() -> None:
-    table = mel_table([tone(500.0, 0.5), np.empty(0, np.float32), tone(500.0, 20.0)])
+    noise = np.random.default_rng(2).standard_normal(320000).astype(np.float32)
+    table = mel_table([noise[:8000], np.empty(0, np.float32), noise])
     assert table.shape == (3, 256, 32) and table.dtype == np.float16
-    assert table[0, :20].any() and not table[0, 30:].any() and not table[1].any()
+    assert table[0, :24].any(axis=1).all() and not table[0, 24:].any() and not table[1].any()
+    assert table[2].any(axis=1).all()
 
 
 def test_reader_ignores_the_silence_behind_an_utterance() -> None:
@@ -116,11 +119,8 @@ def test_models_of_sound_train_and_others_need_what_they_name(corpus: Path, hube
     material = Dataset.load(corpus, "hashing")
     job = Experiment(corpus=corpus, encoder="hashing", model="sound", size="small", seed=0, out=tmp_path)
     result = run_experiment(job, material)
-    assert result["sound"] == "log-mel-1-256x32" and int(str(result["points"])) > 10
-    again = run_experiment(
-        Experiment(corpus=corpus, encoder="hashing", model="sound", size="small", seed=0, out=tmp_path / "again"),
-        material,
-    )
+    assert result["sound"] == "log-mel-1-256x32" and int(str(result["points"])) > 3
+    again = run_experiment(replace(job, out=tmp_path / "again"), material)
     assert again["validation"] == result["validation"]
     with pytest.raises(EncoderError, match="give --hubert"):
         make_model(find_row("sound-hubert"), "small", Dataset.load(corpus, "hashing"), 0)
