@@ -11,6 +11,7 @@ export class Speech {
     const add = talk.add.bind(talk), clear = talk.clear.bind(talk);
     talk.clear = () => { clear(); this.lines = 0; this.live = false; };
     talk.add = entries => { add(entries); this.hear(entries); };
+    link.on('frame', () => { this.live = true; });  // what was said before the first frame stays silent
   }
 
   begin(hello) {
@@ -96,7 +97,6 @@ export class Speech {
   hear(entries) {
     entries.forEach(({ who }, k) => { if (this.live && this.aloud?.checked && who !== this.talk.own && who !== 'ad_wizard' && who !== 'experimenter') this.speak(this.lines + k); });
     this.lines += entries.length;
-    this.live = true;  // what was said before the page was opened stays silent
   }
 
   speak(line) {
