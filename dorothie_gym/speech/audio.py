@@ -50,7 +50,9 @@ def checked_samples(samples: NDArray[np.generic], sample_rate: int, where: str =
             f"{where}: has {short_repr(sample_rate)} samples per second; {LOWEST_RATE} to {HIGHEST_RATE} are supported"
         )
     values = np.asarray(samples)
-    if values.ndim not in (1, 2) or 0 in values.shape:
+    if not values.size:
+        raise AudioError(f"{where}: is empty")
+    if values.ndim not in (1, 2):
         raise AudioError(f"{where}: has the shape {values.shape}; it must be (samples,) or (samples, channels)")
     if len(values) > LONGEST * sample_rate:
         seconds = len(values) / sample_rate
@@ -154,7 +156,7 @@ def read_audio(path: Path | str, sample_rate: int = SAMPLE_RATE) -> Samples:
                 )
             rate, samples = int(file.samplerate), file.read(dtype="float32", always_2d=True)
     except soundfile.LibsndfileError as error:
-        raise AudioError(f"{path}: cannot be read as audio: {str(error).splitlines()[0]}") from error
+        raise AudioError(f"{path}: cannot be read as audio: {error.error_string.splitlines()[0]}") from error
     return resample(checked_samples(samples, rate, str(path)), rate, sample_rate)
 
 
