@@ -106,6 +106,8 @@ def _said(utterance: UtteranceRecord, units: Units, kinds: Mapping[int, Handled]
     heard = utterance.moves[0].recognised
     if heard is not None and heard != utterance.text:
         text += f' (heard: "{heard}")'
+    if any(str(units.session.events[move.index].data.get("audio")) in units.session.audio for move in utterance.moves):
+        text += f" (audio {utterance.number})"
     return TranscriptLine(
         time=utterance.start,
         speaker=utterance.speaker,

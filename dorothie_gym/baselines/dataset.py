@@ -14,6 +14,7 @@ from torch import Tensor
 
 from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, text_encoder, text_table
 from dorothie_gym.baselines.model_io import TASKS, Examples
+from dorothie_gym.baselines.sound_inputs import Sound, SoundInputs
 from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, Sight, VisibleBoxes, build, points
 from dorothie_gym.errors import CheckpointError, SessionError
 from dorothie_gym.maps.catalogue import find_town
@@ -59,6 +60,9 @@ def sight_of(objects: Objects, detector: Path | None = None) -> Sight | None:
 class Dataset:
     """Dataset of a corpus. Vectors of texts are kept in the user's cache.
 
+    Attributes:
+        hubert: folder with the weights of HuBERT, for models that hear by it; None without one.
+
     Args:
         columns: the corpus.
         encoder: encoder of its texts.
@@ -80,6 +84,8 @@ class Dataset:
         self._cache, self._corpus, self._sight = cache, corpus, sight
         self._others: dict[tuple[Objects, Path | None], Dataset] = {}
         self._examples: dict[tuple[str, BatchSpec], Examples] = {}
+        self._sounds: dict[Sound, SoundInputs] = {}
+        self.hubert: Path | None = None
 
     @classmethod
     def load(cls, corpus: Path | str, encoder: str = "auto") -> Self:
@@ -139,18 +145,35 @@ class Dataset:
             )
         return found
 
-    def examples(self, fold: str, spec: BatchSpec, *, queries: bool = False) -> Examples:
+    def examples(self, fold: str, spec: BatchSpec, *, queries: bool = False, sound: Sound | None = None) -> Examples:
         """Returns the points of a fold as tensors; computed once.
 
         Args:
             fold: the fold.
             spec: sizes.
             queries: whether the inputs have the queries of the detector (N, q, d) at the last look, under "detector".
+            sound: encoder of the sound of the current utterances (N, ...), under "current_sound"; None for none.
         """
         if (fold, spec) not in self._examples:
             self._examples[fold, spec] = Examples.gather(self.columns, self.tables(fold), spec)
         found = self._examples[fold, spec]
-        return replace(found, inputs={**found.inputs, "detector": self._queries(fold)}) if queries else found
+        more: dict[str, Tensor] = {"detector": self._queries(fold)} if queries else {}
+        if sound is not None:
+            more["current_sound"] = self.sounds(sound).at(self.columns, self.tables(fold))
+        return replace(found, inputs={**found.inputs, **more}) if more else found
+
+    def sounds(self, sound: Sound) -> SoundInputs:
+        """Returns the encoder of the sounds of the corpus, made once.
+
+        Raises:
+            EncoderError: the encoder's package or weights are missing.
+            SessionError: the dataset has no corpus that could be read again.
+        """
+        if sound not in self._sounds:
+            if self._corpus is None:
+                raise SessionError("the dataset has no corpus whose sound could be read")
+            self._sounds[sound] = SoundInputs(Path(self._corpus), sound, self.hubert)
+        return self._sounds[sound]
 
     @property
     def detector(self) -> DetectedBoxes:

@@ -61,6 +61,7 @@ class Experiment:
         out: parent of the folders of all trainings.
         strict: whether RfN points hide the earlier acts of the Co-Wizard's own utterance.
         detector: folder of the trained detector, for models of detections.
+        hubert: folder with the weights of HuBERT, for models that hear by it.
     """
 
     corpus: Path
@@ -71,6 +72,7 @@ class Experiment:
     out: Path
     strict: bool = False
     detector: Path | None = None
+    hubert: Path | None = None
 
     def __str__(self) -> str:
         return f"{self.model} ({self.size}), seed {self.seed}"
@@ -100,13 +102,16 @@ def run_experiment(job: Experiment, material: Dataset, on_epoch: OnEpoch = lambd
         OSError: the folder cannot be written.
     """
     material = job.material(material)
+    material.hubert = job.hubert
     about = {"model": job.row.name, "version": __version__, **material.about()}
+    if job.row.sound is not None:
+        about["sound"] = material.sounds(job.row.sound).id
     if job.row.kind in ("ppo", "cloning"):
         return _run_policy(job, about)
     if job.row.kind == "shallow":
         return _run_shallow(job, material, about)
     model = make_model(job.row, job.size, material, job.seed, strict=job.strict)
-    examples = partial(material.examples, spec=model.spec, queries=job.row.queries)
+    examples = partial(material.examples, spec=model.spec, queries=job.row.queries, sound=job.row.sound)
     started = time.perf_counter(), time.process_time()
     trained = train(
         model,
@@ -385,6 +390,7 @@ def table_experiments(
     rows: Sequence[ModelEntry] = ROWS,
     strict: bool = False,
     detector: Path | None = None,
+    hubert: Path | None = None,
 ) -> list[Experiment]:
     """Returns the trainings of a table, seed by seed: the first complete table exists after one seed."""
     return [
@@ -397,6 +403,7 @@ def table_experiments(
             out=out,
             strict=strict,
             detector=detector,
+            hubert=hubert,
         )
         for seed in range(seeds)
         for row in rows

@@ -12,7 +12,9 @@ from torch import Tensor
 
 from dorothie_gym.baselines.dataset import Dataset, Objects
 from dorothie_gym.baselines.encoders.pretrained import find_transformers, has_minilm, load_pretrained, minilm_folder
+from dorothie_gym.baselines.encoders.sound import FRAMES
 from dorothie_gym.baselines.junction_reader import JunctionReader, reader_config
+from dorothie_gym.baselines.sound_inputs import Sound
 from dorothie_gym.baselines.toto import (
     ABLATIONS,
     TOTO,
@@ -50,6 +52,7 @@ class ModelEntry:
         missing: reason why it cannot be run, or empty.
         objects: source of the objects around the ego, see `Dataset.seeing`.
         queries: whether the objects at the point are the queries of the detector, as in the paper.
+        sound: encoder of the current utterance's sound; None for models that receive its recognised words.
         kind: "toto" (with ablations and rivals), "reader" (Junction Reader), a policy by "ppo" or "cloning", or
             "shallow" (scikit-learn, see `dorothie_gym.benchmark.shallow_models`).
     """
@@ -60,6 +63,7 @@ class ModelEntry:
     missing: str = ""
     objects: Objects = "record"
     queries: bool = False
+    sound: Sound | None = None
     kind: Kind = "toto"
 
 
@@ -139,13 +143,37 @@ all queries of the detector at the point, as in the paper. They are trained wher
 take minutes."""
 
 
+SOUND_ROWS: Final = (
+    ModelEntry(name="TOTO (+ Log-mel Speech)", command="toto-sound", change=lambda config: config, sound="log-mel"),
+    ModelEntry(
+        name="TOTO (+ Speech Embedding)", command="toto-embedding", change=lambda config: config,
+        sound="speech-embedding",
+    ),
+    ModelEntry(name="TOTO (+ HuBERT)", command="toto-hubert", change=lambda config: config, sound="hubert"),
+    ModelEntry(
+        name="TOTO (- Current Speech, Words Kept)", command="toto-words", change=lambda c: c.without(Channel.SPEECH)
+    ),
+    ModelEntry(name="Log-mel Only", command="sound", change=_only(Channel.SPEECH), sound="log-mel"),
+    ModelEntry(
+        name="Speech Embedding Only", command="sound-embedding", change=_only(Channel.SPEECH), sound="speech-embedding"
+    ),
+    ModelEntry(name="HuBERT Only (weights of a folder)", command="sound-hubert", change=_only(Channel.SPEECH),
+               sound="hubert"),
+    ModelEntry(
+        name="BERT + Log-mel", command="bert-sound", change=_only(Channel.TRANSCRIPT, Channel.SPEECH), sound="log-mel"
+    ),
+)  # fmt: skip
+"""Models of spoken corpora, whose current utterance is heard as sound. In TOTO without the current speech, the words of
+the current utterance stay, as in the paper's row. They are trained where they are named."""
+
+
 class EpisodicTransformer(TOTO):
     """E.T. (Pashevich et al., 2021): TOTO's encoder over actions, text and images alone."""
 
 
 def find_row(name: str) -> ModelEntry:
     """Returns a model by its command or name; raises `ValueError` listing all for an unknown one."""
-    rows = (*ROWS, *CAMERA_ROWS)
+    rows = (*ROWS, *CAMERA_ROWS, *SOUND_ROWS)
     for row in rows:
         if name.casefold() in (row.command, row.name.casefold()):
             return row
@@ -167,6 +195,10 @@ def make_model(row: ModelEntry, size: str, material: Dataset, seed: int, *, stri
     config = replace(row.change(SIZES[size]()), strict=strict)
     if row.queries:
         config = replace(config, detector=material.detector.query_shape)
+    if row.sound == "log-mel":
+        config = replace(config, sound_frames=FRAMES)
+    elif row.sound is not None:
+        config = replace(config, sound_width=material.sounds(row.sound).dim)
     return build_model(row, config, material)
 
 

@@ -26,7 +26,8 @@ from dorothie_gym.cli.options import PictureCommand
 from dorothie_gym.cli.output import exit_interrupted, fail
 from dorothie_gym.cli.rollout import leaderboard, rollout
 from dorothie_gym.cli.run import run
-from dorothie_gym.cli.sessions import compare, film, replay, show
+from dorothie_gym.cli.sessions import compare, film, replay
+from dorothie_gym.cli.show import show
 from dorothie_gym.cli.stats import stats
 from dorothie_gym.cli.study import study
 from dorothie_gym.cli.submit import submit

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dorothie_gym.cli.completion import complete_town
-from dorothie_gym.cli.options import AsJson, Storyboard, WordErrors
+from dorothie_gym.cli.options import AsJson, Storyboard, WordErrors, needs
 from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stdout
 from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_libraries, listen, serve
 from dorothie_gym.cli.warm_up import compile_first
@@ -64,6 +65,9 @@ def console(
         str, typer.Option(metavar="pause|continue", help="What the session does while that person is away.")
     ] = "pause",
     pictures: Annotated[bool, typer.Option(help="Let participant and Co-Wizard look through the windscreen.")] = True,
+    speech: Annotated[
+        bool, typer.Option("--speech", help=f"Let people speak and hear, besides typing ({needs('speech')}).")
+    ] = False,
     host: Host = LOCAL,
     port: Port = PORT,
     as_json: AsJson = False,
@@ -77,7 +81,7 @@ def console(
 
     compile_first(pictures=pictures)
     with reporting_errors():
-        config = _config(max_seconds, word_errors, absence, after_absence, while_away, pictures)
+        config = replace(_config(max_seconds, word_errors, absence, after_absence, while_away, pictures), speech=speech)
         if resume is None:
             room = _room(town or TOWN, storyboard, seed, roles, out, config)
         else:
@@ -89,7 +93,9 @@ def console(
         print_json({"links": links, "recorded": None if out is None else str(out)})
     else:
         _print_links(links, out)
-    serve(Console([room]).app(), listener)
+    with reporting_errors():
+        served = Console([room])
+    serve(served.app(), listener)
 
 
 def _config(

@@ -136,12 +136,22 @@ class VideoWriter(Protocol):
         """Closes the file."""
 
 
-def video_writer(path: Path, frames_per_second: float) -> VideoWriter:
-    """Returns a video writer of imageio; raises `ImportError` if the extra `video` is not installed."""
+def video_writer(path: Path, frames_per_second: float, sound: Path | None = None) -> VideoWriter:
+    """Returns a video writer of imageio: H.264, and AAC if there is sound, which every container of `_SUFFIXES` holds.
+
+    Args:
+        path: file to write.
+        frames_per_second: its frame rate.
+        sound: audio file with its sound track; None for a silent video.
+
+    Raises:
+        ImportError: the extra `video` is not installed.
+    """
     import imageio.v2 as imageio
 
+    track = {} if sound is None else {"audio_path": str(sound), "audio_codec": "aac"}
     writer: VideoWriter = imageio.get_writer(
-        path, fps=frames_per_second, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"]
+        path, fps=frames_per_second, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"], **track
     )
     return writer
 

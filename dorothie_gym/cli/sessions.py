@@ -1,9 +1,11 @@
-"""`dorothie-gym replay`, `film`, `compare` and `show`: playback, films, comparison, transcripts of sessions."""
+"""`dorothie-gym replay`, `film` and `compare`: playback, films and comparison of sessions."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,7 +29,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dorothie_gym.recording import Difference
+    from dorothie_gym.recording import Difference, Session
     from dorothie_gym.rendering.playback import Playback
     from dorothie_gym.rollout.replay import ReplayCheck, ReplaySources
 
@@ -144,14 +146,22 @@ def _write_video(playback: Playback, fps: float, video: Path) -> int:
     return _write(video, fps, (renderer.draw(scene) for scene in playback.scenes(fps)), playback.count(fps))
 
 
-def _write(video: Path, fps: float, frames: Iterable[NDArray[np.uint8]], count: int) -> int:
-    """Writes frames as a video, which appears when it is complete; returns their number."""
+def _write(video: Path, fps: float, frames: Iterable[NDArray[np.uint8]], count: int, sound: Path | None = None) -> int:
+    """Writes frames as a video, which appears when it is complete; returns their number.
+
+    Args:
+        video: file to write.
+        fps: frame rate.
+        frames: the frames.
+        count: number of frames, for the progress.
+        sound: audio file with the sound track; None for a silent video.
+    """
     from rich.progress import track
 
     console, shown = stderr(), 0
     part = video.with_name(f".{video.stem}.part{video.suffix}")
     try:
-        writer = video_writer(part, fps)
+        writer = video_writer(part, fps) if sound is None else video_writer(part, fps, sound)
         try:
             for frame in track(
                 frames, "Writing video", total=count, console=console, transient=True, disable=not console.is_terminal
@@ -207,7 +217,10 @@ def film(
     maps: Maps = None,
     as_json: AsJson = False,
 ) -> None:
-    """Film a recorded session through the windscreen, beside its map, with the talk as subtitles."""
+    """Film a recorded session through the windscreen, beside its map, with the talk as subtitles.
+
+    A spoken session is filmed with its sound.
+    """
     check_video(out)
     from dorothie_gym.rollout.replay import ReplaySources
 
@@ -216,13 +229,14 @@ def film(
     if as_json:
         print_json(facts)
     else:
-        line = f"{facts['session']}: {facts['seconds']:.0f} s, {facts['pictures']} pictures: {out}"
+        sound = ", with sound" if facts["sound"] else ""
+        line = f"{facts['session']}: {facts['seconds']:.0f} s, {facts['pictures']} pictures{sound}: {out}"
         stdout().print(line, markup=False, soft_wrap=True)
 
 
 def _film(path: Path, sources: ReplaySources, out: Path, view: RenderView, fps: float) -> Facts:
     from dorothie_gym.cli.warm_up import compile_first
-    from dorothie_gym.recording import read_session
+    from dorothie_gym.recording import FRAME_RATE, read_session
     from dorothie_gym.rendering.playback import Playback
     from dorothie_gym.rendering.session_views import SessionRenderer
 
@@ -231,7 +245,7 @@ def _film(path: Path, sources: ReplaySources, out: Path, view: RenderView, fps: 
     playback, size = Playback(session, town), renderer.windscreen
     if size is None:
         frames: Iterable[NDArray[np.uint8]] = (renderer.draw(scene) for scene in playback.scenes(fps))
-        count = playback.count(fps)
+        count, first = playback.count(fps), playback.first_frame
     else:
         from dorothie_gym.camera.config import CameraConfig
         from dorothie_gym.camera.recorded_pictures import RecordedPictures
@@ -239,16 +253,34 @@ def _film(path: Path, sources: ReplaySources, out: Path, view: RenderView, fps: 
         compile_first(pictures=True)
         pictures = RecordedPictures(session, town, CameraConfig(width=size[0], height=size[1]))
         frames = (renderer.draw(playback.scene(frame), taken.rgb) for frame, taken in pictures.pictures(fps))
-        count = len(pictures.frames(fps))
-    shown = _write(out, fps, frames, count)
+        taken_at = pictures.frames(fps)
+        count, first, fps = len(taken_at), taken_at.start, FRAME_RATE / taken_at.step
+    with _sound_file(session, first / FRAME_RATE, count / fps) as sound:
+        shown = _write(out, fps, frames, count, sound)
     return {
         "session": session.name,
         "town": session.header.town,
         "seconds": round(session.duration, 3),
         "view": view.value,
         "pictures": shown,
+        "sound": sound is not None,
         "video": str(out),
     }
+
+
+@contextmanager
+def _sound_file(session: Session, start: float, seconds: float) -> Iterator[Path | None]:
+    """Yields a WAV file with the sound of a part of a session [s], or None for a session without audio."""
+    if not session.audio:
+        yield None
+        return
+    from dorothie_gym.recording.sound import sound_track
+    from dorothie_gym.speech import encode_wav
+
+    with tempfile.TemporaryDirectory(prefix="dorothie_gym.") as folder:
+        file = Path(folder) / "sound.wav"
+        file.write_bytes(encode_wav(sound_track(session, start, seconds)))
+        yield file
 
 
 # --- Comparison -------------------------------------------------------------------------------------------------------
@@ -301,23 +333,3 @@ def _difference_page(difference: Difference | None) -> dict[str, int | str] | No
         "first": difference.recorded,
         "second": difference.replayed,
     }
-
-
-# --- Transcripts ------------------------------------------------------------------------------------------------------
-
-
-def show(
-    session: Annotated[list[Path], typer.Argument(metavar="SESSION...", help="Sessions of any layout.")],
-    out: Annotated[Path | None, typer.Option(metavar="FILE.md", help="File to write; default standard output.")] = None,
-    maps: Maps = None,
-) -> None:
-    """Write annotated transcripts as Markdown: utterances, dialogue acts, exchanges, transactions and other events."""
-    with reporting_errors():
-        from dorothie_gym.analysis.transcript import markdown
-        from dorothie_gym.recording import read_session
-
-        page = "\n".join(markdown(read_session(path, maps=maps)) for path in session)
-        if out is not None:
-            out.write_text(page, encoding="utf-8", newline="\n")
-        else:
-            typer.echo(page, nl=False)

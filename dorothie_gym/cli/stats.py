@@ -11,6 +11,7 @@ from rich.table import Table
 
 from dorothie_gym.cli.options import OWN_NAME, AsJson, Maps
 from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, session_progress, stdout
+from dorothie_gym.cli.speech_table import show_speech
 
 if TYPE_CHECKING:
     from dorothie_gym.recording import Corpus
@@ -62,6 +63,9 @@ def stats(
     talk: Annotated[
         bool, typer.Option("--talk", help="Truth, reasons, arrival times and answers of what is said.")
     ] = False,
+    speech: Annotated[
+        bool, typer.Option("--speech", help="Audio hours, overlap, gaps, speaking rates and word error rates.")
+    ] = False,
     check: Annotated[
         bool, typer.Option("--check", help="Check the consistency of the annotation; exit code 1 if it has faults.")
     ] = False,
@@ -73,7 +77,14 @@ def stats(
 ) -> None:
     """Print statistics of a corpus: table 2 of the paper, majority baselines and diversity, from the events."""
     _check_choice(
-        folder, kappa, picture=picture is not None, phenomena=phenomena, behaviour=behaviour, talk=talk, check=check
+        folder,
+        kappa,
+        picture=picture is not None,
+        phenomena=phenomena,
+        behaviour=behaviour,
+        talk=talk,
+        speech=speech,
+        check=check,
     )
     if picture is not None:
         picture = PICTURE if picture == Path(OWN_NAME) else picture
@@ -94,6 +105,8 @@ def stats(
             _behaviour(corpus, as_json=as_json)
         elif talk:
             _talk(corpus, as_json=as_json)
+        elif speech:
+            show_speech(corpus, as_json=as_json)
         else:
             _count(corpus, picture, as_json=as_json)
 

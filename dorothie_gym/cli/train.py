@@ -64,6 +64,10 @@ Detector = Annotated[
         help="Models of detections and queries: folder of the trained detector; default OUT/detr/small/seed-0.",
     ),
 ]  # fmt: skip
+Hubert = Annotated[
+    Path | None,
+    typer.Option("--hubert", metavar="DIR", help="Models of HuBERT: folder of its weights (safetensors)."),
+]
 Encoder = Annotated[
     str, typer.Option(help="Text encoder: auto (minilm if installed, else hashing), hashing, minilm, bert.")
 ]
@@ -98,6 +102,7 @@ def train(
     inputs: PixelSource = None,
     epochs: Epochs = None,
     detector: Detector = None,
+    hubert: Hubert = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a model with several seeds, test it, and print its scores.
@@ -128,10 +133,12 @@ def train(
             fail(f"{row.name} cannot be trained: {row.missing}")
         if detector is not None and row.objects != "detections":
             fail(_NOT_OF_DETECTIONS)
+        if hubert is not None and row.sound != "hubert":
+            fail("--hubert is for models of HuBERT only, such as toto-hubert")
         folder, where = _places(corpus, out)
         jobs = table_experiments(
             folder, where, encoder=encoder, size=size, seeds=seeds, rows=[row], strict=strict,
-            detector=_checked_detector(detector or where / _DETECTOR, [row]),
+            detector=_checked_detector(detector or where / _DETECTOR, [row]), hubert=hubert,
         )  # fmt: skip
         results = _run(jobs, workers, quiet=as_json)
         table, _ = gather_table(jobs, floors=False)
@@ -159,6 +166,7 @@ def table(
     workers: Workers = None,
     strict: Strict = False,
     detector: Detector = None,
+    hubert: Hubert = None,
     as_json: AsJson = False,
 ) -> None:
     """Train all models that are not trained yet, and write the paper's results table with its figures beside ours.
@@ -177,7 +185,7 @@ def table(
         folder, where = _places(corpus, out)
         jobs = table_experiments(
             folder, where, encoder=encoder, size=size, seeds=seeds, rows=rows, strict=strict,
-            detector=_checked_detector(detector or where / _DETECTOR, rows),
+            detector=_checked_detector(detector or where / _DETECTOR, rows), hubert=hubert,
         )  # fmt: skip
         results = _run(jobs, workers, quiet=as_json)
         made, predictions = gather_table(jobs)

@@ -63,6 +63,7 @@ class ConsoleConfig:
         pictures: whether seats can look through the windscreen.
         picture_size: width and height of the pictures [px].
         picture_quality: quality of the pictures as JPEG, in 1..95.
+        speech: whether people can speak into a microphone, and hear what others say.
         absence: rules for people who leave.
         repeatable: whether people at the seats may begin another session after the last one.
 
@@ -76,6 +77,7 @@ class ConsoleConfig:
     pictures: bool = True
     picture_size: tuple[int, int] = (480, 270)
     picture_quality: int = 72
+    speech: bool = False
     absence: AbsenceRules = field(default_factory=AbsenceRules)
     repeatable: bool = True
 

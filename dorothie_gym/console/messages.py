@@ -73,10 +73,14 @@ class Parse(_Message, frozen=True):
 
 
 class Say(_Command, frozen=True):
-    """Typed turn; without `spans`, the classifier segments it and finds the acts."""
+    """Typed or spoken turn; without `spans`, the classifier segments it and finds the acts.
+
+    `audio` is the name of the recording from which its words were recognised.
+    """
 
     text: _Typed
     spans: Annotated[list[TypedSpan], Meta(max_length=12)] | None = None
+    audio: _Name | None = None
 
 
 class Correct(_Message, frozen=True):

@@ -119,6 +119,15 @@ class Room:
         """Ends the session at the next tick, if it is not over; one that has not begun leaves no record."""
         self._calls.append(End(reason))
 
+    def keep_audio(self, seat: Seat, flac: bytes) -> str | None:
+        """Keeps the recording of a spoken turn with the session; returns its name, or None without a record."""
+        record = self.record
+        if record is None or self.state is RoomState.OVER:
+            return None
+        name = record.add_audio(seat.name, flac)
+        seat.recordings.add(name)
+        return name
+
     @property
     def wants_pictures(self) -> bool:
         """Whether a browser has asked for pictures through the windscreen."""
@@ -181,6 +190,7 @@ class Room:
         for seat in self._all():
             seat.talk = TalkLog(seat.role)
             seat.taken_over, seat.refused = False, []
+            seat.recordings.clear()
             if seat.inbox is not None:
                 seat.inbox.clear()
         self._frames.events.clear()
@@ -388,6 +398,8 @@ class Room:
             raise MessageError(f"the seat of the {seat.name} has no role")
         elif self.state is RoomState.OVER:
             raise MessageError("the session is over")
+        elif isinstance(message, m.Say) and message.audio is not None and message.audio not in seat.recordings:
+            raise MessageError("the seat has no recording of that name")
         else:
             seat.inbox.put(message, seat.talk.awaiting)
 

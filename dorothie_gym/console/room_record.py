@@ -32,6 +32,7 @@ class RoomRecord:
         self._writer = SessionWriter(folder, header)
         self._recorder = SessionRecorder(engine, self._writer)
         self._log = SeatLogWriter(folder)
+        self._recordings = 0
 
     def record(self, actions: Mapping[str, ActionMapping]) -> None:
         """Records a decision after the engine has played it."""
@@ -41,6 +42,13 @@ class RoomRecord:
         """Records events at the seats."""
         for event in events:
             self._log.append(event)
+
+    def add_audio(self, seat: str, flac: bytes) -> str:
+        """Records a spoken turn (FLAC), and returns the name of its file; other threads may call it, one at a time."""
+        self._recordings += 1
+        name = f"{seat}_{self._recordings}.flac"
+        self._writer.add_audio(name, flac)
+        return name
 
     def finish(self, *, broken_off: bool) -> None:
         """Closes the record of a session that is over.

@@ -50,6 +50,7 @@ class Seat:
         taken_over: whether the policy plays for a person who is away.
         done: last command that was carried out.
         refused: reasons for refusals that were not sent yet.
+        recordings: names of the recordings of spoken turns that are kept.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Seat:
     taken_over: bool = False
     done: int = 0
     refused: list[str] = field(default_factory=list)
+    recordings: set[str] = field(default_factory=set)
 
     @property
     def present(self) -> bool:

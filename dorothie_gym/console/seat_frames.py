@@ -140,6 +140,7 @@ class SeatFrames:
             "rate": self._config.decision_frequency,
             "pictures": self._windscreen is not None and seat.role is not Role.AD_WIZARD,
             "repeatable": self._config.repeatable,
+            "speech": self._config.speech and seat.role in (Role.PARTICIPANT, Role.CO_WIZARD),
             "vocabulary": vocabulary(),
             **static_view(observed, len(town.streets)),
         }

@@ -28,6 +28,7 @@ from dorothie_gym.console.messages import Join, MessageError, decode_message
 from dorothie_gym.console.pace import run_room
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.seat import Seat
+from dorothie_gym.console.spoken_turns import SpokenTurns
 from dorothie_gym.console.town_page import town_page
 
 logger = logging.getLogger(__name__)
@@ -69,6 +70,9 @@ class Console:
     Attributes:
         rooms: rooms that are open.
         connections: number of open websockets.
+
+    Raises:
+        SpeechError: people can speak, and the extra `speech` is not installed.
     """
 
     def __init__(self, rooms: Sequence[Room] = (), *, suspends: bool = False) -> None:
@@ -77,6 +81,7 @@ class Console:
         self._suspends = suspends
         self._tasks: dict[Room, asyncio.Task[None]] = {}
         self._threads: tuple[ThreadPoolExecutor, ThreadPoolExecutor] | None = None
+        self._speech = SpokenTurns(self.find) if any(room.config.speech for room in self.rooms) else None
 
     def find(self, token: str) -> tuple[Room, Seat] | None:
         """Returns the room and the seat of a token; None for an unknown one."""
@@ -136,6 +141,7 @@ class Console:
             await _serve(self, socket)
 
         return [
+            *([] if self._speech is None else self._speech.routes()),
             Route("/seat", index),
             Route("/towns/{name}.json", town),
             WebSocketRoute("/ws", websocket),
@@ -163,6 +169,8 @@ class Console:
                 room.suspend()
             else:
                 room.shut_down()
+        if self._speech is not None:
+            self._speech.close()
 
 
 class SecurityHeaders:

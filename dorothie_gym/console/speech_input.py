@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dorothie_gym.console.messages import MessageError, Say, TypedSpan
 from dorothie_gym.dialogue import guess_act, guess_spans
@@ -31,11 +31,13 @@ class TypedAct:
         text: the words, at most `UTTERANCE_LENGTH` characters.
         act: act that is spoken.
         guess: act of the classifier for these words.
+        audio: name of the recording of its turn; None for a typed one.
     """
 
     text: str
     act: DialogueAct
     guess: DialogueAct
+    audio: str | None = None
 
     @property
     def source(self) -> ActSource:
@@ -45,7 +47,8 @@ class TypedAct:
     def to_json(self) -> dict[str, object]:
         """Returns text, act and guess in JSON types, for the log of the seats."""
         guess = {"move": self.guess.move.label, "slots": self.guess.slot_labels()}
-        return {"text": self.text, **act_json(self.act), "source": self.source.value, "guess": guess}
+        audio = {} if self.audio is None else {"audio": self.audio}
+        return {"text": self.text, **act_json(self.act), "source": self.source.value, "guess": guess, **audio}
 
 
 def act_json(act: DialogueAct) -> dict[str, object]:
@@ -86,7 +89,7 @@ def typed_acts(message: Say, after: DialogueMove | None) -> tuple[TypedAct, ...]
     found = read_typed(message.text, after) if message.spans is None else _confirmed(message.spans, after)
     if not found:
         raise MessageError("nothing was typed that can be spoken")
-    return found
+    return found if message.audio is None else tuple(replace(each, audio=message.audio) for each in found)
 
 
 def _confirmed(spans: Sequence[TypedSpan], after: DialogueMove | None) -> tuple[TypedAct, ...]:

@@ -20,6 +20,7 @@ from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition, encode_meaning, find_meaning, read_meaning
 from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
+from dorothie_gym.dialogue.recognition_errors import ErrorProfile, Loudness, WordClass, measured_errors, word_class
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle, draw_style
 from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.errors import PhraseFileError
@@ -37,11 +38,13 @@ __all__ = [
     "CommunicativeFunction",
     "Conversation",
     "Direction",
+    "ErrorProfile",
     "Exchange",
     "ExchangeState",
     "ExchangeTracker",
     "Intention",
     "Lexicon",
+    "Loudness",
     "ParsedText",
     "PhraseFileError",
     "Predicate",
@@ -52,6 +55,7 @@ __all__ = [
     "Span",
     "SpeakerStyle",
     "Utterance",
+    "WordClass",
     "Wording",
     "WordingContext",
     "act_of",
@@ -62,10 +66,12 @@ __all__ = [
     "guess_act",
     "guess_spans",
     "load_lexicon",
+    "measured_errors",
     "read_meaning",
     "speech_seconds",
     "understand",
     "word_act",
     "word_acts",
+    "word_class",
     "word_error_rate",
 ]

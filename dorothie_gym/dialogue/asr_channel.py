@@ -6,9 +6,10 @@ import functools
 import itertools
 import math
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 from rapidfuzz import process
@@ -19,26 +20,21 @@ from dorothie_gym.dialogue.conversation import Span, Utterance
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.dialogue.entity_recognition import sound_of
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
-from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
+from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
+from dorothie_gym.dialogue.recognition_errors import Loudness, measured_errors, proper_words, word_class
 from dorothie_gym.dialogue.talk_files import read_talk_files
-from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, Slot
+from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z']*")
 _CANDIDATES = 6
 """Number of candidate words for a substitution."""
 
-USUAL_WORD_ERROR_RATE = 0.05
-"""Word error rate of sessions by default.
+USUAL_WORD_ERROR_RATE: Final = round(measured_errors().rate, 3)
+"""Word error rate of sessions by default: that of spoken sessions (`recognition_errors.measured_errors`).
 
 Systems of the time of the paper, and professional transcribers, have 5.1 % on telephone conversations of strangers
 (Switchboard; Xiong et al., ICASSP 2018; Saon et al., Interspeech 2017).
 """
-
-RARE = 5
-"""Words that stand no more often in the phrases of the grammar are rare; about a fifth of the words spoken."""
-
-COMMON_WEIGHT, RARE_WEIGHT = 0.75, 2.15
-"""Error rates of common and of rare words relative to `AsrChannel.rate`; set by hand, so that the mean is about 1."""
 
 
 @shared
@@ -49,17 +45,16 @@ class AsrChannel:
     Attributes:
         rate: word error rate in [0, 1): substitutions, deletions and insertions per spoken word.
         substitutions: share of substitutions among the errors.
-        deletions: share of deletions among the errors; the rest are insertions. The defaults follow large-vocabulary
-            recognition of conversations (Goldwater, Jurafsky and Manning, Speech Communication 52(3), 2010: about
-            three fifths substitutions, a quarter deletions). As there, infrequent words are misrecognised more often.
+        deletions: share of deletions among the errors; the rest are insertions. The defaults are those measured in
+            spoken sessions (`recognition_errors`), as are the relative error rates of speakers, noises and words.
 
     Raises:
         ValueError: if `rate` or the shares are out of range.
     """
 
     rate: float = USUAL_WORD_ERROR_RATE
-    substitutions: float = 0.6
-    deletions: float = 0.25
+    substitutions: float = field(default_factory=lambda: measured_errors().substitutions)
+    deletions: float = field(default_factory=lambda: measured_errors().deletions)
 
     def __post_init__(self) -> None:
         if not 0 <= self.rate < 1:
@@ -70,12 +65,14 @@ class AsrChannel:
                 "errors: none below 0, their sum at most 1"
             )
 
-    def transcribe(self, text: str, rng: np.random.Generator) -> str:
+    def transcribe(self, text: str, rng: np.random.Generator, circumstances: float = 1.0) -> str:
         """Returns a transcript of a text with random word errors.
 
         Args:
             text: spoken text.
             rng: source of randomness.
+            circumstances: error rate of the speaker in the present noise relative to the mean
+                (`ErrorProfile.circumstances`).
 
         Returns:
             The transcript, with at least one word unless the text is empty.
@@ -85,10 +82,11 @@ class AsrChannel:
         heard: list[str] = []
         deletions = self.deletions * self.rate
         substitutions = self.substitutions * self.rate
-        insertions = self.rate - deletions - substitutions
+        insertions = (self.rate - deletions - substitutions) * self._damped(circumstances)
+        weights = measured_errors().word_classes
         for place, word in enumerate(words):
             # dividing the number drawn multiplies the probabilities of an error
-            drawn = draw() / (1.0 + (_weight(word) - 1.0) * (1.0 - self.rate))
+            drawn = draw() / self._damped(circumstances * weights[word_class(word)])
             last_hope = place == len(words) - 1 and not heard
             if drawn < deletions and not last_hope:
                 # Punctuation is not part of the deleted word: it moves to the previous word.
@@ -101,6 +99,10 @@ class AsrChannel:
             if draw() < insertions:
                 heard.insert(len(heard) - 1 if heard and draw() < 0.5 else len(heard), _inserted(draw))
         return " ".join(heard)
+
+    def _damped(self, relative: float) -> float:
+        """Returns a relative error rate nearer to 1 for large rates, since no word has more errors than one."""
+        return 1.0 + (relative - 1.0) * (1.0 - self.rate)
 
 
 def word_error_rate(said: Sequence[str], heard: Sequence[str]) -> float:
@@ -144,19 +146,11 @@ def misheard(word: str, draw: Callable[[], float]) -> str:
     options, weights = _confusions(found[0].lower())
     drawn = draw() * weights[-1]
     choice = next(option for option, weight in zip(options, weights, strict=True) if drawn < weight)
-    if found[0][0].isupper() and choice not in _proper_words():
+    if found[0][0].isupper() and choice not in proper_words():
         choice = choice[0].upper() + choice[1:] if word[0].isupper() and found.start() == 0 else choice
-    elif choice in _proper_words():
-        choice = _proper_words()[choice]
+    elif choice in proper_words():
+        choice = proper_words()[choice]
     return word[: found.start()] + choice + word[found.end() :]
-
-
-@functools.lru_cache(maxsize=8192)
-def _weight(word: str) -> float:
-    """Returns the error rate of a word relative to the mean."""
-    parts = re.findall(r"[a-z']+", word.lower())
-    common = parts and all(part in _common_words() or len(part) == 1 for part in parts)
-    return COMMON_WEIGHT if common else RARE_WEIGHT
 
 
 @functools.lru_cache(maxsize=8192)
@@ -171,7 +165,7 @@ def _confusions(word: str) -> tuple[tuple[str, ...], tuple[float, ...]]:
         for other in sounds[sound]
         if other != word and similarity > 0
     ][:_CANDIDATES]
-    if word in _proper_words():
+    if word in proper_words():
         # A rare name is confused with a common word or another name, or slightly distorted.
         options += [(_distorted(word), 0.6)]
     if not options:
@@ -202,31 +196,11 @@ def _insertions() -> tuple[str, ...]:
 
 
 @functools.cache
-def _proper_words() -> Mapping[str, str]:
-    """Returns the words of proper names: lower case -> spelling."""
-    return {
-        word.lower(): word
-        for value, forms in load_lexicon().phrases.items()
-        if value.slot in (Slot.LANDMARK, Slot.STREET)
-        for phrase in forms["say"]
-        for word in phrase.split()
-        if word[0].isupper() and len(word) > 2
-    }
-
-
-@functools.cache
-def _common_words() -> frozenset[str]:
-    """Returns the words that stand often in the phrases of the grammar; names are never among them."""
-    counts = Counter(re.findall(r"\b[a-z][a-z']+\b", " ".join(read_talk_files().values()).lower()))
-    return frozenset(word for word, count in counts.items() if count > RARE) - set(_proper_words())
-
-
-@functools.cache
 def _vocabulary_by_sound() -> Mapping[str, tuple[str, ...]]:
     """Returns the vocabulary of the recogniser by phonetic key: all generated words and common words like names."""
     spoken = " ".join(read_talk_files().values()).lower()
     known = split_words(" ".join(strings("cues.yaml: known", read_data("cues.yaml").get("known"))))
-    words = {word for word in re.findall(r"\b[a-z][a-z']+\b", spoken)} | set(known) | set(_proper_words())
+    words = {word for word in re.findall(r"\b[a-z][a-z']+\b", spoken)} | set(known) | set(proper_words())
     found: dict[str, list[str]] = defaultdict(list)
     for word in sorted(words):
         if len(word) > 1:
@@ -275,18 +249,20 @@ class Recogniser:
         self._channel, self._rng, self._classify = channel, rng, classify
         self._open = OpenMoves()
 
-    def hear(self, utterance: Utterance) -> Utterance:
+    def hear(self, utterance: Utterance, noise: Loudness = Loudness.QUIET) -> Utterance:
         """Returns the recognised utterance: the same spans with transcripts and matching acts.
 
         Args:
             utterance: spoken utterance; calls follow the order of utterance ends.
+            noise: noise in the car at its end.
         """
         if self._channel.rate == 0:
             return utterance
         after = self._open.answered_by(utterance)
+        circumstances = measured_errors().circumstances(utterance.speaker, noise)
         spans = []
         for place, span in enumerate(utterance.spans):
-            text = self._channel.transcribe(span.text, self._rng)
+            text = self._channel.transcribe(span.text, self._rng, circumstances)
             act = span.act
             if not same_words(text, span.text):
                 act = guess_act(text, after if place == 0 else None) if self._classify else UNCLASSIFIED

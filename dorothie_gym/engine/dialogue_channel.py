@@ -13,6 +13,7 @@ from dorothie_gym.dialogue import (
     Annotator,
     AsrChannel,
     Conversation,
+    Loudness,
     Recogniser,
     Span,
     SpeakerStyle,
@@ -189,7 +190,7 @@ class DialogueChannel:
 
     def _hear(self, utterance: Utterance, cabin: Callable[[], CabinState]) -> DeliveredUtterance:
         if self._spoken is None:
-            heard = self._recogniser.hear(utterance)
+            heard = self._recogniser.hear(utterance, self._noise(cabin)) if self._rate else utterance
         else:
             heard = self._spoken.hear(utterance, len(self.said), cabin())
         # The Co-Wizard understands its own utterances as spoken, and those of the participant as recognised.
@@ -197,6 +198,12 @@ class DialogueChannel:
         records = self._records(utterance, heard)
         self.said.append(utterance)
         return DeliveredUtterance(said=utterance, heard=heard, understood=understood, records=records)
+
+    @staticmethod
+    def _noise(cabin: Callable[[], CabinState]) -> Loudness:
+        from dorothie_gym.speech import signal_to_noise
+
+        return Loudness.of(signal_to_noise(cabin()))
 
     def _understood(self, utterance: Utterance) -> tuple[DialogueAct, ...]:
         """Returns the acts of an utterance, or those classified from its words where acts are not observed."""

@@ -34,7 +34,8 @@ class SeatEventKind(enum.StrEnum):
     """The clock runs again: seconds (of the pause)."""
     SAID = "said"
     """A person typed a span: text, move, slots (the act that was spoken), source ("classifier", or "speaker" where the
-    person corrected the act), guess (move and slots of the classifier)."""
+    person corrected the act), guess (move and slots of the classifier); audio (name of the recording of the turn in the
+    session's folder `utterance`) of one that was spoken."""
     CORRECTED = "corrected"
     """A person corrected the act of a span after it was spoken: utterance (number), span (index), move, slots."""
     ANNOUNCED = "announced"

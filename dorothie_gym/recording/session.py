@@ -336,7 +336,9 @@ def _audio(folder: Path) -> Mapping[str, Path]:
     """Returns the audio files by name."""
     if not folder.is_dir():
         return MappingProxyType({})
-    return MappingProxyType({path.name: path for path in sorted(folder.glob("*.flac"))})
+    return MappingProxyType(
+        {path.name: path for ending in ("flac", "wav") for path in sorted(folder.glob(f"*.{ending}"))}
+    )
 
 
 @contextmanager

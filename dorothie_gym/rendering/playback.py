@@ -36,6 +36,9 @@ _TRAIL: Final = 0.5
 class Playback:
     """Scenes of a session at any frame.
 
+    Attributes:
+        first_frame: first frame with a car state; 0 if there is none.
+
     Args:
         session: recorded session.
         town: town of the session.
@@ -53,7 +56,7 @@ class Playback:
             for car in (self._car(event.frame),)
         ]
         rows = session.trajectory
-        self._first_frame = int(rows["frame"][0]) if len(rows) else 0
+        self.first_frame = int(rows["frame"][0]) if len(rows) else 0
         step = max(round(_TRAIL * FRAME_RATE), 1)
         self._trail_frames = rows["frame"][::step]
         self._trail = np.stack([rows["x"][::step], rows["y"][::step]], axis=1)
@@ -66,11 +69,11 @@ class Playback:
     def scenes(self, frames_per_second: float) -> Iterator[Scene]:
         """Yields scenes at a frame rate [1/s], from the first frame with a car state to the last."""
         for k in range(self.count(frames_per_second)):
-            yield self.scene(self._first_frame + round(k * FRAME_RATE / frames_per_second))
+            yield self.scene(self.first_frame + round(k * FRAME_RATE / frames_per_second))
 
     def count(self, frames_per_second: float) -> int:
         """Returns the number of scenes at a frame rate [1/s]."""
-        return math.floor((self.last_frame - self._first_frame) * frames_per_second / FRAME_RATE) + 1
+        return math.floor((self.last_frame - self.first_frame) * frames_per_second / FRAME_RATE) + 1
 
     def scene(self, frame: int) -> Scene:
         """Returns the session at a frame (30 Hz)."""

@@ -4,7 +4,15 @@ Needs the extra `speech`; the packages are imported when a synthesiser or recogn
 """
 
 from dorothie_gym.errors import AudioError, SpeechError
-from dorothie_gym.speech.audio import SAMPLE_RATE, Samples, checked_samples, encode_flac, read_audio, resample
+from dorothie_gym.speech.audio import (
+    SAMPLE_RATE,
+    Samples,
+    checked_samples,
+    encode_flac,
+    encode_wav,
+    read_audio,
+    resample,
+)
 from dorothie_gym.speech.backends import RECOGNIZER_NAMES, SYNTHESIZER_NAMES, find_recognizer, find_synthesizer
 from dorothie_gym.speech.cabin_noise import CabinState, cabin_noise, mixed, pink_noise, signal_to_noise
 from dorothie_gym.speech.http_speech import HttpRecognizer, HttpSynthesizer
@@ -36,6 +44,7 @@ __all__ = [
     "cabin_noise",
     "checked_samples",
     "encode_flac",
+    "encode_wav",
     "find_recognizer",
     "find_synthesizer",
     "mixed",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
+import wave
 from math import gcd
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -49,7 +50,9 @@ def checked_samples(samples: NDArray[np.generic], sample_rate: int, where: str =
             f"{where}: has {short_repr(sample_rate)} samples per second; {LOWEST_RATE} to {HIGHEST_RATE} are supported"
         )
     values = np.asarray(samples)
-    if values.ndim not in (1, 2) or 0 in values.shape:
+    if not values.size:
+        raise AudioError(f"{where}: is empty")
+    if values.ndim not in (1, 2):
         raise AudioError(f"{where}: has the shape {values.shape}; it must be (samples,) or (samples, channels)")
     if len(values) > LONGEST * sample_rate:
         seconds = len(values) / sample_rate
@@ -117,6 +120,17 @@ def encode_flac(samples: Samples, sample_rate: int = SAMPLE_RATE) -> bytes:
     return buffer.getvalue()
 
 
+def encode_wav(samples: Samples, sample_rate: int = SAMPLE_RATE) -> bytes:
+    """Returns audio as a WAV file of 16 bits, without the extra `speech`."""
+    buffer = io.BytesIO()
+    with wave.open(buffer, "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(sample_rate)
+        file.writeframes(to_pcm(samples).astype("<i2").tobytes())
+    return buffer.getvalue()
+
+
 def read_audio(path: Path | str, sample_rate: int = SAMPLE_RATE) -> Samples:
     """Returns the audio of a FLAC or WAV file at a rate; several channels are averaged.
 
@@ -142,7 +156,7 @@ def read_audio(path: Path | str, sample_rate: int = SAMPLE_RATE) -> Samples:
                 )
             rate, samples = int(file.samplerate), file.read(dtype="float32", always_2d=True)
     except soundfile.LibsndfileError as error:
-        raise AudioError(f"{path}: cannot be read as audio: {str(error).splitlines()[0]}") from error
+        raise AudioError(f"{path}: cannot be read as audio: {error.error_string.splitlines()[0]}") from error
     return resample(checked_samples(samples, rate, str(path)), rate, sample_rate)
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from dorothie_gym.errors import SpeechError, one_line
-from dorothie_gym.speech.audio import LONGEST, SAMPLE_RATE, Samples, checked_samples, resample, to_pcm
+from dorothie_gym.speech.audio import LONGEST, SAMPLE_RATE, Samples, checked_samples, encode_wav, resample
 from dorothie_gym.speech.extras import speech_module
 from dorothie_gym.speech.recognizer import Recognition, RecognizedWord, single_hypothesis
 from dorothie_gym.speech.spoken_form import spoken_words
@@ -125,19 +125,9 @@ class HttpRecognizer:
         if hints:
             form["prompt"] = ", ".join(hints)
         body = self._server.post(
-            "audio/transcriptions", data=form, files={"file": ("speech.wav", _wav(audio), "audio/wav")}
+            "audio/transcriptions", data=form, files={"file": ("speech.wav", encode_wav(audio), "audio/wav")}
         )
         return _transcription(body)
-
-
-def _wav(samples: Samples) -> bytes:
-    buffer = io.BytesIO()
-    with wave.open(buffer, "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(SAMPLE_RATE)
-        file.writeframes(to_pcm(samples).astype("<i2").tobytes())
-    return buffer.getvalue()
 
 
 def _transcription(body: bytes) -> Recognition:

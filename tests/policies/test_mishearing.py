@@ -112,5 +112,5 @@ def test_car_stops_for_an_indirect_command() -> None:
 
 def test_rare_words_are_misheard_more_often() -> None:
     channel, rng = AsrChannel(rate=0.1), np.random.default_rng(0)
-    lost = {word: sum(channel.transcribe(word, rng) != word for _ in range(600)) for word in ("Bonisteel", "please")}
-    assert lost["Bonisteel"] > 2 * lost["please"]
+    lost = {word: sum(channel.transcribe(word, rng) != word for _ in range(600)) for word in ("turquoise", "please")}
+    assert lost["turquoise"] > 1.2 * lost["please"]

@@ -36,7 +36,7 @@ def test_stereo_integers_are_averaged_at_full_scale() -> None:
 @pytest.mark.parametrize(
     ("samples", "rate", "message"),
     [
-        (np.zeros(0, np.float32), 16000, "has the shape"),
+        (np.zeros(0, np.float32), 16000, "is empty"),
         (np.zeros(61 * 16000, np.float32), 16000, "is 61 s long"),
         (np.array([0.0, np.nan], np.float32), 16000, "no finite numbers"),
         (np.zeros(10, np.float32), 4000, "has 4000 samples per second; 8000 to 96000"),

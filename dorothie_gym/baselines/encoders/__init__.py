@@ -21,6 +21,7 @@ from dorothie_gym.baselines.encoders.pretrained import (
     ResNetEncoder,
     has_minilm,
 )
+from dorothie_gym.baselines.encoders.sound import SoundReader, SpeechEmbeddingEncoder, mel_table
 from dorothie_gym.errors import EncoderError
 
 TEXT_ENCODERS: Mapping[str, Callable[[], TextEncoder]] = MappingProxyType(
@@ -57,10 +58,13 @@ __all__ = [
     "ImageEncoder",
     "MiniLMEncoder",
     "ResNetEncoder",
+    "SoundReader",
+    "SpeechEmbeddingEncoder",
     "SpeechEncoder",
     "TextEncoder",
     "Vectors",
     "has_minilm",
+    "mel_table",
     "table_key",
     "text_encoder",
     "text_table",

@@ -77,7 +77,7 @@ MAX_SIZE: Final = 8192
 
 _RANGES: Final = (
     *((name, 1, MAX_SIZE) for name in ("width", "feed_forward", "text_width", "lane_width", "id_width")),
-    *((name, 0, MAX_SIZE) for name in ("image_width", "sound_width")),
+    *((name, 0, MAX_SIZE) for name in ("image_width", "sound_width", "sound_frames")),
     *((name, 1, 64) for name in ("layers", "heads", "map_heads", "text_layers")),
     ("text_tokens", 1, 512),
     ("vocabulary", 1, 1 << 16),
@@ -120,7 +120,9 @@ class TOTOConfig(HistorySizes):
         id_width: numbers of the vector looked up for a road, and for a junction.
         roads, junctions: sizes of those tables; ids beyond them share rows.
         image_width: numbers of a picture's vector at each token of the window; 0 where there is no camera.
-        sound_width: numbers of the vector of the current utterance's sound; 0 where there is no sound.
+        sound_width: numbers of the vector of the current utterance's sound; 0 where there is no such vector.
+        sound_frames: frames of its log-mel spectrum, which a small convolution reads that is trained with the model; 0
+            where there is no such spectrum.
         detector: (queries, numbers each) of an object detector; None: objects come from the world's list.
         learning_rate, weight_decay, clip: of AdamW, and the largest norm of the gradient.
         batch_size: points of a step.
@@ -156,6 +158,7 @@ class TOTOConfig(HistorySizes):
     junctions: int = 34
     image_width: int = 0
     sound_width: int = 0
+    sound_frames: int = 0
     detector: tuple[int, int] | None = None
     learning_rate: float = 1e-5
     weight_decay: float = 1e-4
@@ -241,7 +244,7 @@ class TOTOConfig(HistorySizes):
         Raises:
             InputFileError: a field is unknown, missing, of another type or out of its range.
         """
-        known = {"strict": True, **fields}  # models without the field were trained so
+        known = {"strict": True, "sound_frames": 0, **fields}  # models without the fields were trained so
         if missing := sorted({field.name for field in dataclass_fields(cls)} - set(known)):
             raise InputFileError("TOTOConfig", f"the field {missing[0]!r} is missing; the model is of another version")
         return checked(known, cls, "TOTOConfig")

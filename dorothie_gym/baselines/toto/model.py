@@ -12,6 +12,7 @@ from typing import Final, TypeAlias
 import torch
 from torch import Tensor, nn
 
+from dorothie_gym.baselines.encoders.sound import SoundReader
 from dorothie_gym.baselines.model_io import Inputs, Labels, Outputs, Predicted, decode
 from dorothie_gym.baselines.toto.config import Channel, TOTOConfig
 from dorothie_gym.baselines.toto.layers import Block, GraphAttention, segment_softmax, time_encoding
@@ -113,7 +114,10 @@ class TOTO(Model):
         if Channel.VISION in given:
             self.scene = nn.Linear(config.image_width or width, width)
         if Channel.SPEECH in given:
-            self.speech = nn.Linear(config.sound_width or words, width)
+            if config.sound_frames:
+                self.sound = SoundReader(width, config.dropout)
+            else:
+                self.speech = nn.Linear(config.sound_width or words, width)
         if Channel.OBJECTS in given and config.detector is not None:
             self.queries = nn.Linear(config.detector[0] * config.detector[1], width)
 
@@ -290,8 +294,11 @@ class TOTO(Model):
     def _speech(self, inputs: Inputs) -> Tokens:
         """Returns the token of the current utterance as heard (UfN)."""
         heard, said = inputs["current_recognised"], inputs["current_text"]
-        if self.config.sound_width:
-            return self.speech(inputs["current_sound"])[:, None], (said >= 0)[:, None], inputs["time"][:, None]
+        if self.config.sound_width or self.config.sound_frames:
+            read, time = self.sound if self.config.sound_frames else self.speech, inputs["time"][:, None]
+            if "current_sound" not in inputs:  # of a session in progress, in which no utterance is to be predicted
+                return time.new_zeros(len(time), 1, self.config.width), torch.zeros_like(time, dtype=torch.bool), time
+            return read(inputs["current_sound"])[:, None], (said >= 0)[:, None], time
         text = torch.where(heard >= 0, heard, said)[:, None]
         return self.speech(self.texts(text)), text >= 0, inputs["time"][:, None]
 

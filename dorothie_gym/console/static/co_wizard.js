@@ -2,6 +2,7 @@
 
 import { button, h, icon, notice, panel, rebuild, words } from './dom.js';
 import { COLOURS, MapView } from './map.js';
+import { Speech } from './speech.js';
 import { Talk } from './talk.js';
 import { Windscreen } from './windscreen.js';
 
@@ -32,6 +33,7 @@ export class CoWizardPage {
     Object.assign(this, { link, mode: null, plan: [], goals: [], statuses: {}, marked: null });
     this.windscreen = new Windscreen(link, { rate: 5 });
     this.talk = new Talk(link, { own: 'co_wizard', quick: QUICK, keys, alt: true });
+    this.speech = new Speech(link, this.talk, keys);
     this.canvas = h('canvas', { 'aria-label': 'Map with what the car knows; press a mode below it, then click' });
     this.map = new MapView(this.canvas, { onclick: (at, reach) => this.click(at, reach) });
     this.map.layers.push((ink, px) => this.paintPlan(ink, px));
@@ -144,7 +146,7 @@ export class CoWizardPage {
 
   drive(action, more) { this.link.command('drive', { action, ...more }); }
 
-  begin() { Object.assign(this, { plan: [], goals: [], statuses: {}, marked: null }); this.map.goals = []; this.windscreen.begin(); this.setMode(null); }
+  begin(hello) { this.speech.begin(hello); Object.assign(this, { plan: [], goals: [], statuses: {}, marked: null }); this.map.goals = []; this.windscreen.begin(); this.setMode(null); }
 
   update(state, fields) {
     this.state = state;

@@ -2,6 +2,7 @@
 
 import { h, icon, panel, rebuild } from './dom.js';
 import { MapView } from './map.js';
+import { Speech } from './speech.js';
 import { Talk } from './talk.js';
 import { Windscreen } from './windscreen.js';
 
@@ -13,6 +14,7 @@ export class ParticipantPage {
   constructor(link, keys) {
     this.windscreen = new Windscreen(link);
     this.talk = new Talk(link, { own: 'participant', quick: QUICK, keys });
+    this.speech = new Speech(link, this.talk, keys);
     this.canvas = h('canvas', { 'aria-label': 'Map of the town with all places' });
     this.map = new MapView(this.canvas);
     this.story = h('p', { class: 'story' });
@@ -29,6 +31,7 @@ export class ParticipantPage {
   }
 
   begin(hello) {
+    this.speech.begin(hello);
     this.story.textContent = hello.story;
     this.windscreen.begin();
     this.map.scale = 2.4;

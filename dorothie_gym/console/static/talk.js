@@ -87,7 +87,7 @@ export class Talk {
   changed() {
     clearTimeout(this.timer);
     const text = this.input.value.trim();
-    if (!text) { this.draft = null; this.overrides.clear(); this.chips.replaceChildren(); return; }
+    if (!text) { this.recorded = this.draft = null; this.overrides.clear(); this.chips.replaceChildren(); return; }
     this.timer = setTimeout(() => { const c = ++this.parsing; this.queries.set(c, text); this.link.send({ k: 'parse', c, text }); }, 220);
   }
 
@@ -111,7 +111,9 @@ export class Talk {
     text = text.trim();
     if (!text) return;
     const spans = !phrase && this.draft?.text === text && this.overrides.size ? this.draft.spans.map(({ text: words, move, slots }) => ({ text: words, move, slots })) : undefined;
-    this.link.command('say', { text, ...(spans && { spans }) });
+    const audio = !phrase && this.recorded || undefined;
+    if (audio) this.recorded = null;
+    this.link.command('say', { text, ...(spans && { spans }), ...(audio && { audio }) });
     this.await(text);
     if (!phrase) { this.input.value = ''; this.draft = null; this.overrides.clear(); this.chips.replaceChildren(); }
   }

@@ -1,4 +1,4 @@
-"""Durations of recorded utterances, from the headers of FLAC and WAV files.
+"""Audio files of recorded utterances, FLAC or WAV, and durations from their headers.
 
 Only the first bytes of a file are read, and no sample is decoded, so that no audio library is needed.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import stat
 import struct
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -29,6 +30,9 @@ _STREAM_INFO: Final = 38
 class AudioFiles:
     """Audio files of a session.
 
+    Attributes:
+        paths: the files by name.
+
     Args:
         folder: folder of the session.
         report: receives the files without a readable header.
@@ -36,6 +40,12 @@ class AudioFiles:
 
     def __init__(self, folder: Path, report: ReadReport) -> None:
         self._folders = [folder / name for name in AUDIO_FOLDERS if (folder / name).is_dir()]
+        self.paths: Mapping[str, Path] = {
+            path.name: path
+            for parent in self._folders
+            for path in sorted(parent.iterdir())
+            if path.suffix in _ENDINGS and path.is_file()
+        }
         self._report = report
         self._known: dict[str, tuple[str, float] | None] = {}
 

@@ -240,7 +240,7 @@ class LogReader:
         first_frame: frame (10 Hz) at which the session begins.
         name: name of the file, for the report.
         report: receives missing, unknown and repaired values.
-        audio: the audio files of the session; None for sessions of this package, which have none.
+        audio: the audio files of the session; None for sessions of this package that have none.
     """
 
     def __init__(

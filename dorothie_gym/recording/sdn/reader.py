@@ -54,6 +54,7 @@ class RawSession:
     first_frame: int
     place: SdnMap
     report: ReadReport
+    audio: Mapping[str, Path]
 
     @property
     def is_ours(self) -> bool:
@@ -102,6 +103,7 @@ def read_sdn(path: Path | str, *, maps: Path | str | None = None, sign: SignVote
         complete=outcome is not None or not isinstance(ending, Mapping),
         name=folder.resolve().name,
         scene=scene,
+        audio=raw.audio,
         report=report,
     )
 
@@ -127,7 +129,8 @@ def raw_session(folder: Path, maps: Path | None) -> RawSession:
         report.miss(f"map of {town or 'the town'!r} (lanes, and angles of turns into a road, are unknown)")
     header = header_of(config, task, layout, place, first, report)
     ours = isinstance(config.get(OURS), Mapping)
-    log = LogReader(rows, first, name, report, audio=None if ours else AudioFiles(folder, report))
+    audio = AudioFiles(folder, report)
+    log = LogReader(rows, first, name, report, audio=None if ours and not audio.paths else audio)
     events, unknown = with_roads(log.events(), log.actions.roads, places, first, place)
     if log.actions.roads:
         report.facts["turns_into_a_road"] = {"found": len(log.actions.roads) - unknown, "unknown": unknown}
@@ -137,7 +140,7 @@ def raw_session(folder: Path, maps: Path | None) -> RawSession:
         more, header = ViewReader(folder, first, report).events(events, header)
         events = sorted([*events, *more], key=lambda event: event.frame)
     _note_files(folder, layout, report)
-    return RawSession(layout, config, task, header, events, places, first, place, report)
+    return RawSession(layout, config, task, header, events, places, first, place, report, audio.paths)
 
 
 def settle_sign(folders: Iterable[Path | str]) -> SignVote:

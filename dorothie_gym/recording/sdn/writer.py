@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shutil
 from collections.abc import Container, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Final
@@ -154,7 +155,8 @@ def _said(data: Mapping[str, object]) -> dict[str, object]:
     kept = data.get("sdn_act")
     if isinstance(kept, Mapping):
         act = {**kept, **act}
-    act |= _more(data, _SAID)
+    is_of_span = _OF_SPAN.fullmatch(str(data.get("audio")))
+    act |= _more(data, (*_SAID, "audio") if is_of_span else _SAID)
     said = {"utterance_gt": data["text"], "utterance_filename": _file(data), "act": act}
     return said if data.get("recognised") is None else {**said, "utterance": data["recognised"]}
 
@@ -168,6 +170,8 @@ def _file(data: Mapping[str, object]) -> str:
 def _write_audio(folder: Path, session: Session) -> None:
     """Writes the audio of each utterance, joined from that of its spans; those of which a file is missing are left out.
 
+    A file that holds a whole utterance is copied.
+
     Raises:
         AudioError: a file is damaged.
         SpeechError: the extra `speech` is not installed.
@@ -177,10 +181,15 @@ def _write_audio(folder: Path, session: Session) -> None:
     folder.mkdir()
     for utterance in session.utterances():
         events = [session.events[move.index].data for move in utterance.moves]
-        paths = [session.audio.get(str(data.get("audio"))) for data in events]
-        found = [read_audio(path) for path in paths if path is not None]
-        if len(found) == len(paths):
-            write_atomically(folder / _file(events[0]), encode_flac(np.concatenate(found)))
+        names = list(dict.fromkeys(str(data.get("audio")) for data in events))
+        if not all(name in session.audio for name in names):
+            continue
+        paths, stem = [session.audio[name] for name in names], Path(_file(events[0])).stem
+        if len(paths) == 1:
+            shutil.copyfile(paths[0], folder / (stem + paths[0].suffix))
+        else:
+            joined = np.concatenate([read_audio(path) for path in paths])
+            write_atomically(folder / f"{stem}.flac", encode_flac(joined))
 
 
 def _physical(data: Mapping[str, object]) -> dict[str, object]:

@@ -1,0 +1,130 @@
+"""Speech in real browsers, with a microphone that plays a file. Needs Chromium."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+pytest.importorskip("uvicorn", reason="needs the extra console")
+
+from dorothie_gym.console.config import ConsoleConfig  # noqa: E402
+from dorothie_gym.console.room import Room  # noqa: E402
+from dorothie_gym.console.seating import parse_roles  # noqa: E402
+from dorothie_gym.engine.session_engine import SessionEngine  # noqa: E402
+from dorothie_gym.speech import encode_wav, find_synthesizer, resample, say  # noqa: E402
+from tests.console.people import SEED, TOWN  # noqa: E402
+from tests.console.serving import Served  # noqa: E402
+from tests.console.test_browser_pictures import CHROMIUM, FLAGS, WAIT  # noqa: E402
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed (Debian: apt-get install chromium)"),
+]
+
+TURN = "Turn left at the KFC, please."
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """Chromium whose microphone says `TURN` over and over, with pauses."""
+    file = tmp_path_factory.mktemp("microphone") / "turn.wav"
+    pause = np.zeros(8000, dtype=np.float32)
+    samples = np.concatenate([pause, say(find_synthesizer(), TURN), pause])
+    file.write_bytes(encode_wav(resample(samples, 16000, 48000), 48000))
+    flags = [
+        *FLAGS, "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
+        f"--use-file-for-fake-audio-capture={file}", "--autoplay-policy=no-user-gesture-required",
+    ]  # fmt: skip
+    with sync_api.sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=flags)
+        yield launched
+        launched.close()
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Served]:
+    config = ConsoleConfig(pictures=False, speech=True)
+    engine = SessionEngine(TOWN, config=config.environment())
+    room = Room(engine, parse_roles("participant=human,co_wizard=human"), config, seed=SEED, folder=tmp_path / "out")
+    with Served(room) as running:
+        yield running
+
+
+def opened(browser: Any, served: Served, seat: str, errors: list[str]) -> Any:
+    page = browser.new_context(permissions=["microphone"]).new_page()
+    page.set_default_timeout(WAIT)
+    page.on("pageerror", lambda error: errors.append(f"{seat}: {error}"))
+    page.on("console", lambda line: errors.append(f"{seat}: {line.text}") if line.type == "error" else None)
+    page.goto(f"http://127.0.0.1:{served.port}/seat#{served.room.seats[seat].token}")
+    page.wait_for_selector(f"body[data-ready={seat}]")
+    return page
+
+
+def until(page: Any, reached: str) -> None:
+    """Waits for an expression of the page; the page's policy forbids Playwright's own way."""
+    end = time.monotonic() + WAIT / 1000.0
+    while not page.evaluate(reached):
+        assert time.monotonic() < end, reached
+        time.sleep(0.1)
+
+
+def talk_for(page: Any, seconds: float) -> None:
+    """Holds the button down for a time [s]."""
+    box = page.locator(".speech .hold").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    time.sleep(seconds)
+    page.mouse.up()
+
+
+def test_held_button_records_and_words_appear_with_their_acts(browser: Any, served: Served, tmp_path: Path) -> None:
+    errors: list[str] = []
+    page, other = (opened(browser, served, seat, errors) for seat in ("participant", "co_wizard"))
+    other.locator("#aloud").check()
+    talk_for(page, 4.0)
+    until(page, "document.querySelector('#words').value.includes('KFC')")
+    page.wait_for_selector(".talk > .chips .chip")
+    assert "Instruct" in page.locator(".talk > .chips").inner_text()
+    assert other.locator(".line.participant").count() == 0, "nothing is said before it is sent"
+    page.locator("#words").press("Enter")
+    other.wait_for_selector(".line.participant")
+    assert "KFC" in other.locator(".line.participant").first.inner_text()
+    until(other, "performance.getEntriesByType('resource').some(each => each.name.includes('/speech/said/'))")
+    page.locator("#at-once").check()
+    talk_for(page, 4.0)
+    until(page, "document.querySelectorAll('.line.own').length > 1")
+    assert page.locator("#words").input_value() == ""
+    deadline = time.monotonic() + 30.0
+    folder = next((tmp_path / "out").iterdir())
+    while time.monotonic() < deadline and (folder / "seats.jsonl").read_text("utf-8").count('"audio"') < 2:
+        time.sleep(0.2)
+    assert {path.name for path in (folder / "utterance").iterdir()} == {"participant_1.flac", "participant_2.flac"}
+    assert not errors
+
+
+def test_key_begins_and_ends_a_turn(browser: Any, served: Served) -> None:
+    errors: list[str] = []
+    page, _ = (opened(browser, served, seat, errors) for seat in ("participant", "co_wizard"))
+    page.locator("main").press("t")
+    page.wait_for_selector(".speech .hold[aria-pressed=true]")
+    time.sleep(4.0)
+    page.locator("main").press("t")
+    until(page, "document.querySelector('#words').value.toLowerCase().includes('left')")
+    assert page.locator(".speech .hold").get_attribute("aria-pressed") == "false"
+    assert not errors
+
+
+def test_missing_microphone_is_reported_and_typing_goes_on(browser: Any, served: Served) -> None:
+    errors: list[str] = []
+    page = opened(browser, served, "participant", errors)
+    page.evaluate("() => { navigator.mediaDevices.getUserMedia = () => Promise.reject(new Error('no device')); }")
+    talk_for(page, 0.3)
+    until(page, "document.body.innerText.includes('The microphone cannot be used: no device')")
+    assert page.locator(".speech .hold").get_attribute("aria-pressed") == "false"
+    assert page.locator("#words").is_enabled() and not errors
