@@ -112,3 +112,14 @@ def test_questions_of_the_participant_are_understood_as_they_are_meant():
         for _ in range(20):
             text = word_act(item.act, Role.PARTICIPANT, rng, item.wording)
             assert understand(text).asked == question, text
+
+
+@pytest.mark.parametrize("question", ["When do ugh get there?", "why did you turn aunt?", "How will you chat there?"])
+def test_question_of_which_nothing_was_understood_is_asked_again(question):
+    assert reply(question).act.move is M.CONFUSE
+
+
+@pytest.mark.parametrize("question", ["where are we?", "what street is this?"])
+def test_question_for_the_street_is_answered_by_it(question):
+    (said,) = reply(question).meaning
+    assert said.predicate is Predicate.ON_STREET

@@ -66,6 +66,23 @@ def test_arrival_question_before_goal_is_denied_with_nudge() -> None:
     assert human.moves() == [M.REPLY_N, M.INSTRUCT]
 
 
+def test_car_that_does_not_move_is_asked_why_instead_of_being_told_a_third_time() -> None:
+    human = Guide(14.0)
+    told = []
+    for _ in range(4):
+        human.says()
+        told.append(human.state.speech.queue[0].act)
+        human.state.speech = replace(human.state.speech.cleared(), last_end=-100.0)
+        human.observation["time"] = human.observation["time"] + 10.0
+    further, why, start = (
+        DialogueAct.of(move, action)
+        for move, action in (
+            (M.INSTRUCT, ActionValue.LANE_FOLLOW), (M.QUERY_W, ActionValue.STOP), (M.INSTRUCT, ActionValue.START),
+        )
+    )  # fmt: skip
+    assert told == [further, further, why, start]
+
+
 def test_goal_question_right_after_announcement_is_not_answered() -> None:
     human = Human()
     human.observation["time"] = np.array([60.0])

@@ -5,7 +5,7 @@ import pytest
 
 from dorothie_gym.dialogue import Direction, Wording
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, Role
+from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, Role
 from dorothie_gym.policies import ScriptedParticipant
 from dorothie_gym.policies.participant.config import ParticipantStyle
 from dorothie_gym.policies.participant.repairs import correction, has_missed
@@ -49,6 +49,13 @@ class Human:
 
     def moves(self) -> list[DialogueMove]:
         return [item.act.move for item in self.state.speech.queue]
+
+
+def test_car_that_gives_up_the_present_errand_is_corrected():
+    human = Human()
+    human.hears(M.CONFIRM, human.state.task.goal.name, GoalStatus.ABANDONED)
+    clarified = [item.act for item in human.state.speech.queue if item.act.move is M.CLARIFY]
+    assert clarified and human.state.task.goal.name in clarified[0].slots
 
 
 @pytest.mark.parametrize("move", [M.ACKNOWLEDGE, M.CONFIRM])

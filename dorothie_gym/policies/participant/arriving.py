@@ -10,6 +10,7 @@ from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition,
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
@@ -191,9 +192,17 @@ def _guide_standing(state: ParticipantState, view: ParticipantView, left: float)
 
 
 def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
-    """Returns the instruction for a car that stands a little before the place."""
+    """Returns the instruction for a car that stands a little before the place.
+
+    A car that does not move is asked why instead of being told a third time, and then told to start.
+    """
     assert state.route.progress is not None
-    state.guidance = state.guidance.after_nudging(view.time)
+    since = view.time if state.motion.standing_since is None else state.motion.standing_since
+    state.guidance = state.guidance.after_nudging(view.time, since)
+    if state.guidance.nudges > IN_VAIN and state.guidance.nudges % 2 == 1:
+        return why_standing(state, view)
+    if state.guidance.nudges > IN_VAIN:
+        return order(DialogueMove.INSTRUCT, ActionValue.START)
     left = state.route.progress.left(view.station)
     if left > 30.0:
         state.guidance = state.guidance.with_approach_announced(False)

@@ -25,10 +25,10 @@ from dorothie_gym.policies.participant.hints import hint
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import (
     IN_VAIN,
-    ask_why_standing,
     remark_on_miss,
     remark_on_wrong_turn,
     stop_circling,
+    why_standing,
 )
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey
 from dorothie_gym.policies.participant.view import ParticipantView
@@ -156,7 +156,7 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
         near = True
     if stuck and state.guidance.step == key and state.guidance.repeats + 1 >= IN_VAIN:
         note_step(state, view, ("why", view.lane, 0))
-        ask_why_standing(state, view)
+        state.say(why_standing(state, view))
         return
     overdue = stuck or (key[0] != "turn" and waited > config.repeat_after)
     changing = state.guidance.step is not None and state.guidance.step[0] == "lane"

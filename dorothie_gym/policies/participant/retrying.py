@@ -78,11 +78,11 @@ def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
     _try_another_way(state, view, tried)
 
 
-def ask_why_standing(state: ParticipantState, view: ParticipantView) -> None:
-    """Asks why the car stands although it was told to drive on, instead of telling it a third time."""
+def why_standing(state: ParticipantState, view: ParticipantView) -> Remark:
+    """Returns the question why the car stands although it was told to drive on, instead of telling it a third time."""
     stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
     state.conversation = state.conversation.after_asking_why(view.time)
-    state.say(intend(CommunicativeFunction.SET_QUESTION, stands))
+    return intend(CommunicativeFunction.SET_QUESTION, stands)
 
 
 def _in_vain(view: ParticipantView, action: ActionValue | None, topic: str) -> Remark:

@@ -212,6 +212,7 @@ class GuidanceState:
         points_out: whether these words only state that this is the place.
         stopped_at: time of the last stop instruction [s].
         nudged_at: time of the last instruction to drive on a little [s].
+        nudges: number of such instructions, and of remarks about them, while the car has stood.
         considered: last step for which it was decided whether to wait for a question of the car.
         left_to_ask: result of that decision.
     """
@@ -231,6 +232,7 @@ class GuidanceState:
     points_out: bool = False
     stopped_at: float = -math.inf
     nudged_at: float = -math.inf
+    nudges: int = 0
     considered: StepKey | None = None
     left_to_ask: bool = False
 
@@ -307,9 +309,9 @@ class GuidanceState:
         """Records an instruction to stop; if it has to be repeated, it is a plain one."""
         return replace(self, stopped_at=now, stop_text="" if self.points_out else self.stop_text, points_out=False)
 
-    def after_nudging(self, now: float) -> GuidanceState:
-        """Records an instruction to drive on a little."""
-        return replace(self, nudged_at=now)
+    def after_nudging(self, now: float, standing_since: float) -> GuidanceState:
+        """Records an instruction at `now` [s] to drive on a little, to a car that has stood since a time [s]."""
+        return replace(self, nudged_at=now, nudges=self.nudges + 1 if self.nudged_at >= standing_since else 1)
 
     def with_consideration(self, step: StepKey, left_to_ask: bool) -> GuidanceState:
         """Records whether a step is left to a question of the car."""
