@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,18 +12,25 @@ import typer
 
 from dorothie_gym.cli.options import needs
 from dorothie_gym.cli.output import fail
-from dorothie_gym.policies.language_model.config import URL_VARIABLE, SimulatedTime
 
 if TYPE_CHECKING:
     from dorothie_gym.policies.language_model import LanguageModelConfig
 
 _PANEL = "Language models (llm:MODEL)"
 
+
+class AnswerTime(enum.StrEnum):
+    """What happens to the session while the model answers: `SimulatedTime`, whose import takes long."""
+
+    WAITS = "waits"
+    CHARGED = "charged"
+
+
 LlmUrl = Annotated[
     str | None,
     typer.Option(
         metavar="URL",
-        help=f"Endpoint with OpenAI's chat interface, such as http://localhost:8000/v1; default: ${URL_VARIABLE}. The "
+        help="Endpoint with OpenAI's chat interface, such as http://localhost:8000/v1; default: $OPENAI_BASE_URL. The "
         f"key is read from $OPENAI_API_KEY ({needs('llm')}).",
         rich_help_panel=_PANEL,
     ),
@@ -34,7 +42,7 @@ LlmTokens = Annotated[
     int, typer.Option(min=16, max=100_000, help="Largest number of tokens of an answer.", rich_help_panel=_PANEL)
 ]
 LlmTime = Annotated[
-    SimulatedTime,
+    AnswerTime,
     typer.Option(
         help="The session waits for answers, or goes on: an answer then takes effect after the time of the call.",
         rich_help_panel=_PANEL,
@@ -69,7 +77,7 @@ class LanguageModelOptions:
     url: str | None
     timeout: float
     tokens: int
-    time: SimulatedTime
+    time: AnswerTime
     pictures: bool
     cassette: Path | None
     replay: bool
@@ -78,6 +86,7 @@ class LanguageModelOptions:
     def config(self) -> LanguageModelConfig:
         """Returns the settings; the name of the model is a placeholder. Exits if they are incomplete or wrong."""
         from dorothie_gym.policies.language_model import LanguageModelConfig
+        from dorothie_gym.policies.language_model.config import URL_VARIABLE, SimulatedTime
 
         url = self.url or os.environ.get(URL_VARIABLE, "")
         if not url and not self.replay:
@@ -88,7 +97,7 @@ class LanguageModelOptions:
                 url=url,
                 timeout=self.timeout,
                 max_tokens=self.tokens,
-                time=self.time,
+                time=SimulatedTime(self.time.value),
                 pictures=self.pictures,
                 cassette=self.cassette,
                 offline=self.replay,

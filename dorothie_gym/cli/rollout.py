@@ -12,6 +12,7 @@ import typer
 
 from dorothie_gym.cli.completion import complete_towns
 from dorothie_gym.cli.language_model import (
+    AnswerTime,
     LanguageModelOptions,
     LlmCassette,
     LlmPictures,
@@ -49,7 +50,6 @@ from dorothie_gym.cli.output import (
 )
 from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.policies.language_model.config import SimulatedTime
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def rollout(
     llm_url: LlmUrl = None,
     llm_timeout: LlmTimeout = 30.0,
     llm_tokens: LlmTokens = 300,
-    llm_time: LlmTime = SimulatedTime.WAITS,
+    llm_time: LlmTime = AnswerTime.WAITS,
     llm_pictures: LlmPictures = False,
     llm_cassette: LlmCassette = None,
     llm_replay: LlmReplay = False,

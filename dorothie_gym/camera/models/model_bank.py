@@ -57,7 +57,8 @@ class ModelBank:
     """Models of all bodies.
 
     Attributes:
-        mesh: triangles of all models in their own frames: x forward, y to the right, origin on the ground.
+        mesh: triangles of all models in their own frames: x forward, y to the right, origin on the ground; without
+            components.
         ranges: first triangle of each model and the one after its last, (n, 2) int32.
         boxes: smallest and largest x, y, z of each model (n, 2, 3) float32 [m].
     """
@@ -84,7 +85,8 @@ def model_bank() -> ModelBank:
     models += [prop_model(kind) for kind in PropKind]
     ends = np.cumsum([0, *(model.size for model in models)])
     boxes = np.array([(m.corners.min(axis=(0, 1)), m.corners.max(axis=(0, 1))) for m in models], dtype=np.float32)
-    return ModelBank(joined(models), np.column_stack((ends[:-1], ends[1:])).astype(np.int32), boxes)
+    mesh = joined(models)._replace(components=np.zeros((12, 0), np.float32))  # only copies at their places are drawn
+    return ModelBank(mesh, np.column_stack((ends[:-1], ends[1:])).astype(np.int32), boxes)
 
 
 class PlacementRecord:
