@@ -69,7 +69,7 @@ def test_arrival_question_before_goal_is_denied_with_nudge() -> None:
 def test_car_that_does_not_move_is_asked_why_instead_of_being_told_a_third_time() -> None:
     human = Guide(14.0)
     told = []
-    for _ in range(4):
+    for _ in range(6):
         human.says()
         told.append(human.state.speech.queue[0].act)
         human.state.speech = replace(human.state.speech.cleared(), last_end=-100.0)
@@ -80,7 +80,7 @@ def test_car_that_does_not_move_is_asked_why_instead_of_being_told_a_third_time(
             (M.INSTRUCT, ActionValue.LANE_FOLLOW), (M.QUERY_W, ActionValue.STOP), (M.INSTRUCT, ActionValue.START),
         )
     )  # fmt: skip
-    assert told == [further, further, why, start]
+    assert told == [further, further, why, further, start, why]
 
 
 def test_goal_question_right_after_announcement_is_not_answered() -> None:

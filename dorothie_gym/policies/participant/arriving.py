@@ -194,14 +194,15 @@ def _guide_standing(state: ParticipantState, view: ParticipantView, left: float)
 def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
     """Returns the instruction for a car that stands a little before the place.
 
-    A car that does not move is asked why instead of being told a third time, and then told to start.
+    A car that does not move is asked why instead of being told a third time; then it is told again, and to start.
     """
     assert state.route.progress is not None
     since = view.time if state.motion.standing_since is None else state.motion.standing_since
     state.guidance = state.guidance.after_nudging(view.time, since)
-    if state.guidance.nudges > IN_VAIN and state.guidance.nudges % 2 == 1:
+    again, attempt = divmod(state.guidance.nudges, IN_VAIN + 1)
+    if attempt == 0:
         return why_standing(state, view)
-    if state.guidance.nudges > IN_VAIN:
+    if again and attempt == IN_VAIN:
         return order(DialogueMove.INSTRUCT, ActionValue.START)
     left = state.route.progress.left(view.station)
     if left > 30.0:
