@@ -33,7 +33,7 @@ def corpus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     policies = {role: make_policy("scripted", role, env.limits) for role in AGENT_ROLES}
     for seed in range(28):
         fold = "train" if seed < 26 else "val/seen"
-        play_session(env, policies, seed=seed + 5, folder=root / fold / f"{seed:04}")
+        play_session(env, policies, seed=seed + 8, folder=root / fold / f"{seed:04}")
     return root
 
 
