@@ -1,4 +1,4 @@
-"""What commands with a web server share: options, libraries, address, and the server."""
+"""Shared parts of commands with a web server: options, libraries, address, and the server."""
 
 from __future__ import annotations
 

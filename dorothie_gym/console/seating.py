@@ -6,9 +6,9 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from dorothie_gym.errors import SettingsError, did_you_mean
+from dorothie_gym.errors import PolicyLoadError, SettingsError, did_you_mean
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies.policy_loader import SCRIPTED, Player, find_player
+from dorothie_gym.policies.policy_loader import LANGUAGE_MODEL, SCRIPTED, Player, find_player
 
 
 class Occupancy(enum.StrEnum):
@@ -52,7 +52,7 @@ def parse_roles(text: str) -> dict[Role, SeatPlan]:
 
     Raises:
         SettingsError: a role is unknown or named twice, or has no value.
-        PolicyLoadError: there is no such policy.
+        PolicyLoadError: there is no such policy, or it cannot play in real time.
     """
     given: dict[Role, str] = {}
     last: Role | None = None
@@ -68,10 +68,24 @@ def parse_roles(text: str) -> dict[Role, SeatPlan]:
         if role in given:
             raise SettingsError(f"--roles: {role.value} is named twice; give it one player")
         given[role], last = value.strip(), role
-    return {role: _plan(given.get(role, Occupancy.OPEN.value), role) for role in AGENT_ROLES}
+    return {role: plan_seat(given.get(role, Occupancy.OPEN.value), role) for role in AGENT_ROLES}
 
 
-def _plan(given: str, role: Role) -> SeatPlan:
+def plan_seat(given: str, role: Role) -> SeatPlan:
+    """Returns the plan of a seat.
+
+    Args:
+        given: "human", "open", or a policy by name or file.
+        role: role of the seat.
+
+    Raises:
+        PolicyLoadError: there is no such policy, or it cannot play in real time.
+    """
+    if given.startswith(LANGUAGE_MODEL):
+        raise PolicyLoadError(
+            f"{role.value}: {given} cannot play with people in real time, because each call would hold up "
+            "all seats; language models play in `dorothie-gym run` and `rollout`"
+        )
     if given in (Occupancy.HUMAN.value, Occupancy.OPEN.value):
         return SeatPlan(occupancy=Occupancy(given))
     return SeatPlan(occupancy=Occupancy.POLICY, player=find_player(given, role))

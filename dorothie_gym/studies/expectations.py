@@ -1,4 +1,4 @@
-"""What a field of a study file expects, in words: for error messages."""
+"""Expected content of the fields of a study file, in words for error messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the browser of a participant is sent at each stage: texts, questions, and the token of the participant's seat.
+"""Data for the browser of a participant at each stage: texts, questions, and the token of the participant's seat.
 
 It holds nothing about conditions, other people or the assignment.
 """

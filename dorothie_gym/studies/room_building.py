@@ -10,12 +10,11 @@ from typing import Final
 from dorothie_gym.console.config import AbsenceRules, AfterAbsence, ConsoleConfig, WhileAway
 from dorothie_gym.console.resuming import Resumed
 from dorothie_gym.console.room import Room
-from dorothie_gym.console.seating import Occupancy, SeatPlan
+from dorothie_gym.console.seating import plan_seat
 from dorothie_gym.console.town_page import town_page
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies.policy_loader import find_player
 from dorothie_gym.recording import Session, SessionState, session_state
 from dorothie_gym.rollout.replay import begin_replay
 from dorothie_gym.studies.record_types import SESSIONS_FOLDER, SessionRow
@@ -48,7 +47,7 @@ class RoomBuilder:
         assert tutorial is not None
         absence = AbsenceRules(while_away=WhileAway.PAUSE, then=AfterAbsence.WAIT)
         config = self._config(tutorial.seconds, 0.0, absence)
-        plans = {each: _plan(HUMAN if each is role else "scripted", each) for each in AGENT_ROLES}
+        plans = {each: plan_seat(HUMAN if each is role else "scripted", each) for each in AGENT_ROLES}
         return Room(self._engine(tutorial.scenario, config), plans, config, seed=self._study.assignment.seed)
 
     def session(self, row: SessionRow, people: Mapping[Role, str]) -> Room:
@@ -65,7 +64,7 @@ class RoomBuilder:
         rules = self._study.absence
         absence = AbsenceRules(while_away=rules.while_away, seconds=rules.seconds, then=rules.then)
         config = self._config(self._study.session.max_seconds, condition.word_error_rate, absence)
-        plans = {role: _plan(player, role) for role, player in condition.players.items()}
+        plans = {role: plan_seat(player, role) for role, player in condition.players.items()}
         ids = {role.value: name for role, name in people.items()}
         extra = {STUDY_FIELD: {"session": row.id, "condition": row.condition, "participants": ids}}
         scenario, resumed = Scenario(town=row.town, storyboard=row.storyboard), self._left_behind(row)
@@ -110,9 +109,3 @@ class RoomBuilder:
         engine = SessionEngine(town, storyboard, config=config.environment())
         town_page(engine.town)  # browsers are served at once
         return engine
-
-
-def _plan(player: str, role: Role) -> SeatPlan:
-    if player == HUMAN:
-        return SeatPlan(occupancy=Occupancy.HUMAN)
-    return SeatPlan(occupancy=Occupancy.POLICY, player=find_player(player, role))

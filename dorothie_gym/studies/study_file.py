@@ -11,10 +11,10 @@ from typing import Any, Final, NoReturn
 import msgspec
 import yaml
 
-from dorothie_gym.errors import DorothieGymError, InputFileError, one_line, short_repr
+from dorothie_gym.console.seating import Occupancy, plan_seat
+from dorothie_gym.errors import DorothieGymError, InputFileError, PolicyLoadError, one_line, short_repr
 from dorothie_gym.input_files import read_text
 from dorothie_gym.maps import load_town
-from dorothie_gym.policies.policy_loader import find_player
 from dorothie_gym.studies.expectations import explain
 from dorothie_gym.studies.items import Choice, Number
 from dorothie_gym.studies.study import HUMAN, Method, Scenario, Study
@@ -207,8 +207,8 @@ def check_sources(study: Study, path: Path) -> None:
     for k, condition in enumerate(study.conditions):
         for role, player in condition.players.items():
             try:
-                if player != HUMAN:
-                    find_player(player, role)
+                if plan_seat(player, role).occupancy is Occupancy.OPEN:
+                    raise PolicyLoadError(f"{role.value}: seats of studies are not open; give {HUMAN!r} or a policy")
             except DorothieGymError as error:
                 raise InputFileError(path, str(error), f"conditions[{k}].{role.value}") from None
 

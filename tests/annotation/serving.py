@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import json
-import threading
 import urllib.error
 import urllib.request
 from pathlib import Path
 from typing import Any
 
-import uvicorn
-
 from dorothie_gym.annotation.server import AnnotationServer
 from dorothie_gym.annotation.workplace import Seat, SeatKind, Workplace
 from dorothie_gym.recording import Corpus
+from tests.served_application import ServedApplication
 
 
-class Served:
+class Served(ServedApplication):
     """Server with the annotators Anna and Ben, and the adjudicator Carol."""
 
     def __init__(self, corpus: Path, *, pre_annotate: bool = False) -> None:
@@ -25,22 +23,7 @@ class Served:
         self.corpus = corpus
         workplace = Workplace(Corpus.load(corpus).entries, list(self.seats.values()), pre_annotate=pre_annotate)
         self.application = AnnotationServer(workplace)
-        config = uvicorn.Config(self.application.app(), port=0, log_level="warning")
-        self.server = uvicorn.Server(config)
-        self.thread = threading.Thread(target=self.server.run, daemon=True)
-
-    def __enter__(self) -> Served:
-        self.thread.start()
-        while not self.server.started:
-            assert self.thread.is_alive()
-            threading.Event().wait(0.02)
-        self.port = self.server.servers[0].sockets[0].getsockname()[1]
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.server.should_exit = True
-        self.thread.join(10.0)
-        assert not self.thread.is_alive()
+        super().__init__(self.application.app())
 
     def link(self, name: str) -> str:
         return f"http://127.0.0.1:{self.port}/annotate#{self.seats[name].token}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -13,43 +12,31 @@ from typing import Any
 import numpy as np
 import pytest
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+pytest.importorskip("playwright.sync_api", reason="needs playwright")
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
-from dorothie_gym.annotation.corpus_agreement import corpus_agreement  # noqa: E402
-from dorothie_gym.annotation.log import ADJUDICATED, read_annotation  # noqa: E402
-from dorothie_gym.annotation.marks import Annotation, SpanMark  # noqa: E402
-from dorothie_gym.annotation.source_text import SourceText  # noqa: E402
-from dorothie_gym.engine.config import EnvConfig  # noqa: E402
-from dorothie_gym.engine.session_engine import SessionEngine  # noqa: E402
-from dorothie_gym.ontology import AGENT_ROLES, DialogueMove, LandmarkName, UnitEnd  # noqa: E402
-from dorothie_gym.policies import make_policy  # noqa: E402
-from dorothie_gym.recording import Corpus, EventType, Session  # noqa: E402
-from dorothie_gym.rollout import play_session  # noqa: E402
-from dorothie_gym.speech import encode_flac  # noqa: E402
-from tests.annotation.builders import recorded  # noqa: E402
-from tests.annotation.serving import Served  # noqa: E402
+from dorothie_gym.annotation.corpus_agreement import corpus_agreement
+from dorothie_gym.annotation.log import ADJUDICATED, read_annotation
+from dorothie_gym.annotation.marks import Annotation, SpanMark
+from dorothie_gym.annotation.source_text import SourceText
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.ontology import AGENT_ROLES, DialogueMove, LandmarkName, UnitEnd
+from dorothie_gym.policies import make_policy
+from dorothie_gym.recording import Corpus, EventType, Session
+from dorothie_gym.rollout import play_session
+from dorothie_gym.speech import encode_flac
+from tests.annotation.builders import recorded
+from tests.annotation.serving import Served
+from tests.chromium import IN_CHROMIUM, WAIT, chromium
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed (Debian: apt-get install chromium)"),
-]
-
-FLAGS = [
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--autoplay-policy=no-user-gesture-required",
-]  # fmt: skip
-WAIT = 30_000  # [ms] for a busy machine
+pytestmark = IN_CHROMIUM
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with sync_api.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+    with chromium("--autoplay-policy=no-user-gesture-required") as launched:
         yield launched
-        launched.close()
 
 
 @pytest.fixture(scope="module")

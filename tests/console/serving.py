@@ -4,43 +4,25 @@ from __future__ import annotations
 
 import contextlib
 import json
-import threading
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from typing import Any
 
-import uvicorn
 import websockets.sync.client as sockets
 
 from dorothie_gym.console.messages import MAX_BYTES
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.server import Console
+from tests.served_application import ServedApplication
 
 
-class Served:
+class Served(ServedApplication):
     """Console that runs on a free port in a thread."""
 
     def __init__(self, room: Room) -> None:
         self.room, self.console = room, Console([room])
-        config = uvicorn.Config(
-            self.console.app(), port=0, log_level="warning", ws="websockets-sansio", ws_max_size=2 * MAX_BYTES
-        )  # fmt: skip
-        self.server = uvicorn.Server(config)
-        self.thread = threading.Thread(target=self.server.run, daemon=True)
-
-    def __enter__(self) -> Served:
-        self.thread.start()
-        while not self.server.started:
-            assert self.thread.is_alive()
-            threading.Event().wait(0.02)
-        self.port = self.server.servers[0].sockets[0].getsockname()[1]
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.server.should_exit = True
-        self.thread.join(10.0)
-        assert not self.thread.is_alive()
+        super().__init__(self.console.app(), ws="websockets-sansio", ws_max_size=2 * MAX_BYTES)
 
     def get(self, path: str) -> tuple[int, Any, bytes]:
         try:

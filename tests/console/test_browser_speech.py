@@ -10,22 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+pytest.importorskip("playwright.sync_api", reason="needs playwright")
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
-from dorothie_gym.console.config import ConsoleConfig  # noqa: E402
-from dorothie_gym.console.room import Room  # noqa: E402
-from dorothie_gym.console.seating import parse_roles  # noqa: E402
-from dorothie_gym.engine.session_engine import SessionEngine  # noqa: E402
-from dorothie_gym.speech import encode_wav, find_synthesizer, resample, say  # noqa: E402
-from tests.console.people import SEED, TOWN  # noqa: E402
-from tests.console.serving import Served  # noqa: E402
-from tests.console.test_browser_pictures import CHROMIUM, FLAGS, WAIT  # noqa: E402
+from dorothie_gym.console.config import ConsoleConfig
+from dorothie_gym.console.room import Room
+from dorothie_gym.console.seating import parse_roles
+from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.speech import encode_wav, find_synthesizer, resample, say
+from tests.chromium import IN_CHROMIUM, WAIT, chromium
+from tests.console.people import SEED, TOWN
+from tests.console.serving import Served
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed (Debian: apt-get install chromium)"),
-]
+pytestmark = IN_CHROMIUM
 
 TURN = "Turn left at the KFC, please."
 
@@ -38,13 +35,11 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     samples = np.concatenate([pause, say(find_synthesizer(), TURN), pause])
     file.write_bytes(encode_wav(resample(samples, 16000, 48000), 48000))
     flags = [
-        *FLAGS, "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
+        "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
         f"--use-file-for-fake-audio-capture={file}", "--autoplay-policy=no-user-gesture-required",
     ]  # fmt: skip
-    with sync_api.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=flags)
+    with chromium(*flags) as launched:
         yield launched
-        launched.close()
 
 
 @pytest.fixture

@@ -32,3 +32,8 @@ def test_mistakes_are_named(text: str) -> None:
 def test_unknown_policies_are_named() -> None:
     with pytest.raises(PolicyLoadError, match="there is no policy 'robot'"):
         parse_roles("participant=robot")
+
+
+def test_language_models_do_not_play_in_real_time() -> None:
+    with pytest.raises(PolicyLoadError, match="co_wizard: llm:any cannot play with people in real time"):
+        parse_roles("co_wizard=llm:any")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import random
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +13,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from tests.malformed.side_files import (
+    make_annotations,
+    make_cassette,
+    make_study,
+    read_annotations,
+    read_cassette,
+    read_study,
+)
 from tests.maps import opendrive_text as xodr
 from tests.maps.yaml_text import MIDTOWN
 from tests.recording.builders import write
@@ -69,40 +76,6 @@ def _native(folder: Path) -> None:
     with SeatLogWriter(folder / "two") as log:
         log.append(SeatEvent(frame=3, kind=SeatEventKind.JOINED, role=Role.CO_WIZARD, data={"seconds": None}))
         log.append(SeatEvent(frame=9, kind=SeatEventKind.PAUSED, data={"reason": "absence"}))
-
-
-def _annotations(folder: Path) -> None:
-    from dorothie_gym.annotation.formats import Format, export_annotation
-    from tests.annotation.builders import annotate, random_annotation, recorded
-
-    one, text = recorded(folder / "one")
-    for seed, name in enumerate(("anna", "ben", "adjudicated")):
-        annotate(folder / "one", text, name, random_annotation(text, random.Random(seed), complete=True))
-    for to in (Format.JSONL, Format.ELAN):
-        export_annotation(one, random_annotation(text, random.Random(7)), "carl", folder / f"carl{to.suffix}", to)
-
-
-def _read_annotations(folder: Path) -> None:
-    from dorothie_gym.annotation.corpus_agreement import corpus_agreement
-    from dorothie_gym.annotation.formats import import_annotation
-    from dorothie_gym.errors import DorothieGymError
-    from dorothie_gym.recording import Corpus, Session
-
-    refusals: list[DorothieGymError] = []
-    session = None
-    try:
-        session = Session.load(folder / "one")
-        corpus_agreement(Corpus.load(folder).entries, with_alpha=False)
-    except DorothieGymError as error:
-        refusals.append(error)
-    for name in ("carl.jsonl", "carl.eaf"):
-        try:
-            if session is not None:
-                import_annotation(session, folder / name)
-        except DorothieGymError as error:
-            refusals.append(error)
-    if refusals:
-        raise refusals[0]
 
 
 def _read_sessions(folder: Path) -> None:
@@ -362,26 +335,6 @@ def _read_model(folder: Path) -> None:
         find_player(str(path), Role.CO_WIZARD).make(Role.CO_WIZARD, SpaceLimits())
 
 
-def _cassette(folder: Path) -> None:
-    from dorothie_gym.policies.language_model.cassette import Cassette, Reply
-    from dorothie_gym.policies.language_model.faults import Fault
-    from dorothie_gym.policies.language_model.usage import ModelUsage
-
-    tape = Cassette(folder / "tape.jsonl")
-    tape.add({"model": "m", "seed": 1}, Reply(answer='{"drive": "Stop"}', tokens=(900, 20), latency=0.5))
-    tape.add({"model": "m", "seed": 2}, Reply(fault=Fault.TIMEOUT, reason="no answer", retried=True, latency=30.0))
-    usage = ModelUsage(model="m", calls=2, answers=1, cost=0.01, silences={"timeout": 1})
-    (folder / "usage.json").write_text(json.dumps({"co_wizard": usage.to_json()}))
-
-
-def _read_cassette(folder: Path) -> None:
-    from dorothie_gym.policies.language_model.cassette import Cassette
-    from dorothie_gym.rollout.closed_loop.usage import read_usage
-
-    Cassette(folder / "tape.jsonl").find({"model": "m", "seed": 1})
-    read_usage(folder)
-
-
 # --- Caches, with correct checksums ----------------------------------------------------------------------------------
 
 
@@ -467,23 +420,6 @@ def _read_audio(folder: Path) -> None:
     read_audio(folder / "speech.flac")
 
 
-def _study(folder: Path) -> None:
-    from importlib.resources import files
-
-    example = files("dorothie_gym.studies") / "data" / "example.yaml"
-    (folder / "study.yaml").write_text(example.read_text(encoding="utf-8"), encoding="utf-8")
-
-
-def _read_study(folder: Path) -> None:
-    from dorothie_gym.studies.assignment import Assigner
-    from dorothie_gym.studies.study_file import check_sources, read_study
-
-    file = folder / "study.yaml"
-    study = read_study(file)
-    Assigner(study).slot(3)
-    check_sources(study, file)
-
-
 SUBJECTS: Final = MappingProxyType(
     {
         "audio": Subject(_audio, _read_audio),
@@ -491,15 +427,15 @@ SUBJECTS: Final = MappingProxyType(
         "release": Subject(_release, _read_sessions),
         "sample": Subject(_sample, _read_sessions),
         "hub": Subject(_hub, _read_sessions),
-        "annotations": Subject(_annotations, _read_annotations),
+        "annotations": Subject(make_annotations, read_annotations),
         "corpus": Subject(_corpus, _read_corpus),
         "predictions": Subject(_predictions, _read_predictions),
         "yaml": Subject(_yaml_town, _read_town, slow=True),
         "opendrive": Subject(_opendrive_town, _read_town),
         "storyboard": Subject(_storyboard, _read_storyboard),
-        "study": Subject(_study, _read_study),
+        "study": Subject(make_study, read_study),
         "rollout": Subject(_rollout, _read_rollout),
-        "cassette": Subject(_cassette, _read_cassette),
+        "cassette": Subject(make_cassette, read_cassette),
         "cache": Subject(_cache, _read_cache),
         "rl": Subject(_rl_model, _read_model, slow=True),
         "selfplay": Subject(_selfplay_model, _read_model, slow=True),

@@ -8,18 +8,15 @@ from typing import Any
 
 import pytest
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+pytest.importorskip("playwright.sync_api", reason="needs playwright")
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
-from dorothie_gym.recording import Session  # noqa: E402
-from tests.console.test_browser_pictures import CHROMIUM, FLAGS, WAIT  # noqa: E402
-from tests.studies.content import STUDY, write_study  # noqa: E402
-from tests.studies.serving import ServedStudy  # noqa: E402
+from dorothie_gym.recording import Session
+from tests.chromium import IN_CHROMIUM, WAIT, chromium
+from tests.studies.content import STUDY, write_study
+from tests.studies.serving import ServedStudy
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed (Debian: apt-get install chromium)"),
-]
+pytestmark = IN_CHROMIUM
 
 RICH = {
     **STUDY,
@@ -40,10 +37,8 @@ RICH = {
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with sync_api.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+    with chromium() as launched:
         yield launched
-        launched.close()
 
 
 class Laboratory:

@@ -112,6 +112,8 @@ def test_words_that_older_yaml_takes_for_other_types_are_texts(tmp_path: Path) -
         ("scenarios", {"town": "atlantis"}, r"scenarios\[2\]: .*atlantis"),
         ("scenarios", {"town": "brookside", "storyboard": "nothing"}, r"scenarios\[2\]: .*nothing"),
         ("conditions", {"name": "more", "ad_wizard": "robot"}, r"conditions\[2\].ad_wizard: .*no policy 'robot'"),
+        ("conditions", {"name": "more", "co_wizard": "open"}, r"conditions\[2\].co_wizard: .*are not open"),
+        ("conditions", {"name": "more", "co_wizard": "llm:any"}, r"conditions\[2\].co_wizard: .*in real time"),
     ],
 )
 def test_towns_storyboards_and_policies_are_looked_up(
