@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Sequence
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dorothie_gym.cli.annotations import CorpusOrSession, load_corpus
-from dorothie_gym.cli.options import AsJson, Maps, needs
+from dorothie_gym.cli.options import AsJson, Maps
 from dorothie_gym.cli.output import fail, print_json, reporting_errors, stdout
-from dorothie_gym.cli.serving import LOCAL, listen
+from dorothie_gym.cli.serving import LOCAL, Host, Port, address, check_libraries, listen, serve
 from dorothie_gym.cli.warm_up import compile_first
 
 if TYPE_CHECKING:
-    from dorothie_gym.annotation.workplace import Seat, Workplace
+    from dorothie_gym.annotation.workplace import Seat
 
 PORT = 8024
 """Usual port of the annotation tool."""
-
-_LIBRARIES = ("starlette", "uvicorn")
 
 
 def annotate(
@@ -38,18 +34,17 @@ def annotate(
         bool, typer.Option(help="Begin with marks of the classifier, which the annotator accepts or corrects.")
     ] = True,
     maps: Maps = None,
-    host: Annotated[str, typer.Option(help="Address to listen at; by default only this machine reaches it.")] = LOCAL,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes a free one.")] = PORT,
+    host: Host = LOCAL,
+    port: Port = PORT,
     as_json: AsJson = False,
 ) -> None:
     """Annotate sessions in the browser: prints a link for each annotator, who do not see each other's marks.
 
     Marks are written at once into the folder annotations of each session; the session itself is never changed.
     """
-    for library in _LIBRARIES:
-        if find_spec(library) is None:
-            fail(f"annotate {needs('console')}: {library} is not installed; run: pip install 'dorothie-gym[console]'")
+    check_libraries("annotate")
     with reporting_errors():
+        from dorothie_gym.annotation.server import AnnotationServer
         from dorothie_gym.annotation.workplace import Workplace
 
         seats = _seats(annotator or ([] if adjudicator is not None else ["annotator"]), adjudicator)
@@ -59,15 +54,15 @@ def annotate(
             workplace.open(0)  # a session that cannot be annotated is refused here
     compile_first(pictures=True)
     listener = listen(host, port)
-    shown = f"[{host}]" if ":" in host else host
-    links = {seat.name: f"http://{shown}:{listener.getsockname()[1]}/annotate#{seat.token}" for seat in seats}
+    server = address(host, listener.getsockname()[1])
+    links = {seat.name: f"{server}/annotate#{seat.token}" for seat in seats}
     if as_json:
         print_json({"links": links, "sessions": len(entries)})
     else:
         for seat in seats:
             stdout().print(f"{seat.name:<13} {links[seat.name]}", soft_wrap=True)
         stdout().print("Marks are saved at once. Ctrl-C ends the server.", soft_wrap=True)
-    _serve(workplace, listener)
+    serve(AnnotationServer(workplace).app(), listener)
 
 
 def _seats(annotators: Sequence[str], adjudicator: str | None) -> list[Seat]:
@@ -81,18 +76,3 @@ def _seats(annotators: Sequence[str], adjudicator: str | None) -> list[Seat]:
     if len(set(names)) < len(names):
         fail("two people have the same name; give each a name of its own")
     return seats
-
-
-def _serve(workplace: Workplace, listener: socket.socket) -> None:
-    import uvicorn
-
-    from dorothie_gym.annotation.server import AnnotationServer
-
-    config = uvicorn.Config(
-        AnnotationServer(workplace).app(),
-        log_level="warning",
-        access_log=False,
-        server_header=False,
-        timeout_graceful_shutdown=2,
-    )
-    uvicorn.Server(config).run(sockets=[listener])

@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from dorothie_gym.cli.options import AsJson, Maps
-from dorothie_gym.cli.output import fail, print_json, reporting_errors, stdout, wide_stdout
+from dorothie_gym.cli.output import coefficient, fail, print_json, reporting_errors, stdout, wide_stdout
 
 if TYPE_CHECKING:
     from dorothie_gym.annotation.corpus_agreement import CorpusAgreement
@@ -182,7 +182,7 @@ def _show(found: CorpusAgreement) -> None:
         table.add_column(title, justify="left" if title == "annotators" else "right", no_wrap=True)
     for (first, second), (sessions, pair) in found.pairs.items():
         figures = (pair.spans, pair.moves_of_equal_spans, pair.moves, pair.slots)
-        table.add_row(f"{first}, {second}", str(sessions), str(pair.utterances), *map(_figure, figures))
+        table.add_row(f"{first}, {second}", str(sessions), str(pair.utterances), *map(coefficient, figures))
     table.add_row("the paper", "20", "1045", "", "0.77", "", "0.85")
     console = wide_stdout()
     console.print(table)
@@ -190,11 +190,7 @@ def _show(found: CorpusAgreement) -> None:
         console.print("Krippendorff's alpha needs krippendorff: pip install 'dorothie-gym[agreement]'", style="yellow")
     else:
         console.print(
-            f"Krippendorff's alpha of {len(found.annotators)} annotators: moves {_figure(found.alpha.moves)}, slots "
-            f"{_figure(found.alpha.slots)} ({found.alpha.pieces} pieces).",
+            f"Krippendorff's alpha of {len(found.annotators)} annotators: moves {coefficient(found.alpha.moves)}, "
+            f"slots {coefficient(found.alpha.slots)} ({found.alpha.pieces} pieces).",
             soft_wrap=True,
         )
-
-
-def _figure(value: float | None) -> str:
-    return "undefined" if value is None else f"{value:.2f}"

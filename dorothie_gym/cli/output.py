@@ -68,6 +68,11 @@ def exit_interrupted(text: str) -> NoReturn:
     raise typer.Exit(exit_code()) from None
 
 
+def coefficient(value: float | None) -> str:
+    """Returns a coefficient of agreement with two decimals; "undefined" for None."""
+    return "undefined" if value is None else f"{value:.2f}"
+
+
 def print_json(value: Mapping[str, object] | Sequence[object]) -> None:
     """Prints one JSON value on standard output."""
     typer.echo(json.dumps(value, allow_nan=False))

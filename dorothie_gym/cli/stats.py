@@ -10,7 +10,16 @@ import typer
 from rich.table import Table
 
 from dorothie_gym.cli.options import OWN_NAME, AsJson, Maps
-from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, session_progress, stdout
+from dorothie_gym.cli.output import (
+    Facts,
+    check_picture,
+    coefficient,
+    fail,
+    print_json,
+    reporting_errors,
+    session_progress,
+    stdout,
+)
 from dorothie_gym.cli.speech_table import show_speech
 
 if TYPE_CHECKING:
@@ -331,12 +340,8 @@ def _kappa(first: Path, second: Path, maps: Path | None, *, as_json: bool) -> No
     shown = Table(box=None, pad_edge=False)
     for title in ("Cohen's kappa", "here", "paper"):
         shown.add_column(title, justify="left" if title.startswith("Cohen") else "right")
-    shown.add_row("dialogue moves", _kappa_text(found.moves), "0.77")
-    shown.add_row("dialogue slots", _kappa_text(found.slots), "0.85")
+    shown.add_row("dialogue moves", coefficient(found.moves), "0.77")
+    shown.add_row("dialogue slots", coefficient(found.slots), "0.85")
     console = stdout()
     console.print(shown)
     console.print(f"{found.utterances} utterances, {found.pieces} pieces that neither annotation splits", style="dim")
-
-
-def _kappa_text(value: float | None) -> str:
-    return "undefined" if value is None else f"{value:.2f}"

@@ -12,7 +12,6 @@ from dorothie_gym.ontology import GoalStatus, LandmarkName, MentalAction, Object
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
 from dorothie_gym.policies.language_model.co_wizard_prompt import (
-    KEEP,
     answer_schema,
     drive_options,
     goal_options,
@@ -22,6 +21,7 @@ from dorothie_gym.policies.language_model.co_wizard_prompt import (
 )
 from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
 from dorothie_gym.policies.language_model.role_interface import (
+    KEEP,
     NONE,
     Memory,
     RoleInterface,

@@ -14,6 +14,7 @@ from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, Cho
 from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
 from dorothie_gym.policies.language_model.role_interface import (
     ALL_NAMES,
+    KEEP,
     NONE,
     Line,
     clock,
@@ -28,9 +29,6 @@ from dorothie_gym.policies.language_model.role_interface import (
 from dorothie_gym.policies.route_progress import direction_of, lanes_ahead, streets_named
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.spaces import ExitColumn, Motion, Physical
-
-KEEP = "keep"
-"""Label of leaving goal or status as it is."""
 
 AHEAD = (5, 10, 20, 30, 50, 80)
 """Distances ahead at which a place can be marked [m]."""

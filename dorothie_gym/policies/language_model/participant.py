@@ -11,6 +11,7 @@ from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, distinct
 from dorothie_gym.policies.language_model.role_interface import (
+    KEEP,
     NONE,
     Memory,
     RoleInterface,
@@ -31,8 +32,6 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress, stopping_distance
 from dorothie_gym.policies.turn_lanes import next_turn
 from dorothie_gym.spaces import ActionDict, ObservationMapping, ParticipantAction
-
-KEEP = "keep"
 
 ANNOUNCED = 70.0
 """Distance to a junction at which its turn is due to be announced [m]; a car at 40 km/h takes 6 s for it."""

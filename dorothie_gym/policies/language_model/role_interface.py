@@ -26,6 +26,9 @@ from dorothie_gym.policies.observation_parser import (
 from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.spaces import ActionDict, ObservationMapping, SpaceLimits, Speech
 
+KEEP: Final = "keep"
+"""Label of leaving a goal, a status or a plan as it is."""
+
 NONE: Final = "none"
 """Label of doing nothing in a field."""
 
