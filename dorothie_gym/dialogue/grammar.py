@@ -116,7 +116,8 @@ class Grammar:
         markers: openers, closers and alarms by (kind, speaker, move).
         joints: links between two acts of one utterance, by (previous move, move).
         fillers: filled pauses.
-        clauses: clauses that state a proposition, by its topic ("red", "not goal"), with "past " in front for the past.
+        clauses: clauses that state a proposition, by its topic ("red", "not goal"), with "past " in front for the past
+            and its action ("told LaneFollow") behind where that has a clause of its own.
         props: names of each kind of prop, with an article.
     """
 
@@ -208,7 +209,8 @@ class _Builder:
         elif kind == "prop":
             self.props[PropKind(words[0])] = self._phrase(section)
         elif kind == "clause":
-            Predicate(words[-1])
+            named = words[:-1] if words[-1] in _ACTIONS else words
+            Predicate(named[-1])
             self.clauses[" ".join(words)] = self._phrase(section)
         elif kind == "join":
             for before in words[0].split(","):

@@ -226,7 +226,10 @@ class SlotRealizer:
         cause = self.argument("cause")
         assert isinstance(cause, Proposition)
         tense = "past " if self._wording.topic == "because_then" else ""
-        return load_grammar().clauses[f"{tense}{'not ' * cause.negated}{cause.predicate}"].say(self)
+        clauses, stem = load_grammar().clauses, f"{tense}{'not ' * cause.negated}{cause.predicate}"
+        action = cause.get("action")
+        special = f"{stem} {action.label}" if isinstance(action, ActionValue) else stem
+        return clauses[special if special in clauses else stem].say(self)
 
     def prop(self) -> str:
         """Returns the name of the prop of the content, with an article."""

@@ -84,7 +84,8 @@ def _stop_at_place(state: CoWizardState, view: CoWizardView) -> Physical | None:
     later = left - _way_to_next_decision(state, view) if nudge is not None else left - view.speed * state.clock.interval
     if left + later > 2.0 * STOP_MARGIN:
         return None
-    state.intentions = state.intentions.stopped_at_place(arrived=state.beliefs.goal is not None)
+    arrived = state.beliefs.goal is not None
+    state.intentions = state.intentions.stopped_at_place(arrived=arrived, sent_on=nudge is not None)
     state.commands = state.commands.after_stop(view.time)
     return Physical(action=PhysicalAction.STOP)
 

@@ -6,13 +6,14 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from dorothie_gym.dialogue import Direction, ParsedText
+from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition
 from dorothie_gym.ontology import SPEED_STEP, ActionValue, DialogueAct, StreetName
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.driving import junction_meant, place_ahead
 from dorothie_gym.policies.co_wizard.goals import approach_stop
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
+from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP, CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.spaces import Motion
 
 STRAIGHT_ON_DISTANCE = 60.0
 """Distance to a junction within which "go on" means straight across it [m]."""
@@ -69,13 +70,18 @@ def _do_switch(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
 
 
 def do_stop(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    """Intends to stop here."""
-    state.dialogue = state.dialogue.after_stop_instruction(view.time)
+    """Intends to stop here, on an instruction or because the goal is said to be here."""
+    told = words.told is not None and words.told.predicate is Predicate.ARRIVED and not words.told.negated
+    place = Proposition.of(Predicate.ARRIVED, place=state.beliefs.goal)
+    reason = place if told and state.beliefs.goal is not None else TOLD_TO_STOP
+    state.dialogue = state.dialogue.after_stop_instruction(view.time, reason)
     state.intentions = state.intentions.stopped()
 
 
 def _do_start(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     state.intentions = state.intentions.started()
+    if view.motion is Motion.WAITING:  # for the way, which the instruction does not tell
+        state.dialogue = state.dialogue.asking_way_again()
 
 
 def _do_speed(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:

@@ -177,6 +177,8 @@ def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | N
     intentions, commands, goal = state.intentions, state.commands, state.beliefs.goal
     resting = view.time < commands.rest_until
     hazard = view.hazard if view.motion is Motion.HAZARD else commands.rest_for if resting else ObjectClass.UNLABELED
+    if intentions.arrived and intentions.sent_on and not state.beliefs.exact:
+        return Proposition.of(Predicate.TOLD, action=ActionValue.LANE_FOLLOW)
     if intentions.arrived and goal is not None:
         return Proposition.of(Predicate.ARRIVED, place=goal)
     if state.dialogue.detour_asked_at is not None:
@@ -187,7 +189,7 @@ def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | N
         return Proposition.of(Predicate.HINDERS, object=hazard)
     since = view.time if commands.standing_since is None else commands.standing_since
     if intentions.halted and since - state.dialogue.stop_instructed_at < _OBEYED_WITHIN:
-        return Proposition.of(Predicate.TOLD, action=ActionValue.STOP)
+        return state.dialogue.stop_reason
     if goal is None and intentions.directive is None:
         return Proposition.of(Predicate.GOAL, negated=True)
     guided = goal is not None and not state.beliefs.exact and state.route.progress is None

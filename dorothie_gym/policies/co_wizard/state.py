@@ -9,8 +9,9 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
+from typing import Final
 
-from dorothie_gym.dialogue import Direction, Proposition
+from dorothie_gym.dialogue import Direction, Predicate, Proposition
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import (
     ActionValue,
@@ -25,6 +26,9 @@ from dorothie_gym.policies.noticing import Noticed
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteState
 from dorothie_gym.policies.speech import SpeakingState
+
+TOLD_TO_STOP: Final = Proposition.of(Predicate.TOLD, action=ActionValue.STOP)
+"""The usual reason for stopping on an instruction."""
 
 
 class Wish(enum.Enum):
@@ -64,6 +68,7 @@ class DialogueState:
         idle_since: start of the period without any task or instruction [s].
         steered_at: time of the last navigation instruction [s].
         stop_instructed_at: time of the last instruction to stop [s].
+        stop_reason: why the car stops then: because it is told to, or because the participant says where it is.
         u_turn_instructed_at: time of the last instruction to turn round [s].
         orders: latest U-turns and lane changes that the participant asked for, with their times [s].
         proposed: turn proposed to the participant and not answered yet.
@@ -86,6 +91,7 @@ class DialogueState:
     idle_since: float = 0.0
     steered_at: float = -math.inf
     stop_instructed_at: float = -math.inf
+    stop_reason: Proposition = TOLD_TO_STOP
     u_turn_instructed_at: float = -math.inf
     orders: tuple[tuple[ActionValue, float], ...] = ()
     proposed: Directive | None = None
@@ -116,13 +122,17 @@ class DialogueState:
         """Records a question about the way at the end of a lane."""
         return replace(self, asked_lane=lane, asked_at=now)
 
+    def asking_way_again(self) -> DialogueState:
+        """Lets the way be asked for at once although it was asked for at the present junction before."""
+        return replace(self, asked_lane=-1)
+
     def after_steering(self, now: float) -> DialogueState:
         """Records a navigation instruction at `now` [s]."""
         return replace(self, steered_at=now)
 
-    def after_stop_instruction(self, now: float) -> DialogueState:
-        """Records an instruction to stop at `now` [s]."""
-        return replace(self, stop_instructed_at=now)
+    def after_stop_instruction(self, now: float, reason: Proposition = TOLD_TO_STOP) -> DialogueState:
+        """Records an instruction to stop at `now` [s], and the reason for it."""
+        return replace(self, stop_instructed_at=now, stop_reason=reason)
 
     def after_u_turn_instruction(self, now: float) -> DialogueState:
         """Records an instruction to turn round at `now` [s]."""
@@ -202,6 +212,7 @@ class Intentions:
         nudge: place a little further on at which the car is to stop again.
         creeping: whether the goal is close and its guessed place is carried along ahead of the car.
         arrived: whether the car has stopped at its goal and waits for the next task.
+        sent_on: whether it has only stopped where it was told to drive to, which may be the goal.
         pausing: whether the car stops before the junction ahead until the way is known.
         speed: target cruise speed [km/h].
         slow_until: time at which a temporary speed ends [s].
@@ -216,6 +227,7 @@ class Intentions:
     nudge: Place | None = None
     creeping: bool = False
     arrived: bool = False
+    sent_on: bool = False
     pausing: bool = False
     speed: int
     slow_until: float = math.inf
@@ -238,9 +250,9 @@ class Intentions:
         """Carries out an instruction to stop: lets the car stand and drops nudge and manoeuvre."""
         return replace(self, halted=True, nudge=None, wish=None)
 
-    def stopped_at_place(self, *, arrived: bool) -> Intentions:
-        """Lets the car stand at a place; `arrived` is true at a goal."""
-        return replace(self, halted=True, nudge=None, arrived=arrived)
+    def stopped_at_place(self, *, arrived: bool, sent_on: bool) -> Intentions:
+        """Lets the car stand at a place; `arrived` is true at a goal, `sent_on` at the end of a nudge."""
+        return replace(self, halted=True, nudge=None, arrived=arrived, sent_on=sent_on)
 
     def blocked(self) -> Intentions:
         """Drops directive and nudge and lets the car stand before an obstacle."""

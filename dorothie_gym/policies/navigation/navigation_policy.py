@@ -144,7 +144,8 @@ def note_driving(state: CoWizardState, view: CoWizardView) -> None:
     stands = view.standing and view.motion is Motion.STOPPED
     near = ARRIVED_WITHIN if nudge is None else NUDGED_WITHIN
     if stands and left is not None and abs(left) <= near:
-        state.intentions = state.intentions.stopped_at_place(arrived=state.beliefs.goal is not None)
+        arrived = state.beliefs.goal is not None
+        state.intentions = state.intentions.stopped_at_place(arrived=arrived, sent_on=nudge is not None)
         state.commands = state.commands.after_stop(view.time)
     elif nudge is not None and (left is None or left < -state.config.passed):
         state.intentions = state.intentions.without_nudge()

@@ -235,7 +235,8 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
         return
     if view.time - conversation.heard_at < 4.0:
         return
-    long = view.time - state.motion.moved_at > config.long_stop and view.time > state.motion.excused_until
+    waited = view.time - max(state.motion.moved_at, state.task.announced_at, state.speech.last_end)
+    long = waited > config.long_stop and view.time > state.motion.excused_until
     stands = state.motion.standing_since is not None and long
     if not stands and not view.turning:
         return

@@ -36,11 +36,13 @@ from dorothie_gym.policies.participant.yes_no_answers import (
     answer_yes_no,
     check,
     checked,
+    correct_arrival,
     denied,
     deny_arrival,
     go_first,
     has_just_finished,
     is_elsewhere,
+    is_just_short,
 )
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import LONGEST_BREATH, Remark, intend, repeated
@@ -65,6 +67,9 @@ _GARBLED_WHERE = re.compile(r"(so|and|now|well|okay|,| )*where\b")
 
 _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we're at|we are at)\b")
 """Words by which the car says that it has come to a place."""
+
+_LACKS_WAY = re.compile(r"\b(know the way|where to turn|which way)\b")
+"""Words by which the car says that it stands because it does not know the way."""
 
 
 def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -200,6 +205,23 @@ def _explanation(
             note_blocked(state, view, near=True)
 
 
+def _answer_to_why(
+    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Denies that the car stands because it has arrived, where it has not; names the way that it does not know."""
+    goal, said = state.task.goal, words.text.lower()
+    if _LACKS_WAY.search(said):
+        state.set_guiding(goal is not None)
+        _name_step(state, view, DialogueMove.INSTRUCT, rng)
+        return
+    if goal is None or goal.name not in act.values(Slot.LANDMARK) or not _CLAIMS_ARRIVAL.search(said):
+        return
+    if is_elsewhere(state, view) and not has_just_finished(state, view, act.values(Slot.LANDMARK)):
+        deny_arrival(state)
+    elif is_just_short(state, view):
+        correct_arrival(state, view)
+
+
 def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
     """Returns the sign that an explanation was heard: a reason for a stop, something to be seen, or anything else."""
     said = {value for act in heard.acts for value in act.slots}
@@ -313,4 +335,5 @@ _ANSWERS: dict[
     DialogueMove.INSTRUCT: _request,
     DialogueMove.ACKNOWLEDGE: _acknowledgement,
     DialogueMove.CONFIRM: _acknowledgement,
+    DialogueMove.REPLY_W: _answer_to_why,
 }

@@ -156,9 +156,8 @@ def answer_yes_no(
     elif set(act.values(Slot.ACTION)) & _WAYS:
         state.set_guiding(True)
         _answer_proposal(state, view, act, words, rng)
-    elif not act.slots and _is_just_short(state, view):
-        refusal = denied(words.asked or checked(state, act, words))
-        state.say_only(refusal, replace(creep_instruction(state, view), joined=True))
+    elif not act.slots and is_just_short(state, view):
+        correct_arrival(state, view, words.asked or checked(state, act, words))
     elif words.asked is not None and words.asked.predicate is Predicate.ARRIVED and not about_to_arrive(state, view):
         deny_arrival(state)
     else:
@@ -259,12 +258,19 @@ def is_elsewhere(state: ParticipantState, view: ParticipantView) -> bool:
     return view.standing and far
 
 
-def _is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
+def is_just_short(state: ParticipantState, view: ParticipantView) -> bool:
     """Returns whether the car stands just before the target that it is guided to."""
     progress = state.route.progress
     if not state.guidance.guiding or not view.standing or progress is None:
         return False
     return about_to_arrive(state, view) and progress.left(view.station) > 0.0
+
+
+def correct_arrival(state: ParticipantState, view: ParticipantView, said: Proposition | None = None) -> None:
+    """Denies what a car that stands just before the target asks or says, by default that it is there; sends it on."""
+    assert state.task.goal is not None
+    arrived = Proposition.of(Predicate.ARRIVED, place=state.task.goal.name)
+    state.say_only(denied(said or arrived), replace(creep_instruction(state, view), joined=True))
 
 
 def deny_arrival(state: ParticipantState) -> None:
