@@ -66,6 +66,30 @@ def test_arrival_question_before_goal_is_denied_with_nudge() -> None:
     assert human.moves() == [M.REPLY_N, M.INSTRUCT]
 
 
+@pytest.mark.parametrize(("before", "denied"), [(4.0, [M.REPLY_N, M.INSTRUCT]), (120.0, [M.REPLY_N]), (0.0, [])])
+def test_wrong_arrival_as_the_reason_for_a_stop_is_denied(before: float, denied: list[DialogueMove]) -> None:
+    human = Guide(before)
+    assert human.state.task.goal is not None
+    place = human.state.task.goal.name
+    hears_answer(human, f"because we have reached {place.label}", place)
+    assert human.moves()[: len(denied) or 1] == denied
+
+
+def test_car_that_stands_because_it_does_not_know_the_way_is_told_the_way() -> None:
+    human = Guide(1.0)
+    lane = next(lane for lane in human.env.town.lanes if len(human.env.town.exits(lane.id)) > 1 and lane.length > 30.0)
+    human.put(lane.id, lane.length - 12.0, 0.0)
+    hears_answer(human, "because I don't know where to turn")
+    (told,) = human.state.speech.queue
+    assert told.act.move is M.INSTRUCT and ActionValue.START not in told.act.slots
+    assert told.act.values(Slot.ACTION)
+
+
+def hears_answer(human: Guide, text: str, *values: LandmarkName) -> None:
+    raw = with_words(human.observation, Role.CO_WIZARD, text, DialogueAct.of(M.REPLY_W, *values))
+    listen(human.state, replace(human.view, raw=raw), human.rng)
+
+
 def test_car_that_does_not_move_is_asked_why_instead_of_being_told_a_third_time() -> None:
     human = Guide(14.0)
     told = []

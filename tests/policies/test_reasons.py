@@ -8,6 +8,7 @@ from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, ObjectClass, PhysicalAction, Role, Slot
 from dorothie_gym.policies.co_wizard.answers import answer_open
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest
+from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.spaces import Motion
 from tests.policies.test_co_wizard import Talk
@@ -64,6 +65,44 @@ def test_reason_for_a_stop_is_told_in_the_past_when_the_car_drives_again():
     assert because.get("at") == round(now - 12.0), "when the reason held"
     text = word_act(reply.act, Role.CO_WIZARD, np.random.default_rng(0), reply.wording)
     assert "was red" in text.lower()
+
+
+def where_it_was_sent(talk: Talk) -> CoWizardView:
+    """Lets the car stand where it was told to drive on to, with a goal that is not on its map."""
+    talk.state.beliefs = talk.state.beliefs.without_place()
+    talk.state.intentions = talk.state.intentions.stopped_at_place(arrived=True, sent_on=True)
+    talk.state.commands = replace(talk.state.commands, standing_since=0.0)
+    return view_of(talk, motion=np.int64(Motion.STOPPED), speed=np.zeros(1))
+
+
+def test_car_that_went_as_far_as_told_does_not_claim_that_it_has_arrived():
+    talk = on_the_way()
+    stopped = where_it_was_sent(talk)
+    answer(talk, stopped, ActionValue.STOP)
+    reply = talk.state.speech.queue[0]
+    (because,) = reply.meaning
+    assert because.get("cause") == Proposition.of(Predicate.TOLD, action=ActionValue.LANE_FOLLOW)
+    texts = [word_act(reply.act, Role.CO_WIZARD, np.random.default_rng(k), reply.wording) for k in range(6)]
+    assert all("far" in text for text in texts), texts
+
+
+@pytest.mark.parametrize(("text", "predicate"), [("we're here", Predicate.ARRIVED), ("stop here", Predicate.TOLD)])
+def test_reason_for_an_instructed_stop_is_what_was_said(text: str, predicate: Predicate):
+    talk = on_the_way()
+    do_stop(talk.state, view_of(talk, **DRIVING), DialogueAct.of(M.INSTRUCT, ActionValue.STOP), understand(text))
+    talk.state.commands = replace(talk.state.commands, standing_since=view_of(talk).time)
+    answer(talk, view_of(talk, motion=np.int64(Motion.STOPPED), speed=np.zeros(1)), ActionValue.STOP)
+    (because,) = talk.state.speech.queue[0].meaning
+    cause = because.get("cause")
+    assert isinstance(cause, Proposition) and cause.predicate is predicate
+
+
+def test_car_that_waits_for_the_way_asks_again_when_it_is_told_to_start():
+    talk = on_the_way()
+    talk.state.dialogue = talk.state.dialogue.after_asking_way(7, view_of(talk).time)
+    waiting = view_of(talk, motion=np.int64(Motion.WAITING), speed=np.zeros(1))
+    OBEYED[ActionValue.START](talk.state, waiting, DialogueAct.of(M.INSTRUCT, ActionValue.START), understand("go"))
+    assert talk.state.dialogue.asked_lane == -1
 
 
 def test_stop_long_ago_is_not_explained_by_its_reason():

@@ -57,6 +57,7 @@ class CoWizardConfig:
         goal_interval: time after which a question about the goal is repeated [s].
         hazard_delay: standstill after which a hazard is explained [s].
         hazard_interval: time between explanations of hazards [s].
+        hazard_again: the same during one standstill [s].
         first_word: time at the beginning that is left to the participant [s].
         next_delay: silence after which a standing Co-Wizard asks for the next task [s].
         start_delay: silence at the beginning after which it asks for the first one [s].
@@ -106,6 +107,7 @@ class CoWizardConfig:
     goal_interval: float = 10.0
     hazard_delay: float = 5.0
     hazard_interval: float = 20.0
+    hazard_again: float = 60.0
     first_word: float = 5.0
     next_delay: float = 4.0
     start_delay: float = 7.0
@@ -177,7 +179,7 @@ class CoWizardStyle:
             gentle=gentle,
             rambles=within(0.05, 0.25, persona.talkativeness, rng),
             offers=within(0.3, 1.0, persona.attention, rng),
-            reassures=within(0.3, 0.0, persona.certainty, rng),
+            reassures=within(0.15, 0.0, persona.certainty, rng),
             pace=35 if gentle else int(rng.choice((40, 45))) if brisk else 40,
             chats=within(0.1, 0.6, persona.humour, rng),
             notices=0.0 if persona.ignores else within(0.45, 0.95, persona.attention, rng),

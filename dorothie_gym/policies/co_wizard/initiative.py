@@ -216,7 +216,9 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
         return
     if hazard is ObjectClass.UNLABELED or view.time - commands.standing_since < config.hazard_delay:
         return
-    if view.time - state.dialogue.hazard_explained_at < config.hazard_interval:
+    again = state.dialogue.hazard_explained_at >= commands.standing_since
+    interval = config.hazard_again if again else config.hazard_interval
+    if view.time - state.dialogue.hazard_explained_at < interval:
         return
     state.dialogue = state.dialogue.after_explaining_hazard(view.time)
     if rng.random() < (0.85 if hazard is ObjectClass.TRAFFIC_LIGHT else 0.4):

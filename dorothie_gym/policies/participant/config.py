@@ -199,7 +199,7 @@ class ParticipantStyle:
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
             reasons=within(0.05, 0.3, persona.talkativeness, rng) + 0.15 * landmarks,
             aligns=within(0.15, 0.0, persona.certainty, rng),
-            nods=within(0.35, 0.7, persona.politeness, rng),
+            nods=within(0.45, 0.8, persona.politeness, rng),
             curious=within(0.02, 0.25, persona.attention, rng),
             puzzled=within(0.35, 0.0, persona.certainty, rng),
             points_out=within(0.4, 0.75, persona.politeness, rng) + 0.15 * landmarks,
