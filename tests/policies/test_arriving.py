@@ -11,6 +11,7 @@ from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE
 from dorothie_gym.policies.participant.config import ParticipantConfig
 from dorothie_gym.policies.participant.guidance import guide
 from dorothie_gym.policies.participant.replies import listen
+from dorothie_gym.policies.participant.retrying import why_standing
 from dorothie_gym.policies.route_progress import RouteProgress
 from tests.policies.said import with_words
 from tests.policies.test_repairs import Human
@@ -85,7 +86,18 @@ def test_car_that_stands_because_it_does_not_know_the_way_is_told_the_way() -> N
     assert told.act.values(Slot.ACTION)
 
 
+def test_car_that_still_stands_at_a_former_errand_is_told_the_place_again() -> None:
+    human = Guide(200.0)
+    assert human.state.task.goal is not None
+    other = next(name for name in (LandmarkName.SHELL, LandmarkName.KFC) if name is not human.state.task.goal.name)
+    hears_answer(human, f"because we're at {other.label}", other)
+    assert human.state.speech.queue[0].act.move is M.INSTRUCT
+    assert human.state.task.goal.name in human.state.speech.queue[0].act.slots
+
+
 def hears_answer(human: Guide, text: str, *values: LandmarkName) -> None:
+    """Lets a participant who has asked why the car stands hear the answer."""
+    human.state.speech = replace(human.state.speech, last=why_standing(human.state, human.view))
     raw = with_words(human.observation, Role.CO_WIZARD, text, DialogueAct.of(M.REPLY_W, *values))
     listen(human.state, replace(human.view, raw=raw), human.rng)
 
@@ -105,6 +117,14 @@ def test_car_that_does_not_move_is_asked_why_instead_of_being_told_a_third_time(
         )
     )  # fmt: skip
     assert told == [further, further, why, further, start, why]
+
+
+@pytest.mark.parametrize(("speed", "kept"), [(0.0, True), (6.0, False)])
+def test_answers_are_dropped_before_the_stop_but_not_while_the_car_stands(speed: float, kept: bool) -> None:
+    human = Guide(14.0, speed)
+    human.hears(M.ALIGN)
+    human.says()
+    assert (M.ACKNOWLEDGE in human.moves()) is kept
 
 
 def test_goal_question_right_after_announcement_is_not_answered() -> None:

@@ -172,8 +172,8 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
 
 
 def _may_speak(state: ParticipantState, view: ParticipantView) -> bool:
-    """Returns whether a step may be announced now; close to the place, drops other remarks."""
-    if state.guidance.guiding and about_to_arrive(state, view):
+    """Returns whether a step may be announced now; while the car comes close to the place, drops other remarks."""
+    if state.guidance.guiding and about_to_arrive(state, view) and not view.standing:
         state.speech = state.speech.cleared()
     return state.speech.idle and view.speaking <= 0.0
 

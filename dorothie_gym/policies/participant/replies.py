@@ -208,15 +208,23 @@ def _explanation(
 def _answer_to_why(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Denies that the car stands because it has arrived, where it has not; names the way that it does not know."""
-    goal, said = state.task.goal, words.text.lower()
+    """Takes up why the car stands.
+
+    Denies that it has arrived, where it has not, names the way that it does not know, and repeats where to go if it
+    still stands at the place of a former errand.
+    """
+    goal, said, places, asked = state.task.goal, words.text.lower(), act.values(Slot.LANDMARK), state.speech.last
+    if goal is None or asked is None or ActionValue.STOP not in asked.act.slots:
+        return
     if _LACKS_WAY.search(said):
-        state.set_guiding(goal is not None)
+        state.set_guiding(True)
         _name_step(state, view, DialogueMove.INSTRUCT, rng)
+    elif not places or not _CLAIMS_ARRIVAL.search(said):
         return
-    if goal is None or goal.name not in act.values(Slot.LANDMARK) or not _CLAIMS_ARRIVAL.search(said):
-        return
-    if is_elsewhere(state, view) and not has_just_finished(state, view, act.values(Slot.LANDMARK)):
+    elif goal.name not in places:
+        state.task = state.task.after_reminding(view.time)
+        state.say_first(announcement(state, view, rng))
+    elif is_elsewhere(state, view) and not has_just_finished(state, view, places):
         deny_arrival(state)
     elif is_just_short(state, view):
         correct_arrival(state, view)
