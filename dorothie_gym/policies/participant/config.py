@@ -106,7 +106,7 @@ class ParticipantConfig(GuidanceConfig):
     run_up: float = 45.0
     run_up_per_lane: float = 50.0
     lane_return_time: float = 30.0
-    omits_straight: float = 0.85
+    omits_straight: float = 0.95
     states_distance: float = 0.75
     way_round_cost: float = 400.0
     off_route: int = 3

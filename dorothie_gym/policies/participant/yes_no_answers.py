@@ -157,7 +157,7 @@ def answer_yes_no(
         state.set_guiding(True)
         _answer_proposal(state, view, act, words, rng)
     elif not act.slots and is_just_short(state, view):
-        correct_arrival(state, view, words.asked or checked(state, act, words))
+        correct_arrival(state, view, words.asked)
     elif words.asked is not None and words.asked.predicate is Predicate.ARRIVED and not about_to_arrive(state, view):
         deny_arrival(state)
     else:
