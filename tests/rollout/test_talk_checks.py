@@ -55,6 +55,17 @@ def test_arrival_times_are_compared_with_the_arrival(world):
     assert told(world, Proposition.of(P.ARRIVES_IN, place=place, seconds=ASKED), asked_at) is None
 
 
+def test_arrival_is_true_once_the_errand_is_done_and_false_on_the_way(world):
+    event = next(event for event in world.changes if event.data.get("cause") == "arrival")
+    place = next(name for name in LandmarkName if name.label == event.data["landmark"])
+    arrived = Proposition.of(P.ARRIVED, place=place)
+    assert told(world, arrived, event.time + 5.0) is True
+    assert told(world, arrived.opposite, event.time + 5.0) is False
+    assert (
+        told(world, arrived, next(t for t in np.arange(event.time - 10.0, 0.0, -1.0) if world.speed(t) > 4.0)) is False
+    )
+
+
 @pytest.mark.parametrize(
     ("claimed", "actual", "right"), [(60, 85, True), (60, 95, False), (10, 2, True), (200, 120, False), (120, 90, True)]
 )

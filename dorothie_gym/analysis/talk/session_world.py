@@ -35,6 +35,9 @@ from dorothie_gym.sim.world import CLARITY, FAULT_SECONDS
 _NAMING: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W})
 _OVER: Final = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE, GoalStatus.PENDING})
 STANDING_SPEED: Final = 0.5  # [m/s]
+_CLOSE: Final = 25.0  # distance from a landmark to a car that stands there, or just short of it [m]
+_SOON: Final = 3.0  # time from the standstill at a place to the end of the errand [s]
+_LATELY: Final = 30.0  # time for which a car has arrived after that [s]
 _LIGHT_SIGHT: Final = 60.0  # distance of the light that a standing car waits for [m]
 
 
@@ -248,14 +251,20 @@ class SessionWorld:
         arrived = following.data.get("cause") == "arrival"
         return following.time if arrived and following.data.get("status") == GoalStatus.COMPLETE.label else None
 
-    def arrived_at(self, time: float, name: LandmarkName) -> bool:
-        """Returns whether the car stands at a landmark of a name, or has arrived there in the last half minute."""
-        x, y = self.position(time)
-        near = any(math.hypot(row["x"] - x, row["y"] - y) < 25.0 for row in self.landmarks(name))
+    def arrived_at(self, time: float, name: LandmarkName) -> bool | None:
+        """Returns whether the car has arrived at a landmark of a name: in the last half minute, or in a moment.
+
+        None if it stands close to it, but its errand there is not done: it may be called there, or just short of it.
+        """
         done = any(
-            event.data.get("landmark") == name.label and 0.0 <= time - event.time < 30.0 for event in self.changes
-        )  # fmt: skip
-        return done or (near and self.stands(time))
+            event.data.get("landmark") == name.label
+            and event.data.get("status") == GoalStatus.COMPLETE.label
+            and -_SOON <= time - event.time < _LATELY
+            for event in self.changes
+        )
+        x, y = self.position(time)
+        near = any(math.hypot(row["x"] - x, row["y"] - y) < _CLOSE for row in self.landmarks(name))
+        return True if done else None if near and self.stands(time) else False
 
     def told_to(self, time: float, action: ActionValue, within: float) -> bool:
         """Returns whether the participant has named an action within some seconds before a time [s]."""
