@@ -194,7 +194,7 @@ class ParticipantStyle:
             names_street=within(0.0, 0.5, persona.knowledge, rng) + 0.25 * precise,
             hurries=within(0.6, 0.12, persona.patience, rng),
             patience=within(7.0, 14.0, persona.patience, rng),
-            chat=within(190.0, 90.0, (persona.talkativeness + persona.humour) / 2.0, rng),
+            chat=within(205.0, 100.0, (persona.talkativeness + persona.humour) / 2.0, rng),
             waits=within(0.4, 0.8, persona.patience, rng) + 0.15 * vague,
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
             reasons=within(0.05, 0.3, persona.talkativeness, rng) + 0.15 * landmarks,
