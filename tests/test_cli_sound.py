@@ -22,6 +22,23 @@ from dorothie_gym.speech import read_audio
 from tests.recording.spoken import spoken_session
 
 
+def sound_of(video: Path) -> np.ndarray:
+    """Returns the sound track of a video at 16 kHz."""
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="needs the extra 'video'").get_ffmpeg_exe()
+    raw = subprocess.run(
+        [ffmpeg, "-v", "error", "-i", str(video), "-f", "s16le", "-ac", "1", "-ar", "16000", "-"],
+        capture_output=True, check=True, env=dict(os.environ),
+    ).stdout  # fmt: skip
+    return np.frombuffer(raw, "<i2") / 32768
+
+
+def likeness(heard: np.ndarray, track: np.ndarray) -> float:
+    """Returns the correlation of the loudness of two tracks in blocks of 0.1 s."""
+    blocks = [np.abs(each[: len(each) // 1600 * 1600]).reshape(-1, 1600).mean(axis=1) for each in (heard, track)]
+    count = min(map(len, blocks))
+    return float(np.corrcoef(blocks[0][:count], blocks[1][:count])[0, 1])
+
+
 def call(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
@@ -121,19 +138,24 @@ def test_sound_track_has_each_utterance_at_its_time(session: Path, tmp_path: Pat
 
 
 def test_film_of_a_spoken_session_has_its_sound(session: Path, tmp_path: Path) -> None:
-    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="needs the extra 'video'").get_ffmpeg_exe()
     for name in ("v.mp4", "v.mkv"):
         done = call("film", session, "--out", tmp_path / name, "--view", "map", "--fps", 2, "--json")
         assert done.exit_code == 0, done.output
         facts = json.loads(done.stdout)
         assert facts["sound"] is True
-        raw = subprocess.run(
-            [ffmpeg, "-v", "error", "-i", str(tmp_path / name), "-f", "s16le", "-ac", "1", "-ar", "16000", "-"],
-            capture_output=True, check=True, env=dict(os.environ),
-        ).stdout  # fmt: skip
-        heard = np.frombuffer(raw, "<i2") / 32768
+        heard = sound_of(tmp_path / name)
         track = sound_track(Session.load(session), 0.0, facts["pictures"] / 2)
         assert len(heard) == pytest.approx(len(track), abs=4000)
-        blocks = [np.abs(each[: len(each) // 1600 * 1600]).reshape(-1, 1600).mean(axis=1) for each in (heard, track)]
-        count = min(map(len, blocks))
-        assert np.corrcoef(blocks[0][:count], blocks[1][:count])[0, 1] > 0.9  # AAC delays by 64 ms
+        assert likeness(heard, track) > 0.9  # AAC delays by 64 ms
+
+
+def test_video_of_a_run_has_its_sound(tmp_path: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg", reason="needs the extra 'video'")
+    options = ("--town", "brookside", "--seed", 5, "--max-seconds", 12, "--view", "map", "--json")
+    done = call("run", "--speech", "--video", tmp_path / "v.mp4", "--out", tmp_path / "s", *options)
+    assert done.exit_code == 0, done.output
+    assert [path.name for path in tmp_path.glob("*.mp4")] == ["v.mp4"]
+    heard = sound_of(tmp_path / "v.mp4")
+    track = sound_track(Session.load(tmp_path / "s"), 0.0, 12.0)
+    assert len(heard) == pytest.approx(len(track), abs=4000) and np.abs(track).max() > 0.01
+    assert likeness(heard, track) > 0.9

@@ -9,6 +9,7 @@ from typing import Final
 from dorothie_gym.dialogue import guess_spans
 from dorothie_gym.ontology import DialogueMove, SlotValue
 from dorothie_gym.recording import Session, UtteranceRecord
+from dorothie_gym.speech import readable, spoken_words
 
 REPAIRED_WITHIN: Final = 30.0
 """Time after an utterance within which its meaning is repaired [s]; the car drives some 250 m meanwhile."""
@@ -29,7 +30,8 @@ class LostMeaning:
 
     Attributes:
         utterance: the utterance.
-        lost: values of slots that the parser reads in the spoken words and not in the recognised ones.
+        lost: annotated values of slots that the parser reads in the spoken words, with and without their marks and
+            capitals, and not in the recognised words.
         wrong: values that it reads in the recognised words only.
         asked: whether the listener asked, as its next utterance, within `REPAIRED_WITHIN`.
         said_again: whether one of the speakers said a lost value within `REPAIRED_WITHIN`, in words that were
@@ -51,25 +53,32 @@ class LostMeaning:
 def lost_meanings(session: Session) -> Iterator[LostMeaning]:
     """Yields the utterances of which the recogniser lost a detail, in order.
 
-    Both the spoken and the recognised words are read by the parser; so errors of the parser do not count.
+    Both the spoken and the recognised words are read by the parser, and the speaker must have meant what is read; so
+    neither errors of the parser nor missing marks count.
     """
     said = sorted(session.utterances(), key=lambda each: each.end)
     for place, utterance in enumerate(said):
         heard = utterance.moves[0].recognised
         if heard is None:
             continue
-        meant, understood = _details(utterance.text), _details(heard)
-        if meant <= understood:
+        understood = _details(heard)
+        lost = (_details(utterance.text) & _annotated(utterance)) - understood
+        if lost:
+            lost &= _details(readable(" ".join(spoken_words(utterance.text))))
+        if not lost:
             continue
         after = [each for each in said[place + 1 :] if each.start <= utterance.end + REPAIRED_WITHIN]
-        lost = meant - understood
         yield LostMeaning(
             utterance=utterance,
             lost=lost,
-            wrong=understood - meant,
+            wrong=understood - _details(utterance.text),
             asked=_asks(utterance, after),
             said_again=any(lost & _details(each.moves[0].recognised or each.text) for each in after),
         )
+
+
+def _annotated(utterance: UtteranceRecord) -> frozenset[SlotValue]:
+    return frozenset(value for move in utterance.moves for value in move.act.slots)
 
 
 def _asks(utterance: UtteranceRecord, after: Sequence[UtteranceRecord]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_radians
-from dorothie_gym.cli.output import VideoWriter, video_writer
+from dorothie_gym.cli.output import VideoWriter, add_sound, video_writer
 from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_scene import scene_of
@@ -24,6 +25,7 @@ from dorothie_gym.rendering.session_views import SessionRenderer
 
 if TYPE_CHECKING:
     from dorothie_gym.camera.body_snapshots import BodySnapshot
+    from dorothie_gym.speech import Samples
 
 FRAMES_PER_SECOND = 10
 """Frame rate of the video."""
@@ -35,7 +37,8 @@ _MAX_SPEED = 25.0
 class Film:
     """Writes a video of a session while it is played; pass it to `play_session` as `on_step`.
 
-    Between two decisions, the car follows its recorded trajectory; other actors are interpolated linearly.
+    Between two decisions, the car follows its recorded trajectory; other actors are interpolated linearly. A spoken
+    session gets its sound when the film is closed.
 
     Attributes:
         frames: frames drawn so far.
@@ -52,7 +55,9 @@ class Film:
     def __init__(self, path: Path, view: RenderView = RenderView.BOTH) -> None:
         self.frames, self.seconds = 0, 0.0
         self._renderer = SessionRenderer(view)
+        self._path = path
         self._writer: VideoWriter = video_writer(path, FRAMES_PER_SECOND)
+        self._spoken: list[tuple[float, Samples]] = []
         self._windscreen: _Windscreen | None = None
         self._last: Scene | None = None
 
@@ -63,13 +68,16 @@ class Film:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Closes the file."""
+        """Closes the file, and adds what was spoken."""
         self._writer.close()
+        if self._spoken:
+            self._add_sound()
 
     def __call__(self, engine: SessionEngine) -> None:
         """Appends the frames of the last decision."""
         begun = time.perf_counter()
         self._append_decision(engine)
+        self._spoken += spoken_pieces(engine)
         self.seconds += time.perf_counter() - begun
 
     def _append_decision(self, engine: SessionEngine) -> None:
@@ -83,9 +91,34 @@ class Film:
         self._append(scene, None if self._windscreen is None else self._windscreen.now())
         self._last = scene
 
+    def _add_sound(self) -> None:
+        from dorothie_gym.recording.sound import mixed_track
+        from dorothie_gym.speech import encode_wav
+
+        # the first picture is that of the beginning of the session
+        track = mixed_track(self._spoken, 0.0, self.frames / FRAMES_PER_SECOND)
+        with tempfile.TemporaryDirectory(prefix="dorothie_gym.") as folder:
+            file = Path(folder) / "sound.wav"
+            file.write_bytes(encode_wav(track))
+            add_sound(self._path, file)
+
     def _append(self, scene: Scene, picture: NDArray[np.uint8] | None) -> None:
         self._writer.append_data(self._renderer.draw(scene, picture))
         self.frames += 1
+
+
+def spoken_pieces(engine: SessionEngine) -> Iterator[tuple[float, Samples]]:
+    """Yields the start of each span that was delivered last [s], and its audio; the spans of an utterance follow on."""
+    from dorothie_gym.speech import SAMPLE_RATE
+
+    ends: dict[object, float] = {}
+    for event in engine.last_events:
+        samples = engine.last_recordings.get(str(event.data.get("audio")))
+        if samples is not None:
+            number = event.data["utterance"]
+            begun = ends.get(number, float(str(event.data["start"])))
+            ends[number] = begun + len(samples) / SAMPLE_RATE
+            yield begun, samples
 
 
 class _Moment(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import subprocess
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeAlias
 import typer
 from rich.console import Console
 
+from dorothie_gym.errors import SpeechError, one_line
 from dorothie_gym.interruption import exit_code
 
 if TYPE_CHECKING:
@@ -159,6 +161,33 @@ def video_writer(path: Path, frames_per_second: float, sound: Path | None = None
         path, fps=frames_per_second, macro_block_size=16, ffmpeg_params=["-preset", "veryfast"], **track
     )
     return writer
+
+
+def add_sound(video: Path, sound: Path) -> None:
+    """Adds a sound track (AAC) to a silent video; its pictures are copied.
+
+    Args:
+        video: the video, which is replaced.
+        sound: audio file.
+
+    Raises:
+        ImportError: the extra `video` is not installed.
+        SpeechError: ffmpeg failed.
+    """
+    import imageio_ffmpeg
+
+    part = video.with_name(f".{video.stem}.part{video.suffix}")
+    inputs = ["-i", str(video), "-i", str(sound), "-c:v", "copy", "-c:a", "aac"]
+    try:
+        ran = subprocess.run(
+            [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-y", *inputs, str(part)],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        if ran.returncode:
+            raise SpeechError(f"{video}: the sound cannot be added ({one_line(ran.stderr)}); the pictures are kept")
+        part.replace(video)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 # --- Progress ---------------------------------------------------------------------------------------------------------

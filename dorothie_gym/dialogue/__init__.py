@@ -2,11 +2,13 @@
 
 from dorothie_gym.dialogue.asr_channel import USUAL_WORD_ERROR_RATE, AsrChannel, Recogniser, word_error_rate
 from dorothie_gym.dialogue.conversation import (
+    INAUDIBLE,
     SHORTEST_SPAN,
     WORDS_PER_SECOND,
     Conversation,
     Span,
     Utterance,
+    is_partly_inaudible,
     speech_seconds,
 )
 from dorothie_gym.dialogue.dialogue_act_classifier import act_of, guess_act, guess_spans
@@ -29,6 +31,7 @@ __all__ = [
     "ANSWER_TIMEOUT",
     "ASKED",
     "EXPECTATIONS",
+    "INAUDIBLE",
     "MAX_CHARACTERS",
     "SHORTEST_SPAN",
     "USUAL_WORD_ERROR_RATE",
@@ -65,6 +68,7 @@ __all__ = [
     "fluent",
     "guess_act",
     "guess_spans",
+    "is_partly_inaudible",
     "load_lexicon",
     "measured_errors",
     "read_meaning",

@@ -15,6 +15,15 @@ SHORTEST_SPAN = 0.6
 """Shortest duration of a span [s]; longer than a decision period (0.5 s), so that a speaker can continue."""
 
 
+INAUDIBLE = "..."
+"""Sign in a transcript for words that were not understood, and transcript of speech of which nothing was."""
+
+
+def is_partly_inaudible(text: str) -> bool:
+    """Returns whether a transcript has a sign for words that were not understood."""
+    return any(word.startswith(INAUDIBLE) for word in text.split())
+
+
 def speech_seconds(text: str, words_per_second: float = WORDS_PER_SECOND) -> float:
     """Returns the duration of a spoken text [s].
 

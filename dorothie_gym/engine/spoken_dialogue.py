@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.copying import shared
-from dorothie_gym.dialogue import SHORTEST_SPAN, Span, Utterance
+from dorothie_gym.dialogue import SHORTEST_SPAN, Span, Utterance, guess_act
 from dorothie_gym.dialogue.asr_channel import UNCLASSIFIED, OpenMoves
 from dorothie_gym.ontology import DialogueMove, Role
 from dorothie_gym.speech import (
@@ -17,6 +17,7 @@ from dorothie_gym.speech import (
     Recognition,
     Samples,
     Voice,
+    audible,
     cabin_noise,
     find_recognizer,
     find_synthesizer,
@@ -25,7 +26,6 @@ from dorothie_gym.speech import (
     say,
     signal_to_noise,
     spoken_words,
-    understand_speech,
 )
 
 VOICE_RATE: Final = 3.6
@@ -152,12 +152,11 @@ class SpokenDialogue:
         return found * np.float32(10.0 ** (CROSSTALK / 20.0))
 
     def _read(self, span: Span, heard: Recognition, after: DialogueMove | None) -> Span:
-        if heard.text.split() == spoken_words(span.text):
-            return Span(readable(heard.text), span.act)
-        if not self._classify:
-            return Span(readable(heard.text), UNCLASSIFIED)
-        found = understand_speech(heard, after)
-        return Span(found.text, found.act)
+        words = audible(heard)
+        text = readable(words)
+        if words.split() == spoken_words(span.text):
+            return Span(text, span.act)
+        return Span(text, guess_act(text, after) if self._classify else UNCLASSIFIED)
 
 
 def _add(target: Samples, samples: Samples, offset: int) -> None:

@@ -165,6 +165,11 @@ class SpeechState:
         """Returns whether the last remark said that the other speaker was not understood."""
         return self.last is not None and self.last.act.move is DialogueMove.CONFUSE
 
+    @property
+    def may_ask_back(self) -> bool:
+        """Returns whether the speaker may say that the other was not understood: not for the third time in a row."""
+        return any(item.act.move is not DialogueMove.CONFUSE for item in self.said[-2:]) or len(self.said) < 2
+
     def has_just_spoken(self, now: float, within: float) -> bool:
         """Returns whether the last utterance ended no longer than `within` ago [s], or has not ended yet."""
         return now - self.last_end < within

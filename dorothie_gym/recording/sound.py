@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -84,8 +84,19 @@ def sound_track(session: Session, start: float, seconds: float) -> Samples:
         AudioError: a file is damaged.
         SpeechError: the extra `speech` is not installed.
     """
+    return mixed_track(_timed(session), start, seconds)
+
+
+def mixed_track(spoken: Iterable[tuple[float, Samples]], start: float, seconds: float) -> Samples:
+    """Returns pieces of audio at 16 kHz at their times, in one track (n,), clipped to full scale.
+
+    Args:
+        spoken: start of each piece [s of the session], and its samples.
+        start: time of the first sample [s of the session].
+        seconds: duration [s].
+    """
     track = np.zeros(round(seconds * SAMPLE_RATE), dtype=np.float32)
-    for begun, samples in _timed(session):
+    for begun, samples in spoken:
         first = round((begun - start) * SAMPLE_RATE)
         low, high = max(first, 0), min(first + len(samples), len(track))
         if low < high:

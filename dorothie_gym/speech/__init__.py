@@ -3,6 +3,7 @@
 Needs the extra `speech`; the packages are imported when a synthesiser or recogniser is made, and nothing is downloaded.
 """
 
+from dorothie_gym.dialogue import INAUDIBLE
 from dorothie_gym.errors import AudioError, SpeechError
 from dorothie_gym.speech.audio import (
     SAMPLE_RATE,
@@ -18,7 +19,7 @@ from dorothie_gym.speech.cabin_noise import CabinState, cabin_noise, mixed, pink
 from dorothie_gym.speech.http_speech import HttpRecognizer, HttpSynthesizer
 from dorothie_gym.speech.recognizer import Hypothesis, Recognition, RecognizedWord, Recognizer
 from dorothie_gym.speech.spoken_form import spoken_words, written_form
-from dorothie_gym.speech.spoken_understanding import INAUDIBLE, SpokenUnderstanding, readable, understand_speech
+from dorothie_gym.speech.spoken_understanding import SpokenUnderstanding, audible, readable, understand_speech
 from dorothie_gym.speech.synthesizer import Synthesizer, Voice, say
 from dorothie_gym.speech.whisper_recognizer import WhisperRecognizer
 
@@ -41,6 +42,7 @@ __all__ = [
     "Synthesizer",
     "Voice",
     "WhisperRecognizer",
+    "audible",
     "cabin_noise",
     "checked_samples",
     "encode_flac",

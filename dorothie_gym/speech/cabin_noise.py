@@ -6,6 +6,7 @@ values of a passenger car.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Final
@@ -114,13 +115,16 @@ def cabin_noise(state: CabinState, length: int, rng: np.random.Generator) -> Sam
     """
     if length < 1:
         return np.empty(0, dtype=np.float32)
-    frequencies = np.asarray(np.fft.rfftfreq(length, 1.0 / SAMPLE_RATE), dtype=np.float64)
-    total: NDArray[np.float64] = np.zeros(length)
-    for name, level in noise_levels(state).items():
-        source = np.fft.irfft(_shape(name, frequencies) * np.fft.rfft(rng.standard_normal(length)), length)
-        if name == "talk":
-            source *= _syllables(length, state.talkers, rng)
-        total += source * 10.0 ** (level / 20.0) / max(_weighted_rms(source), 1e-12)
+    padded = _fast_length(length)
+    gain = _a_weighting(padded)
+    levels = noise_levels(state)
+    talk = levels.pop("talk", None)
+    # independent steady sources are one source whose power spectrum is the sum of theirs
+    power = sum(10.0 ** (level / 10.0) * np.square(_shape(name, padded, gain)) for name, level in levels.items())
+    total = _coloured(np.sqrt(power), padded, rng)[:length]
+    if talk is not None:
+        voices = _coloured(_shape("talk", padded, gain), padded, rng)[:length] * _syllables(length, state.talkers, rng)
+        total += voices * 10.0 ** (talk / 20.0)
     return (total / max(_weighted_rms(total), 1e-12)).astype(np.float32)
 
 
@@ -160,15 +164,30 @@ def pink_noise(length: int, rng: np.random.Generator) -> Samples:
     return np.asarray(noise / np.sqrt(np.mean(np.square(noise))), dtype=np.float32)
 
 
-def _shape(name: str, frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the amplitude of a source by frequency [Hz]: corner frequency and slope are set by hand."""
+@functools.lru_cache(maxsize=64)
+def _fast_length(length: int) -> int:
+    """Returns the next length whose Fourier transform is fast; lengths of speech are often prime."""
+    from scipy.fft import next_fast_len
+
+    return int(next_fast_len(length, real=True))
+
+
+def _coloured(shape: NDArray[np.float64], length: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Returns white noise filtered to an amplitude by frequency (length // 2 + 1,)."""
+    return np.asarray(np.fft.irfft(shape * np.fft.rfft(rng.standard_normal(length)), length))
+
+
+def _shape(name: str, length: int, gain: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the amplitude of a source by frequency, of an A-weighted power of 1: corner and slope are set by hand."""
     corner, slope = {
         "idle": (60.0, -9.0), "road": (150.0, -9.0), "air": (300.0, -6.0), "rain": (2000.0, -3.0),
         "talk": (500.0, LONG_TERM_SLOPE),
     }[name]  # fmt: skip
-    octaves = np.log2(np.maximum(frequencies, 1.0) / corner)
-    shape = 10.0 ** (slope * np.maximum(octaves, 0.0) / 20.0)
-    return np.where(frequencies < 30.0, 0.0, shape)
+    frequencies = np.fft.rfftfreq(length, 1.0 / SAMPLE_RATE)
+    # a slope in dB per octave is a power of the frequency
+    shape = np.maximum(frequencies / corner, 1.0) ** (slope / (20.0 * math.log10(2.0)))
+    shape[frequencies < 30.0] = 0.0
+    return np.asarray(shape / math.sqrt(2.0 * float(np.square(shape * gain).sum()) / length))
 
 
 def _syllables(length: int, talkers: int, rng: np.random.Generator) -> NDArray[np.float64]:
@@ -183,13 +202,23 @@ def _syllables(length: int, talkers: int, rng: np.random.Generator) -> NDArray[n
 
 def _weighted(samples: NDArray[np.floating]) -> NDArray[np.float64]:
     """Returns samples at 16 kHz with A-weighting (IEC 61672-1)."""
-    spectrum = np.fft.rfft(np.asarray(samples, dtype=np.float64))
-    squared = np.square(np.fft.rfftfreq(len(samples), 1.0 / SAMPLE_RATE))
+    length = _fast_length(len(samples))
+    spectrum = np.fft.rfft(np.asarray(samples, dtype=np.float64), length)
+    return np.asarray(np.fft.irfft(spectrum * _a_weighting(length), length)[: len(samples)])
+
+
+@functools.lru_cache(maxsize=16)
+def _a_weighting(length: int) -> NDArray[np.float64]:
+    """Returns the gain of A-weighting by frequency, for transforms of a length."""
+    squared = np.square(np.fft.rfftfreq(length, 1.0 / SAMPLE_RATE))
     gain = 12194.0**2 * squared**2 / (
         (squared + 20.6**2) * np.sqrt((squared + 107.7**2) * (squared + 737.9**2)) * (squared + 12194.0**2)
     )  # fmt: skip
-    return np.fft.irfft(spectrum * gain * 10.0 ** (2.0 / 20.0), len(samples))
+    return np.asarray(gain * 10.0 ** (2.0 / 20.0))
 
 
 def _weighted_rms(samples: NDArray[np.floating]) -> float:
-    return float(np.sqrt(np.mean(np.square(_weighted(samples)))))
+    """Returns the root mean square of samples with A-weighting, from their spectrum (Parseval)."""
+    length = _fast_length(len(samples))
+    power = np.square(np.abs(np.fft.rfft(np.asarray(samples, dtype=np.float64), length)) * _a_weighting(length))
+    return math.sqrt(2.0 * float(power.sum()) / length / len(samples))

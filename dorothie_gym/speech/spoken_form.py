@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from dorothie_gym.dialogue import load_lexicon
+from dorothie_gym.dialogue import INAUDIBLE, load_lexicon
 from dorothie_gym.dialogue.numerals import cardinal, read_ordinal
 from dorothie_gym.dialogue.numerals import ordinal as ordinal_word
 from dorothie_gym.ontology import Slot
@@ -78,7 +78,7 @@ def written_form(tokens: Sequence[str]) -> str:
     while place < len(tokens):
         token = tokens[place]
         if token in PUNCTUATION:
-            if parts:
+            if parts and (parts[-1] != INAUDIBLE or token == "?"):
                 parts[-1] += token
             place += 1
             continue

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition
-from dorothie_gym.ontology import ActionValue
+from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, is_partly_inaudible
+from dorothie_gym.ontology import ActionValue, Slot
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.goals import doubt
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.speech import intend
 
 FRAGMENT = 3
@@ -18,6 +19,12 @@ FRAGMENT = 3
 def is_garbled(words: ParsedText) -> bool:
     """Returns whether words that make no sense are so few that they have probably been misheard."""
     return len(words.text.split()) <= FRAGMENT
+
+
+def is_unclear(state: CoWizardState, heard: HeardUtterance) -> bool:
+    """Returns whether the participant is to say again what was partly inaudible; never a stop, which cannot wait."""
+    stops = any(ActionValue.STOP in act.values(Slot.ACTION) for act in heard.acts)
+    return is_partly_inaudible(heard.words.text) and not stops and state.speech.may_ask_back
 
 
 def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:

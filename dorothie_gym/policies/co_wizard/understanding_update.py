@@ -37,7 +37,7 @@ from dorothie_gym.policies.co_wizard.goals import (
 from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, do_turn
 from dorothie_gym.policies.co_wizard.judgement import believes
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
-from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, is_garbled, note_contradiction
+from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, is_garbled, is_unclear, note_contradiction
 from dorothie_gym.policies.co_wizard.repetition import note_order
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive
 from dorothie_gym.policies.co_wizard.story import note_owner, remember
@@ -77,7 +77,10 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     state.speech = state.speech.without_told(heard.words.told)
     before = () if done else _still_due(state)
     state.speech = state.speech.cleared()
-    if _mishears(state, heard, rng):
+    unclear = is_unclear(state, heard)
+    if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
+        do_stop(state, view, heard.acts[0], heard.words)
+    if unclear or _mishears(state, heard, rng):
         state.say(intend(Function.NEGATIVE_FEEDBACK), *before)
         return
     state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
@@ -441,7 +444,11 @@ def _confusion(
 ) -> None:
     """Repeats the last remark that can be repeated."""
     state.feel(Happening.MISUNDERSTOOD, view.time)
-    said = [item for item in state.speech.said if item.act.move in _REPEATABLE]
+    said = [
+        item
+        for place, item in enumerate(state.speech.said, start=1)
+        if item.act.move in _REPEATABLE or (place == len(state.speech.said) and item.act.slots)
+    ]
     if not said:
         return
     last = said[-1]

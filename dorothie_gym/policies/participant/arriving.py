@@ -38,6 +38,9 @@ SHORT_RESERVE = 1.0
 SHOUTS = 3
 """Number of short wordings that are compared when there is only time for a shout."""
 
+REWORDINGS = 4
+"""Number of draws of other words for a stop instruction that is repeated."""
+
 BEHIND_CORNER = 5.0
 """Distance from the beginning of a lane within which a car has just turned and is about to speed up [m]."""
 
@@ -74,7 +77,8 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     if _room_to_stop(state, view, left)[0] < -config.late_stop:
         # there is only time for a shout
         shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(SHOUTS)]
-        shortest = min(*shouts, state.guidance.stop_text, key=state.speech.delivery.seconds)
+        options = [text for text in (*shouts, state.guidance.stop_text) if text != state.guidance.stop_said] or shouts
+        shortest = min(options, key=state.speech.delivery.seconds)
         state.guidance = state.guidance.with_stop_text(shortest)
     if _is_time_to_stop(state, view, left):
         if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > 0.0:
@@ -93,7 +97,11 @@ def _choose_stop_words(state: ParticipantState, rng: np.random.Generator) -> Non
     first = not state.route.misses and state.guidance.stopped_at == -math.inf
     points_out = first and rng.random() < state.style.points_out
     act, wording = (_here(state).act, _HERE) if points_out else (_STOP, Wording(here=True))
-    text = word_act(act, Role.PARTICIPANT, rng, wording, style=state.speech.style)
+    text = said = state.guidance.stop_said
+    for _ in range(REWORDINGS):
+        text = word_act(act, Role.PARTICIPANT, rng, wording, style=state.speech.style)
+        if text != said:
+            break
     state.guidance = state.guidance.with_stop_text(text, points_out=points_out)
 
 
@@ -107,7 +115,7 @@ def _here(state: ParticipantState) -> Remark:
 def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
     """Returns the time after which the stop instruction is repeated [s]: soon if the car does not brake."""
     heeded = view.speed < state.motion.speed - BRAKING
-    return STOP_REPEAT if heeded else state.speech.delivery.seconds(state.guidance.stop_text) + REACTION
+    return STOP_REPEAT if heeded else state.speech.delivery.seconds(state.guidance.stop_said) + REACTION
 
 
 def _announce_place(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction, ParsedText, speech_seconds
+from dorothie_gym.dialogue import CommunicativeFunction, ParsedText, is_partly_inaudible, speech_seconds
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Slot, SlotValue
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.observation_parser import HeardUtterance
@@ -22,7 +22,7 @@ _SIDEWAYS = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 
 
 def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtterance, rng: np.random.Generator) -> bool:
-    """Returns whether the participant has to ask for words that the car said while the participant was speaking.
+    """Returns whether the participant has to ask for words that were inaudible, or said while it was speaking.
 
     Args:
         state: working copy of the state; keeps the utterance, to answer it after the clarification.
@@ -30,6 +30,9 @@ def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtter
         heard: utterance of the car.
         rng: random generator of the decision.
     """
+    if is_partly_inaudible(heard.words.text) and state.speech.may_ask_back:
+        state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
+        return True
     if heard.acts[0].move is DialogueMove.CLARIFY:
         return False
     spoke_meanwhile = state.speech.last_end > view.time - speech_seconds(heard.words.text)

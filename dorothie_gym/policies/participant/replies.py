@@ -297,8 +297,10 @@ def _confusion(
 
 
 def _is_of_the_moment(said: Remark) -> bool:
-    """Returns whether a remark is repeated as it was: one beside the task, or an action that no step names."""
-    return said.act.move is DialogueMove.IRRELEVANT or bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)
+    """Returns whether a remark is repeated as it was: a question, one beside the task, or an action no step names."""
+    if said.act.move in contents.QUESTIONS or said.act.move is DialogueMove.IRRELEVANT:
+        return True
+    return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)
 
 
 def _acknowledgement(

@@ -210,6 +210,7 @@ class GuidanceState:
         slowed_early: whether it has been asked to slow down because the place is easily missed.
         stop_text: words to stop the car with; empty until they are chosen.
         points_out: whether these words only state that this is the place.
+        stop_said: words of the last stop instruction, which are not repeated: they may be hard to recognise.
         stopped_at: time of the last stop instruction [s].
         nudged_at: time of the last instruction to drive on a little [s].
         nudges: number of such instructions, and of remarks about them, while the car has stood.
@@ -229,6 +230,7 @@ class GuidanceState:
     approach_announced: bool = False
     slowed_early: bool = False
     stop_text: str = ""
+    stop_said: str = ""
     points_out: bool = False
     stopped_at: float = -math.inf
     nudged_at: float = -math.inf
@@ -307,7 +309,7 @@ class GuidanceState:
 
     def after_stopping(self, now: float) -> GuidanceState:
         """Records an instruction to stop; if it has to be repeated, it is a plain one."""
-        return replace(self, stopped_at=now, stop_text="" if self.points_out else self.stop_text, points_out=False)
+        return replace(self, stopped_at=now, stop_text="", stop_said=self.stop_text, points_out=False)
 
     def after_nudging(self, now: float, standing_since: float) -> GuidanceState:
         """Records an instruction at `now` [s] to drive on a little, to a car that has stood since a time [s]."""
