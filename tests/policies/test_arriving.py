@@ -86,6 +86,14 @@ def test_car_that_stands_because_it_does_not_know_the_way_is_told_the_way() -> N
     assert told.act.values(Slot.ACTION)
 
 
+def test_car_that_waits_for_the_way_just_before_the_place_is_sent_straight_on() -> None:
+    human = Guide(9.0)
+    hears_answer(human, "because I need to know which way to go")
+    (told,) = human.state.speech.queue
+    assert told.act.values(Slot.ACTION) == (ActionValue.LANE_FOLLOW,)
+    assert told.wording.distance is None, "a distance would make the car stop at the junction again"
+
+
 def test_car_that_still_stands_at_a_former_errand_is_told_the_place_again() -> None:
     human = Guide(200.0)
     assert human.state.task.goal is not None

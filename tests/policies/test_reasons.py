@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dorothie_gym.dialogue import Predicate, Proposition, understand, word_act
+from dorothie_gym.dialogue import Direction, Predicate, Proposition, understand, word_act
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, ObjectClass, PhysicalAction, Role, Slot
 from dorothie_gym.policies.co_wizard.answers import answer_open
@@ -103,6 +103,19 @@ def test_car_that_waits_for_the_way_asks_again_when_it_is_told_to_start():
     waiting = view_of(talk, motion=np.int64(Motion.WAITING), speed=np.zeros(1))
     OBEYED[ActionValue.START](talk.state, waiting, DialogueAct.of(M.INSTRUCT, ActionValue.START), understand("go"))
     assert talk.state.dialogue.asked_lane == -1
+
+
+@pytest.mark.parametrize(("text", "crosses"), [("drive on for nine meters", True), ("go two meters further", False)])
+def test_car_crosses_the_junction_before_it_when_it_is_told_to_go_farther_than_that(text: str, crosses: bool):
+    talk = on_the_way()
+    view = view_of(talk, speed=np.zeros(1))
+    assert view.choice is not None and 3.0 < view.choice.distance < 8.0
+    talk.state.intentions = talk.state.intentions.directed(None).halting()
+    act = DialogueAct.of(M.INSTRUCT, ActionValue.LANE_FOLLOW)
+    OBEYED[ActionValue.LANE_FOLLOW](talk.state, view, act, understand(text))
+    directive = talk.state.intentions.directive
+    assert (directive is not None and directive.direction is Direction.STRAIGHT) is crosses
+    assert talk.state.intentions.nudge is not None and not talk.state.intentions.halted
 
 
 def test_stop_long_ago_is_not_explained_by_its_reason():

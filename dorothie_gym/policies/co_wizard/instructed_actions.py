@@ -44,14 +44,18 @@ def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: P
 
 
 def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    close = state.intentions.halted or state.intentions.creeping or view.standing
+    close, choice = state.intentions.halted or state.intentions.creeping or view.standing, junction_meant(state, view)
     if close and (words.further or words.distance is not None):
         distance = float(words.distance) if words.distance is not None else state.config.nudge_distance
-        state.intentions = state.intentions.nudged(place_ahead(state, view, distance))
-        return
-    choice = junction_meant(state, view)
-    state.intentions = state.intentions.proceeding()
-    if choice is not None and (words.direction is Direction.STRAIGHT or choice.distance < STRAIGHT_ON_DISTANCE):
+        place = place_ahead(state, view, distance)
+        state.intentions = state.intentions.nudged(place)
+        across = place[0] != view.lane
+    else:
+        state.intentions = state.intentions.proceeding()
+        across = words.direction is Direction.STRAIGHT or (
+            choice is not None and choice.distance < STRAIGHT_ON_DISTANCE
+        )
+    if choice is not None and across:
         straight = Directive(direction=Direction.STRAIGHT, junction=choice.junction)
         state.intentions = state.intentions.directed(straight)
 

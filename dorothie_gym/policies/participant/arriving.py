@@ -6,7 +6,15 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, SpeakerStyle, Wording, word_act
+from dorothie_gym.dialogue import (
+    CommunicativeFunction,
+    Direction,
+    Predicate,
+    Proposition,
+    SpeakerStyle,
+    Wording,
+    word_act,
+)
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies.participant.orders import order
@@ -202,7 +210,8 @@ def _guide_standing(state: ParticipantState, view: ParticipantView, left: float)
 def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
     """Returns the instruction for a car that stands a little before the place.
 
-    A car that does not move is asked why instead of being told a third time; then it is told again, and to start.
+    A car that does not move is asked why instead of being told a third time; then it is told to go straight on, as a
+    junction may be what it waits before, and to start.
     """
     assert state.route.progress is not None
     since = view.time if state.motion.standing_since is None else state.motion.standing_since
@@ -212,9 +221,16 @@ def creep_instruction(state: ParticipantState, view: ParticipantView) -> Remark:
         return why_standing(state, view)
     if again and attempt == IN_VAIN:
         return order(DialogueMove.INSTRUCT, ActionValue.START)
+    if again:
+        return straight_on()
     left = state.route.progress.left(view.station)
     if left > 30.0:
         state.guidance = state.guidance.with_approach_announced(False)
     reserve = state.config.distance_reserve if left > 18.0 else SHORT_RESERVE
     wording = Wording(distance=left - reserve) if left > FURTHER else Wording(topic="further")
     return order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, wording)
+
+
+def straight_on() -> Remark:
+    """Returns the instruction to go straight on, across a junction as well."""
+    return order(DialogueMove.INSTRUCT, ActionValue.LANE_FOLLOW, Wording(direction=Direction.STRAIGHT))

@@ -24,7 +24,7 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
-from dorothie_gym.policies.participant.arriving import about_to_arrive
+from dorothie_gym.policies.participant.arriving import about_to_arrive, straight_on
 from dorothie_gym.policies.participant.goals import announcement, describe
 from dorothie_gym.policies.participant.guidance import next_step, note_step
 from dorothie_gym.policies.participant.reactions import note_blocked
@@ -218,7 +218,10 @@ def _answer_to_why(
         return
     if _LACKS_WAY.search(said):
         state.set_guiding(True)
+        before = state.speech
         _name_step(state, view, DialogueMove.INSTRUCT, rng)
+        if state.speech is before:  # there is no turn before the place
+            state.say_first(straight_on())
     elif not places or not _CLAIMS_ARRIVAL.search(said):
         return
     elif goal.name not in places:
