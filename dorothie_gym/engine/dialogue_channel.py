@@ -152,6 +152,11 @@ class DialogueChannel:
         spoken.begin(role, samples, utterance.end)
         return reason
 
+    def give_voices(self, pitches: Mapping[Role, float]) -> None:
+        """Gives speakers a pitch of their own, see `SpokenDialogue.give_voices`; without effect on the text channel."""
+        if self._spoken is not None:
+            self._spoken.give_voices(pitches)
+
     def note(self, landmark: LandmarkName, status: GoalStatus) -> None:
         """Updates the annotation with a change of a subgoal's status, which ends transactions."""
         self._annotator.note(landmark, status)

@@ -252,6 +252,10 @@ class LiveSession:
         """Utterances that have begun and are not over."""
         return self._dialogue.in_progress
 
+    def give_voices(self, pitches: Mapping[Role, float]) -> None:
+        """Gives speakers a pitch of their own, by role, before the first of them speaks."""
+        self._dialogue.give_voices(pitches)
+
     @property
     def recordings(self) -> Mapping[str, Samples]:
         """Audio of the spans that were over at the last decision, at 16 kHz, by file name; none without speech."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -33,8 +34,10 @@ VOICE_RATE: Final = 3.6
 sessions, without silence around them (`dorothie-gym bench speech`)."""
 
 PITCHES: Final = {Role.PARTICIPANT: (0.86, 0.97), Role.CO_WIZARD: (0.92, 0.96)}
-"""Ranges from which the pitch of a speaker's voice is drawn; set by hand. Above 1, the recogniser fails on short words:
-"stop" is recognised 8 times of 8 at 0.9, 3 to 5 times at 1, and never at 1.1."""
+"""Ranges from which the pitch of a speaker without a voice of its own is drawn; set by hand, see `policies.persona`."""
+
+DISTINCT: Final = 0.03
+"""Least difference in pitch between the two speakers; set by hand. Smaller ones are hard to hear between utterances."""
 
 CROSSTALK: Final = -15.0
 """Level of the other speaker's voice at a speaker's microphone, where both talk [dB]; set by hand."""
@@ -85,6 +88,22 @@ class SpokenDialogue:
         self._spans: dict[Role, list[SpokenSpan]] = {role: [] for role in PITCHES}
         self._over: dict[Role, list[SpokenSpan]] = {role: [] for role in PITCHES}
         self.recordings: dict[str, Samples] = {}
+
+    def give_voices(self, pitches: Mapping[Role, float]) -> None:
+        """Gives speakers a pitch of their own; moves the Co-Wizard's if it is too close to the participant's.
+
+        Args:
+            pitches: pitch relative to that of the synthesiser, by role; other roles keep theirs.
+
+        Raises:
+            ValueError: a pitch is out of the range of `Voice`.
+        """
+        self._voices |= {role: Voice(pitch=round(pitch, 2)) for role, pitch in pitches.items() if role in self._voices}
+        own, other = (self._voices[role].pitch for role in (Role.CO_WIZARD, Role.PARTICIPANT))
+        if round(abs(own - other), 2) < DISTINCT:
+            low, high = PITCHES[Role.PARTICIPANT]
+            moved = other + DISTINCT if other + DISTINCT <= high else max(other - DISTINCT, low)
+            self._voices[Role.CO_WIZARD] = Voice(pitch=round(moved, 2))
 
     def speak(self, role: Role, text: str, pace: float) -> Samples:
         """Returns a text as a role says it, at 16 kHz, with silence behind it up to `SHORTEST_SPAN`.

@@ -21,6 +21,8 @@ from dorothie_gym.spaces import ActionMapping
 PERSONAS: Final = "personas"
 """Field of a header with the personas of the scripted speakers, by role; see `dorothie_gym.policies.persona`."""
 
+PITCH: Final = "pitch"
+"""Trait that is the pitch of a persona's voice."""
 
 USAGE_FILE: Final = "usage.json"
 """What the policies have cost in a session (calls, tokens), by role; not part of the record, and absent for nothing."""
@@ -76,6 +78,7 @@ def play_session(
     engine = host.engine
     host.reset(seed=seed)
     states = {role: policies[role].initial_state(policy_seed(seed, role), engine.town) for role in AGENT_ROLES}
+    engine.session.give_voices(pitches_of(personas_of(policies, states)))
     with ExitStack() as stack:
         writer = None
         if folder is not None:
@@ -113,6 +116,20 @@ def with_personas(
     header: SessionHeader, policies: Mapping[Role, AnyPolicy], states: Mapping[Role, object]
 ) -> SessionHeader:  # fmt: skip
     """Returns a header that records the personas of policies, by role; the same one where there are none."""
-    found = {str(role): policy.persona_of(states[role]) for role, policy in policies.items()}
-    personas = {role: persona for role, persona in found.items() if persona is not None}
+    personas = personas_of(policies, states)
     return replace(header, extra={**header.extra, PERSONAS: personas}) if personas else header
+
+
+def personas_of(
+    policies: Mapping[Role, AnyPolicy], states: Mapping[Role, object]
+) -> dict[str, Mapping[str, float | str]]:  # fmt: skip
+    """Returns the personas of policies, by role; those that have none are left out."""
+    found = {str(role): policy.persona_of(states[role]) for role, policy in policies.items()}
+    return {role: persona for role, persona in found.items() if persona is not None}
+
+
+def pitches_of(personas: object) -> dict[Role, float]:
+    """Returns the pitch of the speakers' voices by role, from personas as a header records them; none without any."""
+    known = personas if isinstance(personas, Mapping) else {}
+    found = {role: known[str(role)].get(PITCH) for role in AGENT_ROLES if isinstance(known.get(str(role)), Mapping)}
+    return {role: float(pitch) for role, pitch in found.items() if isinstance(pitch, float | int)}

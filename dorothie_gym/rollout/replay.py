@@ -19,6 +19,7 @@ from dorothie_gym.errors import SessionError, StoryboardError, TownError
 from dorothie_gym.input_files import checked, raising
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.catalogue import find_town
+from dorothie_gym.ontology import Role
 from dorothie_gym.recording import (
     CorpusEntry,
     Difference,
@@ -28,8 +29,10 @@ from dorothie_gym.recording import (
     SessionWriter,
     first_difference,
 )
+from dorothie_gym.rollout.play import PERSONAS, pitches_of
 from dorothie_gym.rollout.processes import run_tasks
 from dorothie_gym.spaces import ActionDict, Observation
+from dorothie_gym.speech.synthesizer import HIGHEST_PITCH, LOWEST_PITCH
 from dorothie_gym.tasks import StoryboardTemplate, load_template, template_names
 
 Observations: TypeAlias = Mapping[str, Observation]
@@ -110,7 +113,19 @@ def begin_replay(session: Session, town: Town, *, storyboard: StoryboardTemplate
     config = config_of(session.header)
     engine = SessionEngine(town, config=config, max_cycles=_cycles(session, config))
     engine.reset(scenario=_scenario(session, town, storyboard))
+    engine.session.give_voices(_voices(session))
     return engine
+
+
+def _voices(session: Session) -> dict[Role, float]:
+    """Returns the pitch of each voice; raises `SessionError` if the record has one that no voice can have."""
+    pitches = pitches_of(session.header.extra.get(PERSONAS))
+    for role, pitch in pitches.items():
+        if not LOWEST_PITCH <= pitch <= HIGHEST_PITCH:
+            raise SessionError(
+                f"{session.name}: {PERSONAS}.{role}.pitch is {pitch}; it must be in {LOWEST_PITCH}..{HIGHEST_PITCH}"
+            )
+    return pitches
 
 
 def recorded_actions(engine: SessionEngine, session: Session) -> Iterator[Actions]:

@@ -22,8 +22,8 @@ FRAMES_PER_SECOND: Final = 100
 """Frames of the recogniser per second."""
 
 PADDING: Final = 0.12
-"""Silence around the audio [s]; the decoder needs some to begin and end with, but much of it spoils the normalisation of
-noisy audio. On 400 spans in the noise of the car, the word error rate is 3.9 % with 0.25 s and 3.2 % with 0.12 s."""
+"""Silence around the audio [s]; the decoder needs some to begin and end with, but much of it spoils the normalisation
+of noisy audio. On 400 spans in the noise of the car, the word error rate is 3.9 % with 0.25 s and 3.2 % with 0.12 s."""
 
 LEVEL: Final = 0.08
 """Root mean square to which audio is scaled; the features are normalised, so only rounding depends on it."""
@@ -62,7 +62,8 @@ class SphinxRecognizer:
             dictionary.write_text(language.dictionary, encoding="utf-8")
             self._decoder: Any = sphinx.Decoder(
                 hmm=str(models / "en-us"), lm=str(arpa), dict=str(dictionary), loglevel="FATAL",
-                # without the second pass over the words of the first: a third less time, and 0.0395 instead of 0.046 errors
+                # the second pass over the words of the first takes a third of the time and corrects nothing: on 120
+                # spans in the noise of the car, the word error rate is 5.1 % with it and 4.8 % without
                 fwdflat=False,
             )  # fmt: skip
 

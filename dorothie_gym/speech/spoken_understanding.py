@@ -16,13 +16,15 @@ from dorothie_gym.speech.recognizer import Recognition, RecognizedWord
 from dorothie_gym.speech.spoken_form import written_form
 
 DOUBTFUL: Final = 0.2
-"""Confidence of a word below which it is probably wrong: on the short spans of sessions in the noise of the car, words of
-right ones have 0.26 or more, and all wrong ones but one contain a word below 0.06."""
+"""Confidence of a word below which it is probably wrong. Of the 256 shortest of 400 spans in the noise of the car, 9
+are marked by it, of which 6 are wrong; two lost a value: one is marked, and of the other nothing is recognised."""
 
 SHORT: Final = 2
 """Number of words up to which every doubtful one matters; there is no context that would make up for it."""
 
-_SLIGHT: Final = frozenset("a ah an and er hey hm hmm oh of so the to uh um well yo".split())
+_SLIGHT: Final = frozenset(
+    {"a", "ah", "an", "and", "er", "hey", "hm", "hmm", "oh", "of", "so", "the", "to", "uh", "um", "well", "yo"}
+)
 """Words on which no meaning depends, however doubtful they are."""
 
 
@@ -54,8 +56,8 @@ def readable(text: str) -> str:
 def audible(recognition: Recognition) -> str:
     """Returns the recognised words with `INAUDIBLE` in place of doubtful ones, where these may change the meaning.
 
-    They may if the hypotheses differ in the values of slots, or the speech is short. Systems of spoken dialogue likewise
-    reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial 2005).
+    They may if the hypotheses differ in the values of slots, or the speech is short. Systems of spoken dialogue
+    likewise reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial 2005).
     """
     if not any(map(_is_doubtful, recognition.words)):
         return recognition.text

@@ -15,6 +15,9 @@ from dorothie_gym.speech.audio import Samples
 SLOWEST, FASTEST = 0.5, 2.0
 """Range of relative speaking rates; beyond it, synthesisers drop or smear sounds."""
 
+LOWEST_PITCH, HIGHEST_PITCH = 0.8, 1.25
+"""Range of the pitch of a voice relative to that of the synthesiser; beyond it, voices sound distorted."""
+
 LONGEST_TEXT: Final = 1000
 """Longest text that is synthesised at once [characters]."""
 
@@ -70,8 +73,8 @@ class Voice:
     def __post_init__(self) -> None:
         if not SLOWEST <= self.rate <= FASTEST:
             raise ValueError(f"Voice.rate is {self.rate}; it must be in {SLOWEST}..{FASTEST}")
-        if not 0.8 <= self.pitch <= 1.25:
-            raise ValueError(f"Voice.pitch is {self.pitch}; it must be in 0.8..1.25")
+        if not LOWEST_PITCH <= self.pitch <= HIGHEST_PITCH:
+            raise ValueError(f"Voice.pitch is {self.pitch}; it must be in {LOWEST_PITCH}..{HIGHEST_PITCH}")
 
 
 def check_request(text: str, rate: float) -> None:

@@ -1,6 +1,7 @@
 """Sessions in which talk is synthesised, mixed with noise and recognised."""
 
 import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,9 @@ from dorothie_gym import DuoWizardEnv, EnvConfig
 from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.engine.spoken_dialogue import SpokenDialogue, SpokenSpan
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv
+from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED
@@ -23,6 +26,7 @@ from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.speech import read_audio, spoken_words
 
 TOWN = "brookside"
+SPEAKERS = (Role.PARTICIPANT, Role.CO_WIZARD)
 ALONE = WorldConfig(vehicles=0, pedestrians=0)
 CONFIG = EnvConfig(channel=ChannelKind.SPEECH, max_seconds=45.0, world=ALONE)
 
@@ -127,9 +131,25 @@ def test_settings_are_checked() -> None:
         DuoWizardVectorEnv(2, TOWN, config=CONFIG)
 
 
-def test_crosstalk_is_quieter_than_the_speaker() -> None:
-    from dorothie_gym.engine.spoken_dialogue import SpokenDialogue, SpokenSpan
+def test_speakers_have_the_voices_of_their_personas_and_differ(session: Session) -> None:
+    personas = session.header.extra["personas"]
+    assert isinstance(personas, dict) and all(0.86 <= personas[str(role)]["pitch"] <= 0.97 for role in SPEAKERS)
+    spoken = SpokenDialogue(np.random.SeedSequence(1), words_per_second=2.7, classify=True)
+    spoken.give_voices({Role.PARTICIPANT: 0.951, Role.CO_WIZARD: 0.96})
+    pitches = {role: spoken._voices[role].pitch for role in SPEAKERS}
+    assert pitches == {Role.PARTICIPANT: 0.95, Role.CO_WIZARD: 0.92}
+    spoken.give_voices({Role.PARTICIPANT: 0.87})
+    assert spoken._voices[Role.PARTICIPANT].pitch == 0.87
 
+
+def test_recorded_voice_out_of_range_is_refused(session: Session) -> None:
+    extra = {**session.header.extra, "personas": {"participant": {"pitch": 3.0}}}
+    header = replace(session.header, extra=extra)
+    with pytest.raises(SessionError, match=r"personas\.participant\.pitch is 3\.0; it must be in 0\.8\.\.1\.25"):
+        resimulate(replace(session, header=header), load_town(TOWN))
+
+
+def test_crosstalk_is_quieter_than_the_speaker() -> None:
     spoken = SpokenDialogue(np.random.SeedSequence(1), words_per_second=2.7, classify=True)
     samples = spoken.speak(Role.CO_WIZARD, "Which way now?", 1.0)
     spoken.begin(Role.CO_WIZARD, samples, end=10.0 + len(samples) / 16000)

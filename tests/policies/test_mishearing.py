@@ -6,11 +6,22 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import AsrChannel, Wording, understand
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, LandmarkName, PhysicalAction
+from dorothie_gym.ontology import (
+    ActionValue,
+    DialogueAct,
+    DialogueMove,
+    GoalStatus,
+    LandmarkName,
+    ObjectClass,
+    PhysicalAction,
+    Role,
+)
 from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, note_contradiction
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Speech
+from tests.policies.said import with_words
 from tests.policies.test_co_wizard import Talk
 from tests.policies.test_repairs import Human
 
@@ -40,6 +51,35 @@ def test_small_talk_on_the_way_is_no_reason_to_ask() -> None:
     says(talk, M.INSTRUCT, "to that place", talk.landmarks(hidden=False)[0].name, decisions=6)
     says(talk, M.IRRELEVANT, "we used to come here every summer when I was little")
     assert M.CONFUSE not in talk.moves()
+
+
+def test_inaudible_words_are_asked_for_again_twice_and_then_left() -> None:
+    talk = Talk()
+    says(talk, M.INSTRUCT, "to that place", talk.landmarks(hidden=False)[0].name, decisions=6)
+    for asked in (1, 2, 2):
+        says(talk, M.EXPLAIN, "it's better if we ... road", decisions=14)
+        assert talk.moves().count(M.CONFUSE) == asked
+
+
+def test_stop_is_obeyed_although_the_rest_is_inaudible() -> None:
+    talk = Talk()
+    says(talk, M.INSTRUCT, "stop ...", ActionValue.STOP, decisions=4)
+    assert M.CONFUSE not in talk.moves()
+
+
+def test_participant_asks_for_inaudible_words() -> None:
+    human = Human()
+    human.observation = with_words(human.observation, Role.CO_WIZARD, "... not going ...", DialogueAct(M.EXPLAIN))
+    listen(human.state, human.view, human.rng)
+    assert human.moves() == [M.CONFUSE]
+
+
+def test_question_that_was_not_understood_is_asked_again() -> None:
+    human = Human()
+    question = remark(M.QUERY_YN, ObjectClass.VEHICLES)
+    human.state.speech = replace(human.state.speech, last=question, said=(question,), last_end=human.view.time)
+    human.hears(M.CONFUSE)
+    assert human.moves()[0] is M.QUERY_YN
 
 
 @pytest.mark.parametrize(("hidden", "stops"), [(True, True), (False, False)])

@@ -36,6 +36,14 @@ def test_personas_differ_in_every_trait():
     assert {persona.driving for persona in people} == set(Driving)
 
 
+def test_voices_of_personas_differ_and_can_be_given():
+    pitches = [persona.pitch for persona in drawn()]
+    assert min(pitches) < 0.87 and max(pitches) > 0.96 and np.mean(pitches) == pytest.approx(0.915, abs=0.01)
+    assert {persona.pitch for persona in drawn("pitch=0.9")} == {0.9}
+    with pytest.raises(ValueError, match=r"pitch is '1.2'.*0.86..0.97"):
+        parse_traits("pitch=1.2")
+
+
 def test_given_traits_hold_and_leave_the_others_alone():
     for free, fixed in zip(drawn(), drawn("talkativeness=0.8..1,directions=vague,patience=0.2"), strict=True):
         assert 0.8 <= fixed.talkativeness <= 1.0 and fixed.patience == 0.2 and fixed.directions is Directions.VAGUE

@@ -1,20 +1,27 @@
 """Synthesis and recognition with the real voice and recogniser."""
 
 import hashlib
+import math
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dorothie_gym.dialogue import is_partly_inaudible
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, StreetName
 from dorothie_gym.speech import (
     INAUDIBLE,
     AudioError,
+    Hypothesis,
+    Recognition,
+    RecognizedWord,
     SpeechError,
     Voice,
+    audible,
     find_recognizer,
     find_synthesizer,
     mixed,
@@ -102,7 +109,40 @@ def test_recognised_words_are_written_with_marks(spoken: str, written: str) -> N
     assert readable(spoken) == written
 
 
-@pytest.mark.parametrize("rate", [8000, 22050, 48000])
+def heard(*words: tuple[str, float], others: Sequence[str] = ()) -> Recognition:
+    found = tuple(RecognizedWord(text=text, start=0.0, end=0.1, confidence=sure) for text, sure in words)
+    text = " ".join(word.text for word in found)
+    hypotheses = tuple(Hypothesis(text=each, weight=1.0 / (1 + len(others))) for each in (text, *others))
+    return Recognition(text=text, words=found, hypotheses=hypotheses)
+
+
+@pytest.mark.parametrize(
+    ("recognition", "audible_words"),
+    [
+        (heard(("the", 0.01), ("house", 0.05)), "the ..."),
+        (heard(("yes", 0.9)), "yes"),
+        (heard(("um", 0.01), ("stop", 0.9)), "um stop"),
+        (
+            heard(("it's", 0.9), ("all", 0.1), ("done", 0.1), ("here", 0.9), others=("it's all gone here",)),
+            "it's ... here",
+        ),
+        (heard(("it", 0.9), ("is", 0.1), ("raining", 0.9), others=("it was raining",)), "it is raining"),
+        (heard(("go", math.nan), ("left", math.nan)), "go left"),
+        (Recognition(text=""), ""),
+    ],
+)
+def test_doubtful_words_are_inaudible_where_they_may_change_the_meaning(
+    recognition: Recognition, audible_words: str
+) -> None:
+    assert audible(recognition) == audible_words
+
+
+def test_inaudible_words_stay_so_in_writing() -> None:
+    assert readable("turn ... at the k f c").startswith("turn ...") and readable("...") == INAUDIBLE
+    assert is_partly_inaudible(readable("do you see the ...")) and not is_partly_inaudible("wait, what?")
+
+
+@pytest.mark.parametrize("rate", [8000, 11025, 22050, 44100, 48000, 96000])
 def test_other_sample_rates_are_recognised(audio: np.ndarray, rate: int) -> None:
     assert "left" in find_recognizer().recognize(resample(audio, 16000, rate), rate).text.split()
 
@@ -157,8 +197,13 @@ def test_unknown_names_and_wrong_requests_are_refused(audio: np.ndarray) -> None
         find_synthesizer().synthesize("a" * 1001)
     with pytest.raises(ValueError, match=r"Voice.pitch is 2"):
         Voice(pitch=2)
-    with pytest.raises(AudioError, match="is 70 s long"):
-        find_recognizer().recognize(np.zeros(70 * 16000, np.float32), 16000)
+    for seconds in (70, 36000):
+        long = np.broadcast_to(np.float32(0.0), seconds * 16000)  # ten hours take no memory
+        with pytest.raises(AudioError, match=f"is {seconds} s long; at most 60 s"):
+            find_recognizer().recognize(long, 16000)
+    for rate in (7999, 96001):
+        with pytest.raises(AudioError, match=f"has {rate} samples per second; 8000 to 96000 are supported"):
+            find_recognizer().recognize(np.zeros(1600, np.float32), rate)
     assert not len(find_synthesizer().synthesize("...", rate=SLOWEST))
 
 
