@@ -115,7 +115,8 @@ def test_car_crosses_the_junction_before_it_when_it_is_told_to_go_farther_than_t
     OBEYED[ActionValue.LANE_FOLLOW](talk.state, view, act, understand(text))
     directive = talk.state.intentions.directive
     assert (directive is not None and directive.direction is Direction.STRAIGHT) is crosses
-    assert talk.state.intentions.nudge is not None and not talk.state.intentions.halted
+    assert (talk.state.intentions.nudge is None) is crosses
+    assert not talk.state.intentions.halted
 
 
 def test_stop_long_ago_is_not_explained_by_its_reason():

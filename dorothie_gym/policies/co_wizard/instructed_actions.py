@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, TypeAlias
@@ -45,16 +46,15 @@ def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: P
 
 def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     close, choice = state.intentions.halted or state.intentions.creeping or view.standing, junction_meant(state, view)
+    way = math.inf if choice is None else choice.distance
+    across = words.direction is Direction.STRAIGHT or way < STRAIGHT_ON_DISTANCE
     if close and (words.further or words.distance is not None):
         distance = float(words.distance) if words.distance is not None else state.config.nudge_distance
-        place = place_ahead(state, view, distance)
-        state.intentions = state.intentions.nudged(place)
-        across = place[0] != view.lane
-    else:
-        state.intentions = state.intentions.proceeding()
-        across = words.direction is Direction.STRAIGHT or (
-            choice is not None and choice.distance < STRAIGHT_ON_DISTANCE
-        )
+        if distance <= way:
+            state.intentions = state.intentions.nudged(place_ahead(state, view, distance))
+            return
+        across = True  # at the junction, the car would wait for the way
+    state.intentions = state.intentions.proceeding()
     if choice is not None and across:
         straight = Directive(direction=Direction.STRAIGHT, junction=choice.junction)
         state.intentions = state.intentions.directed(straight)
