@@ -58,7 +58,7 @@ MORE_THAN_USUAL: Final = 1.5
 USUAL_TIME: Final = 30.0
 """Time over which the usual number of objects is averaged [s]."""
 
-CROWD_INTERVAL: Final = 75.0
+CROWD_INTERVAL: Final = 60.0
 """Time between remarks about crowds of a kind [s]."""
 
 

@@ -182,7 +182,7 @@ class CoWizardStyle:
             reassures=within(0.15, 0.0, persona.certainty, rng),
             pace=35 if gentle else int(rng.choice((40, 45))) if brisk else 40,
             chats=within(0.1, 0.6, persona.humour, rng),
-            notices=0.0 if persona.ignores else within(0.45, 0.95, persona.attention, rng),
+            notices=0.0 if persona.ignores else within(0.6, 1.0, persona.attention, rng),
             recalls=within(0.1, 0.6, persona.attention, rng),
         )
 

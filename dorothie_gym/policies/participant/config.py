@@ -205,7 +205,7 @@ class ParticipantStyle:
             points_out=within(0.5, 0.85, persona.politeness, rng) + 0.15 * landmarks,
             thanks=within(0.4, 0.9, persona.politeness, rng),
             verifies=within(0.2, 0.0, persona.certainty, rng),
-            notices=0.0 if persona.ignores else within(0.55, 1.0, persona.attention, rng),
+            notices=0.0 if persona.ignores else within(0.7, 1.0, persona.attention, rng),
         )
 
     def in_mood(self, mood: Mood) -> ParticipantStyle:
