@@ -35,3 +35,30 @@ def chromium(*flags: str) -> Iterator[Any]:
         launched = playwright.chromium.launch(executable_path=CHROMIUM, args=[*_FLAGS, *flags])
         yield launched
         launched.close()
+
+
+@contextmanager
+def another(browser: Any) -> Iterator[Any]:
+    """Yields a further Chromium, in processes of its own."""
+    launched = browser.browser_type.launch(executable_path=CHROMIUM, args=list(_FLAGS))
+    yield launched
+    launched.close()
+
+
+def press(page: Any, *keys: str) -> None:
+    """Presses keys one after the other."""
+    for key in keys:
+        page.keyboard.press(key)
+
+
+def tab_to(page: Any, label: str, most: int = 60) -> None:
+    """Moves the focus by the tabulator to the element with a label or text."""
+    for _ in range(most):
+        page.keyboard.press("Tab")
+        focused = page.evaluate(
+            "(() => { const e = document.activeElement; return [e.textContent, e.getAttribute('aria-label'),"
+            " e.labels?.[0]?.textContent].filter(Boolean).join(' '); })()"
+        )
+        if label in focused:
+            return
+    raise AssertionError(f"{label!r} cannot be reached by keyboard")

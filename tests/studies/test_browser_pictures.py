@@ -12,7 +12,7 @@ pytest.importorskip("playwright.sync_api", reason="needs playwright")
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
 from dorothie_gym.recording import Session
-from tests.chromium import IN_CHROMIUM, WAIT, chromium
+from tests.chromium import IN_CHROMIUM, WAIT, chromium, press, tab_to
 from tests.studies.content import STUDY, write_study
 from tests.studies.serving import ServedStudy
 
@@ -106,24 +106,6 @@ def to_code(page: Any) -> None:
     at(page, "debriefing")
     page.click("text=Continue")
     page.wait_for_selector("text=FINISHED")
-
-
-def press(page: Any, *keys: str) -> None:
-    for key in keys:
-        page.keyboard.press(key)
-
-
-def tab_to(page: Any, label: str) -> None:
-    """Moves the focus by the tabulator to the element with a label or text."""
-    for _ in range(60):
-        page.keyboard.press("Tab")
-        focused = page.evaluate(
-            "(() => { const e = document.activeElement; return [e.textContent, e.getAttribute('aria-label'),"
-            " e.labels?.[0]?.textContent].filter(Boolean).join(' '); })()"
-        )
-        if label in focused:
-            return
-    raise AssertionError(f"{label!r} cannot be reached by keyboard")
 
 
 def test_two_people_play_a_study_one_of_them_by_keyboard_on_a_phone(laboratory: Laboratory) -> None:
