@@ -22,7 +22,7 @@ WRONG: Sequence[Any] = (None, {}, [{}], [[[[]]]], 10**40, -(10**40), -1e308, "\u
 """Values of which each is wrong for fields of several types."""
 
 TRICKS = (
-    "/static/../server.py", "/static/%2e%2e/server.py", "/static/..%2fserver.py", "/static/%2e%2e%2f%2e%2e%2fcli/app.py",
+    "/static/../server.py", "/static/%2e%2e/server.py", "/static/..%2fserver.py", "/static/%2e%2e%2fcli/app.py",
     "/static/%252e%252e/server.py", "/static//etc/passwd", "/static/%00", "/static/main.js%00", "/static/%ff%fe",
     "/towns/..%2f..%2fserver.json", "/towns/%00.json", "/towns/%2e%2e.json", "/../../../../etc/passwd", "//etc/passwd",
     "/seat/..", "/%", "/%zz", "/\\..\\..\\x", "/speech/heard", "/study.sqlite", "/.git/config", "/ws", "/ws/../x",

@@ -16,44 +16,12 @@ pytest.importorskip("websockets", reason="needs the extra console")
 from websockets.exceptions import ConnectionClosed
 
 from dorothie_gym.console.connection import CloseCode
+from tests.console.malformed_messages import SOUND, STRICT, refusals
 from tests.console.people import Table
 from tests.console.serving import Served
 from tests.fuzzing import COUNTS, GROWTH, WRONG, check_raw_requests, malformed, memory, needs_memory
 
 SEATS = "participant", "co_wizard", "ad_wizard", "experimenter", "spectator"
-
-SOUND = (
-    {"k": "say", "n": 1, "text": "Left.", "spans": [{"text": "Left.", "move": "Instruct", "slots": {}}]},
-    {"k": "parse", "c": 1.0, "text": "Left."},
-    {"k": "correct", "utterance": 0, "span": 0, "move": "Instruct"},
-    {"k": "drive", "n": 1, "action": "JTurn", "angle": 90, "up": True},
-    {"k": "plan", "n": 1, "junctions": [1, 2]},
-    {"k": "goal", "n": 1, "landmarks": ["KFC"]},
-    {"k": "status", "n": 1, "landmark": "KFC", "status": "Complete"},
-    {"k": "mark", "n": 1, "landmark": "KFC", "x": 1.0, "y": 2.0},
-    {"k": "weather", "n": 1, "parameter": "fog_density", "share": 0.5},
-    {"k": "prop", "n": 1, "prop": "tree", "x": 1.0, "y": 2.0},
-    {"k": "move", "n": 1, "item": 0, "x": 1.0, "y": 2.0},
-    {"k": "spawn", "n": 1, "what": "vehicles", "x": 1.0, "y": 2.0, "count": 4},
-    {"k": "fault", "n": 1, "sensor": "gps", "on": True},
-    {"k": "task", "n": 1, "change": "trigger", "item": 0},
-    {"k": "message", "n": 1, "text": "Hello."},
-    {"k": "control", "act": "pause"},
-    {"k": "announce", "text": "Hello."},
-    {"k": "view", "rate": 5},
-)
-
-_NUMBERS = [None, {}, [{}], "1", 10**40, -(10**40), "x" * 9000]
-_TEXTS = [None, {}, [{}], 10**40, True, "x" * 9000]
-STRICT: dict[str, Any] = {
-    **dict.fromkeys(("n", "utterance", "item", "count", "rate"), [*_NUMBERS, -1, 1.5, 2**40]),
-    **dict.fromkeys(("x", "y", "share"), [*_NUMBERS, 1e300, -1e300]),
-    **dict.fromkeys(("k", "action", "landmark", "move", "parameter", "prop", "sensor", "what", "change", "act"),
-                    [*_TEXTS, "", "nonsense", "\x00", "../..", "\ud800"]),
-    "text": _TEXTS, "junctions": [None, {}, "1", [1.5], ["x"], [-1], [10**40]], "on": [None, {}, 1, "yes"],
-    "landmarks": [None, {}, "KFC", [1], [None]],
-}  # fmt: skip
-"""Fields of messages, and values of which none is allowed."""
 
 
 @pytest.fixture
@@ -62,16 +30,6 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
     table = Table("participant=human,co_wizard=human,ad_wizard=human", max_seconds=3600.0)
     with Served(table.room) as running:
         yield running
-
-
-def refusals(socket: Any, count: int) -> None:
-    """Reads refusals up to a number; other messages must be of the session."""
-    while count:
-        message = json.loads(socket.recv(timeout=30))
-        assert message["k"] in ("hello", "frame", "refused"), message
-        if message["k"] == "refused":
-            assert message["reason"] and "\n" not in message["reason"] and len(message["reason"]) < 1500
-            count -= 1
 
 
 @needs_memory()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-import resource
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +13,8 @@ import pytest
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
 from dorothie_gym.studies.server import ENTRIES, MAX_BYTES, REQUESTS
+from tests.console.malformed_messages import SOUND, STRICT, refusals
+from tests.fuzzing import COUNTS, GROWTH, check_raw_requests, malformed, memory, needs_memory
 from tests.studies.content import SOLO, write_study
 from tests.studies.serving import Client, ServedStudy
 
@@ -149,22 +150,24 @@ def body(drawn: random.Random) -> bytes:
     return text[: drawn.randrange(len(text))] if kind < 0.4 else text
 
 
-def peak() -> float:
-    """Returns the largest memory that this process has had [MB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-
-
-@pytest.mark.parametrize("seed", [1])
+@needs_memory()
+@pytest.mark.parametrize(("seed", "count"), COUNTS)
 def test_random_requests_are_refused_and_leave_no_traces(
-    served: ServedStudy, person: Client, monkeypatch: pytest.MonkeyPatch, seed: int
+    served: ServedStudy,
+    person: Client,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    request: pytest.FixtureRequest,
+    seed: int,
+    count: int,
 ) -> None:
     monkeypatch.setattr("dorothie_gym.studies.server.REQUESTS", (1e6, 1e6))
     monkeypatch.setattr("dorothie_gym.studies.server.NEWS_SECONDS", 0.0)
     assert served.study is not None
     served.study._buckets.clear()
-    drawn, before = random.Random(seed), peak()
+    drawn, before = random.Random(seed + request.config.getoption("--malformed-seed")), memory()
     known = person.view["id"]
-    for _ in range(600):
+    for _ in range(count):
         action, content = drawn.choice(ACTIONS[1:]), body(drawn)
         if (action == "consent" and content == b'{"agreed": null}') or action == "withdraw":
             continue  # what a person may do
@@ -178,4 +181,34 @@ def test_random_requests_are_refused_and_leave_no_traces(
     person.tag = ""
     person.do("news")
     assert person.view["id"] == known and person.stage == "consent"
-    assert peak() - before < 60.0
+    check_raw_requests(served.port, drawn, count // 20)
+    assert person.send("GET", "/")[0] == 200
+    assert memory() - before < GROWTH
+    assert not [record for record in caplog.records if record.levelname == "ERROR"], caplog.text
+
+
+@needs_memory()
+@pytest.mark.parametrize(("seed", "count"), COUNTS)
+def test_malformed_messages_at_a_seat_of_the_study_are_refused(
+    served: ServedStudy,
+    person: Client,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+    seed: int,
+    count: int,
+) -> None:
+    monkeypatch.setattr("dorothie_gym.console.connection.BURST", 1e9)
+    drawn = random.Random(seed + request.config.getoption("--malformed-seed"))
+    person.do("consent", {"agreed": [True, True]})
+    person.do("answers", {"stage": "before", "answers": {"age": 30}})
+    person.do("proceed", {"stage": "instructions"})
+    person.follow(lambda: person.view.get("token"))
+    before = memory()
+    for _ in range(count // 40):
+        with person.sit() as socket:
+            for _ in range(40):
+                socket.send(malformed(drawn, SOUND, STRICT).encode("utf-8", "surrogatepass").decode("utf-8", "replace"))
+            refusals(socket, 40)
+    assert memory() - before < GROWTH
+    person.do("news")
+    assert person.stage == "tutorial"
