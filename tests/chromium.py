@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+
+from dorothie_gym.speech import Samples, encode_wav, resample
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
@@ -62,3 +67,30 @@ def tab_to(page: Any, label: str, most: int = 60) -> None:
         if label in focused:
             return
     raise AssertionError(f"{label!r} cannot be reached by keyboard")
+
+
+# --- microphone -------------------------------------------------------------------------------------------------------
+
+
+def microphone(samples: Samples, folder: Path) -> tuple[str, ...]:
+    """Returns the flags with which a microphone plays samples at 16 kHz over and over, with pauses.
+
+    Args:
+        samples: what is said.
+        folder: folder for a file with it.
+    """
+    file, pause = folder / "microphone.wav", np.zeros(8000, dtype=np.float32)
+    file.write_bytes(encode_wav(resample(np.concatenate([pause, samples, pause]), 16000, 48000), 48000))
+    return (
+        "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
+        f"--use-file-for-fake-audio-capture={file}", "--autoplay-policy=no-user-gesture-required",
+    )  # fmt: skip
+
+
+def talk_for(page: Any, seconds: float) -> None:
+    """Holds the button down for a time [s]."""
+    box = page.locator(".speech .hold").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    time.sleep(seconds)
+    page.mouse.up()

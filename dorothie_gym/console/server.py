@@ -66,6 +66,7 @@ class Console:
         rooms: rooms of the server when it starts.
         suspends: whether sessions in progress are interrupted when the server stops, so that another server can go on
             with them; otherwise they end.
+        speech: whether people can speak in rooms that are opened later.
 
     Attributes:
         rooms: rooms that are open.
@@ -75,13 +76,14 @@ class Console:
         SpeechError: people can speak, and the extra `speech` is not installed.
     """
 
-    def __init__(self, rooms: Sequence[Room] = (), *, suspends: bool = False) -> None:
+    def __init__(self, rooms: Sequence[Room] = (), *, suspends: bool = False, speech: bool = False) -> None:
         self.rooms = list(rooms)
         self.connections = 0
         self._suspends = suspends
         self._tasks: dict[Room, asyncio.Task[None]] = {}
         self._threads: tuple[ThreadPoolExecutor, ThreadPoolExecutor] | None = None
-        self._speech = SpokenTurns(self.find) if any(room.config.speech for room in self.rooms) else None
+        speaks = speech or any(room.config.speech for room in self.rooms)
+        self._speech = SpokenTurns(self.find) if speaks else None
 
     def find(self, token: str) -> tuple[Room, Seat] | None:
         """Returns the room and the seat of a token; None for an unknown one."""

@@ -108,6 +108,11 @@ class StudyRecords:
             seen=found["seen"],
         )
 
+    def participants(self) -> list[Participant]:
+        """Returns all participants, by id."""
+        names = [row["id"] for row in self.data.rows("SELECT id FROM participants ORDER BY id")]
+        return [person for person in map(self.participant, names) if person is not None]
+
     def find_secret(self, secret: str) -> str | None:
         """Returns the id of the participant whose browser has a secret; None if there is none."""
         name: str | None = self.data.value("SELECT id FROM participants WHERE secret = ?", digest(secret))
