@@ -61,8 +61,9 @@ def tab_to(page: Any, label: str, most: int = 60) -> None:
     for _ in range(most):
         page.keyboard.press("Tab")
         focused = page.evaluate(
-            "(() => { const e = document.activeElement; return [e.textContent, e.getAttribute('aria-label'),"
-            " e.labels?.[0]?.textContent].filter(Boolean).join(' '); })()"
+            "(() => { const e = document.activeElement; if (e === document.body) return '';"
+            " return [e.textContent, e.getAttribute('aria-label'), e.labels?.[0]?.textContent]"
+            ".filter(Boolean).join(' '); })()"
         )
         if label in focused:
             return
