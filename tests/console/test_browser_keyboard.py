@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -270,3 +271,27 @@ def test_three_browsers_play_one_session_at_once(browser: Any, tmp_path: Path) -
     record_of(tmp_path, table)
     joined = [event.role for event in read_seat_log(next(tmp_path.iterdir())) or () if event.kind.value == "joined"]
     assert set(joined) == {Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD}
+
+
+def documented(page: str) -> set[str]:
+    """Returns the keys in the table of a page of the documentation, without those that need a microphone."""
+    text = (Path(__file__).parents[2] / "docs" / page).read_text(encoding="utf-8").partition("\n## Keys\n")[2]
+    keys: set[str] = set()
+    for key, label in re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", text, flags=re.MULTILINE):
+        for each in key.split(", ") if "microphone" not in label else ():
+            first, _, last = each.partition(" to ")
+            before = first[:-1] if last else first
+            keys |= {f"{before}{k}" for k in range(int(first[-1]), int(last[-1]) + 1)} if last else {first}
+    return keys
+
+
+@pytest.mark.parametrize("seat", ["participant", "co_wizard", "ad_wizard", "experimenter"])
+def test_the_pages_of_the_seats_list_their_keys(browser: Any, seat: str) -> None:
+    table = Table()
+    with Served(table.room) as served:
+        at = Keyboard(browser, served, seat)
+        at.press("?")
+        at.page.wait_for_selector("dialog.keys")
+        shown = set(at.page.locator("dialog.keys dt").all_inner_texts())
+        assert shown | {"Escape"} == documented(f"seat-{seat.replace('_', '-')}.md") | {"Escape"}
+        assert at.errors == []
