@@ -23,14 +23,14 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 PROGRAM: Final = (sys.executable, "-m", "dorothie_gym.cli")
-SECONDS: Final = 50
+SECONDS: Final = 46
 """Duration of the session [s]."""
 
 FRAMES_PER_SECOND: Final = 4
-SIZE: Final = (640, 360)
+SIZE: Final = (576, 324)
 """Size of the film [px]."""
 
-QUALITY: Final = 45
+QUALITY: Final = 40
 """Quality of the film as WebP, which keeps it below 1 MB."""
 
 
@@ -45,7 +45,7 @@ def main() -> None:
         frames = [Image.fromarray(frame).resize(SIZE, Image.Resampling.LANCZOS) for frame in imageio.get_reader(video)]
     frames[0].save(
         DOCS / "console_film.webp", save_all=True, append_images=frames[1:], duration=1000 // FRAMES_PER_SECOND, loop=0,
-        quality=QUALITY, method=6,
+        quality=QUALITY, method=4,
     )  # fmt: skip
 
 
@@ -116,11 +116,11 @@ def _say(page: Any, text: str) -> None:
     page.keyboard.type(text, delay=25)
     page.keyboard.press("Enter")
     page.keyboard.press("Escape")
-    page.wait_for_selector(f".line.own:not(.waiting) >> text={text}", timeout=20_000)
+    page.wait_for_selector(f".line.own:not(.waiting) >> text={text}", timeout=60_000)
 
 
 def _heard(page: Any, who: str, text: str) -> None:
-    page.locator(f".line.{who}", has_text=text).last.wait_for(timeout=20_000)
+    page.locator(f".line.{who}", has_text=text).last.wait_for(timeout=60_000)
 
 
 def _until(page: Any, reached: str) -> None:

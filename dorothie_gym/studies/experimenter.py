@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-from collections import Counter
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, Final
@@ -98,7 +97,7 @@ class Experimenter:
         rooms = [self._row(place) for place in progress.rooms.all() if place.room is not None]
         return {
             "title": progress.study.title,
-            "stages": Counter(person.stage.value for person in progress.records.participants()),
+            "stages": {stage.value: number for stage, number in progress.records.stage_counts().items()},
             "waiting": [
                 {"id": person.id, "role": person.role and person.role.value, "seconds": round(seconds)}
                 for person, seconds in progress.waiting.present()

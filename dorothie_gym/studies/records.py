@@ -108,10 +108,10 @@ class StudyRecords:
             seen=found["seen"],
         )
 
-    def participants(self) -> list[Participant]:
-        """Returns all participants, by id."""
-        names = [row["id"] for row in self.data.rows("SELECT id FROM participants ORDER BY id")]
-        return [person for person in map(self.participant, names) if person is not None]
+    def stage_counts(self) -> dict[Stage, int]:
+        """Returns the number of participants at each stage that has any."""
+        rows = self.data.rows("SELECT stage, count(*) AS number FROM participants GROUP BY stage")
+        return {Stage(row["stage"]): row["number"] for row in rows}
 
     def find_secret(self, secret: str) -> str | None:
         """Returns the id of the participant whose browser has a secret; None if there is none."""
