@@ -92,8 +92,8 @@ def _converse(passenger: Any, driver: Any) -> None:
         _heard(driver, "participant", way["name"])
         driver.keyboard.press(str(way["key"]))
         _say(driver, f"Going {way['name']}{' into ' + way['street'] if way['street'] else ''}.")
-        _until(driver, f"(consoleLink.state.exits?.[0]?.[3] ?? -1) !== {way['junction']}")
-    time.sleep(2.0)
+        passed = f"(consoleLink.state.exits?.[0]?.[3] ?? -1) !== {way['junction']}"
+        _until(driver, f"{passed} || consoleLink.state.time > {SECONDS - 12}")
     passenger.keyboard.press("7")  # Stop here, please.
     _heard(driver, "participant", "Stop here")
     driver.keyboard.press("s")

@@ -122,13 +122,15 @@ def test_answers_forbid_foreign_content_and_are_not_stored(person: Client) -> No
     assert {"HttpOnly", "SameSite=strict"} <= set(headers["Set-Cookie"].split("; "))
 
 
-def test_floods_are_refused(served: ServedStudy, person: Client) -> None:
+def test_floods_are_refused(served: ServedStudy, person: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dorothie_gym.studies.server.REQUESTS", (REQUESTS[0], 0.0))  # also on a slow machine
     person.do("consent", {"agreed": [True, True]})
     statuses = [person.post("consent", {"agreed": None}) for _ in range(int(REQUESTS[0]) + 20)]
     assert statuses[0] == 409 and statuses[-1] == 429
 
 
-def test_entries_of_one_address_are_limited(tmp_path: Path) -> None:
+def test_entries_of_one_address_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dorothie_gym.studies.server.ENTRIES", (ENTRIES[0], 0.0))  # also on a slow machine
     with ServedStudy(write_study(tmp_path, SOLO), tmp_path / "data") as served:
         statuses = [Client(served.port).post("join") for _ in range(int(ENTRIES[0]) + 40)]
         assert statuses[0] == 200 and statuses[-1] == 429
