@@ -22,7 +22,7 @@ IN_CHROMIUM = [
 ]
 """Marks of modules whose tests drive it."""
 
-WAIT = 30_000
+WAIT = 60_000
 """Longest time that a page may take on a busy machine [ms]."""
 
 _FLAGS = (

@@ -25,6 +25,9 @@ from tests.console.serving import Served
 
 pytestmark = IN_CHROMIUM
 
+LONGEST = 900.0
+"""Time limit of sessions until a test has done everything [s]; it then sets a shorter one."""
+
 CO_WIZARD_SCALE, AD_WIZARD_SCALE = 4.0, 2.6
 """Scale of the maps when a session begins [px/m]."""
 
@@ -62,7 +65,7 @@ class Keyboard:
     def type(self, text: str) -> None:
         self.page.keyboard.type(text)
 
-    def until(self, reached: Callable[[], object], seconds: float = 30.0) -> None:
+    def until(self, reached: Callable[[], object], seconds: float = 60.0) -> None:
         end = time.monotonic() + seconds
         while not reached():
             assert time.monotonic() < end, "not in time"
@@ -83,7 +86,8 @@ class Keyboard:
         self.press("Enter")
 
     def finish(self, table: Table) -> None:
-        """Waits for the end of the session, and begins the next one."""
+        """Lets the time of the session run out, and begins the next one."""
+        run_out(table)
         self.page.wait_for_selector(".over >> text=Next session", timeout=90_000)
         assert table.room.state is RoomState.OVER
         assert self.page.evaluate("document.activeElement.textContent") in (
@@ -94,6 +98,12 @@ class Keyboard:
         self.until(lambda: table.room.state is RoomState.RUNNING)
         self.page.wait_for_selector(".over", state="detached")
         assert self.errors == []
+
+
+def run_out(table: Table) -> None:
+    """Ends the time of a session in three seconds."""
+    engine = table.room.engine
+    engine.max_cycles = engine.session.decisions + 30
 
 
 def record_of(folder: Path, table: Table) -> Session:
@@ -107,7 +117,7 @@ def record_of(folder: Path, table: Table) -> Session:
 @pytest.mark.parametrize(("width", "height"), [(1280, 720), (844, 390)], ids=["1280x720", "phone"])
 def test_a_participant_plays_a_whole_session_by_keyboard(browser: Any, tmp_path: Path, width: int, height: int) -> None:
     table = Table(
-        "participant=human,co_wizard=scripted,ad_wizard=scripted", folder=tmp_path, pictures=True, max_seconds=40.0
+        "participant=human,co_wizard=scripted,ad_wizard=scripted", folder=tmp_path, pictures=True, max_seconds=LONGEST
     )
     with Served(table.room) as served:
         at = Keyboard(browser, served, "participant", width, height)
@@ -139,7 +149,7 @@ def test_a_participant_plays_a_whole_session_by_keyboard(browser: Any, tmp_path:
             assert box and box["x"] >= 0 and box["x"] + box["width"] <= width, selector
             assert box["y"] >= 0 and box["y"] + box["height"] <= height, selector
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-        page.wait_for_function("document.querySelector('.windscreen .note').hidden", timeout=60_000)
+        at.until(lambda: page.evaluate("document.querySelector('.windscreen .note').hidden"), 120.0)
         at.finish(table)
     session = record_of(tmp_path, table)
     assert session.summary is not None and session.summary["reason"] == "out of time"
@@ -149,7 +159,7 @@ def test_a_participant_plays_a_whole_session_by_keyboard(browser: Any, tmp_path:
 
 
 def test_a_co_wizard_plays_a_whole_session_by_keyboard(browser: Any, tmp_path: Path) -> None:
-    table = Table("co_wizard=human,participant=scripted,ad_wizard=scripted", folder=tmp_path, max_seconds=45.0)
+    table = Table("co_wizard=human,participant=scripted,ad_wizard=scripted", folder=tmp_path, max_seconds=LONGEST)
     with Served(table.room) as served:
         at = Keyboard(browser, served, "co_wizard")
         page = at.page
@@ -185,11 +195,12 @@ def test_a_co_wizard_plays_a_whole_session_by_keyboard(browser: Any, tmp_path: P
         if "physical" in decision.actions.get(Role.CO_WIZARD, {})
     }
     assert decided == set(PhysicalAction), "all physical actions"
-    assert "Okay. Where would you like to go?" in [each.text for each in session.utterances(Role.CO_WIZARD)]
+    said = " ".join(each.text for each in session.utterances(Role.CO_WIZARD))
+    assert "Okay. Where would you like to go?" in said
 
 
 def test_an_ad_wizard_plays_a_whole_session_by_keyboard(browser: Any, tmp_path: Path) -> None:
-    table = Table("ad_wizard=human,participant=scripted,co_wizard=scripted", folder=tmp_path, max_seconds=60.0)
+    table = Table("ad_wizard=human,participant=scripted,co_wizard=scripted", folder=tmp_path, max_seconds=LONGEST)
     with Served(table.room) as served:
         at = Keyboard(browser, served, "ad_wizard")
         page, session = at.page, table.room.engine.session
@@ -215,7 +226,12 @@ def test_an_ad_wizard_plays_a_whole_session_by_keyboard(browser: Any, tmp_path: 
         at.press("Enter", "r")
         at.to("street barrier")
         at.press("Enter")
-        at.point(AD_WIZARD_SCALE, *place(0))
+        for number in range(8):  # a place may be refused: the map shows where the car was a moment ago
+            at.point(AD_WIZARD_SCALE, *place(number))
+            at.until(lambda: page.evaluate("consoleLink.waiting.size") == 0)
+            page.wait_for_timeout(500)
+            if page.locator(".placed li").count():
+                break
         page.wait_for_selector(".placed li")
         at.press("Escape", "r")
         at.to("Move")
@@ -246,7 +262,7 @@ def test_an_ad_wizard_plays_a_whole_session_by_keyboard(browser: Any, tmp_path: 
 
 def test_three_browsers_play_one_session_at_once(browser: Any, tmp_path: Path) -> None:
     roles = "participant=human,co_wizard=human,ad_wizard=human"
-    table = Table(roles, folder=tmp_path, pictures=True, max_seconds=25.0)
+    table = Table(roles, folder=tmp_path, pictures=True, max_seconds=LONGEST)
     with Served(table.room) as served, another(browser) as second, another(browser) as third:
         participant = Keyboard(browser, served, "participant")
         co_wizard = Keyboard(second, served, "co_wizard")
@@ -265,8 +281,9 @@ def test_three_browsers_play_one_session_at_once(browser: Any, tmp_path: Path) -
         participant.page.wait_for_selector(".line.ad_wizard >> text=Look out for fog.")
         assert "fog" not in co_wizard.page.inner_text(".talk")
         everyone = (participant, co_wizard, ad_wizard)
+        run_out(table)
         for each in everyone:
-            each.page.wait_for_selector(".over >> text=The time is up.", timeout=60_000)
+            each.page.wait_for_selector(".over >> text=The time is up.", timeout=120_000)
         assert [each.errors for each in everyone] == [[], [], []]
     record_of(tmp_path, table)
     joined = [event.role for event in read_seat_log(next(tmp_path.iterdir())) or () if event.kind.value == "joined"]
