@@ -13,12 +13,11 @@ import json
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any, Final
 
 import imageio.v2 as imageio
-from console_pictures import DOCS, FLAGS, find_chromium
+from console_pictures import DOCS, FLAGS, find_chromium, until
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
@@ -93,7 +92,7 @@ def _converse(passenger: Any, driver: Any) -> None:
         driver.keyboard.press(str(way["key"]))
         _say(driver, f"Going {way['name']}{' into ' + way['street'] if way['street'] else ''}.")
         passed = f"(consoleLink.state.exits?.[0]?.[3] ?? -1) !== {way['junction']}"
-        _until(driver, f"{passed} || consoleLink.state.time > {SECONDS - 12}")
+        until(driver, f"{passed} || consoleLink.state.time > {SECONDS - 12}")
     passenger.keyboard.press("7")  # Stop here, please.
     _heard(driver, "participant", "Stop here")
     driver.keyboard.press("s")
@@ -102,7 +101,7 @@ def _converse(passenger: Any, driver: Any) -> None:
 
 def _next_way(driver: Any, number: int) -> dict[str, Any]:
     """Returns a turn of the next junction: its name, street, key, and the junction."""
-    _until(driver, "consoleLink.state.exits?.length > 1")
+    until(driver, "consoleLink.state.exits?.length > 1")
     exits = driver.evaluate("consoleLink.state.exits")
     key = next((k for k, row in enumerate(exits) if abs(row[0]) > 30 and (row[0] > 0) == (number % 2 == 0)), 0)
     angle, _, street, junction = exits[key]
@@ -121,15 +120,6 @@ def _say(page: Any, text: str) -> None:
 
 def _heard(page: Any, who: str, text: str) -> None:
     page.locator(f".line.{who}", has_text=text).last.wait_for(timeout=60_000)
-
-
-def _until(page: Any, reached: str) -> None:
-    """Waits until an expression of the page is true; its policy forbids Playwright's own way."""
-    end = time.monotonic() + 40.0
-    while not page.evaluate(reached):
-        if time.monotonic() > end:
-            sys.exit(f"not within 40 s: {reached}")
-        time.sleep(0.1)
 
 
 if __name__ == "__main__":
