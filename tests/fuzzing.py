@@ -81,7 +81,9 @@ def raw_answer(port: int, request: bytes) -> bytes:
             raw.sendall(request)
             raw.shutdown(socket.SHUT_WR)
             return raw.recv(4000)
-        except ConnectionError:
+        except TimeoutError:
+            raise
+        except OSError:  # it has hung up
             return b""
 
 
