@@ -31,5 +31,5 @@ class ServedApplication:
 
     def __exit__(self, *error: object) -> None:
         self.server.should_exit = True
-        self.thread.join(10.0)
+        self.thread.join(60.0)
         assert not self.thread.is_alive()

@@ -40,7 +40,9 @@ def running(file: Path, data: Path) -> Iterator[tuple[subprocess.Popen[str], int
     ) as server:
         try:
             assert server.stdout is not None
-            link = json.loads(server.stdout.readline())["link"]
+            links = json.loads(server.stdout.readline())
+            link = links["link"]
+            assert links["experimenter"].startswith(f"{link}experimenter#"), "what is behind the # is not sent"
             yield server, int(link.rstrip("/").rpartition(":")[2])
         finally:
             server.kill()

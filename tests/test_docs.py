@@ -77,6 +77,9 @@ def test_the_page_of_studies_has_every_field_table_and_kind_of_item(tmp_path: Pa
     (tmp_path / "study.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     items = read_study(tmp_path / "study.yaml").questionnaires.after
     assert {type(item) for item in items} == set(get_args(Item))
+    (spoken,) = re.findall(r"```yaml\n(session: .*?)```", page, flags=re.DOTALL)
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump({**content, **yaml.safe_load(spoken)}), encoding="utf-8")
+    assert len(read_study(tmp_path / "study.yaml").statements) == 2, "the one of the page, and that on voices"
     rows = page.split("## Study file")[1].split("Texts are paragraphs")[0]
     assert [name for name in Study.__struct_fields__ if f"`{name}`" not in rows] == []
     assert [name for name in COLUMNS if f"| `{name}` |" not in page] == []

@@ -67,14 +67,21 @@ def test_charts_show_the_recorded_figures(pictures: ModuleType) -> None:
 def test_every_picture_of_the_pages_is_drawn_by_a_command(pictures: ModuleType) -> None:
     from_runs = {"navigation_curve", "selfplay_curve", "perception", "detections"}  # of trainings and benchmarks
     from_browser = {f"console_{seat}" for seat in ("participant", "co_wizard", "ad_wizard", "experimenter")}
-    from_browser |= {"annotation_tool", "annotation_adjudication", "study_questionnaire"}
+    from_browser |= {
+        "annotation_tool",
+        "annotation_adjudication",
+        "study_questionnaire",
+        "study_experimenter",
+        "console_film",
+    }
     drawn = {path.stem for kind in ("png", "webp") for path in DOCS.glob(f"*.{kind}")}
     assert drawn == {*pictures.PICTURES, "corpus", *from_runs, *from_browser}
 
 
-def test_film_of_the_first_page_is_small_and_moves() -> None:
-    path = DOCS / "film.webp"
-    assert path.stat().st_size < 2_000_000
+@pytest.mark.parametrize(("name", "size"), [("film", 2_000_000), ("console_film", 1_000_000)])
+def test_films_are_small_and_move(name: str, size: int) -> None:
+    path = DOCS / f"{name}.webp"
+    assert path.stat().st_size < size
     with Image.open(path) as film:
         frames = int(getattr(film, "n_frames", 1))
         assert frames > 60 and film.width * 9 == film.height * 16

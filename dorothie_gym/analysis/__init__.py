@@ -15,6 +15,13 @@ from dorothie_gym.analysis.corpus_stats import (
 from dorothie_gym.analysis.exception_attribution import Handled, handled_by, handling, handling_of_events
 from dorothie_gym.analysis.phenomena import PHENOMENA, DialogueView, Occurrence, Phenomenon
 from dorothie_gym.analysis.profiles import Profile, Profiles
+from dorothie_gym.analysis.segmentation_agreement import (
+    SegmentationAgreement,
+    SegmentedSession,
+    UnitSpan,
+    segmentation_agreement,
+    segmentation_alpha,
+)
 from dorothie_gym.analysis.span_agreement import Agreement, Alpha, LabelledSpan, agreement_of, alpha_of, has_alpha
 from dorothie_gym.analysis.units import SaidUnit, Units
 
@@ -37,6 +44,9 @@ __all__ = [
     "Profile",
     "Profiles",
     "SaidUnit",
+    "SegmentationAgreement",
+    "SegmentedSession",
+    "UnitSpan",
     "Units",
     "agreement",
     "agreement_of",
@@ -50,5 +60,7 @@ __all__ = [
     "has_alpha",
     "inconsistencies",
     "phenomena_of",
+    "segmentation_agreement",
+    "segmentation_alpha",
     "verdicts_of",
 ]

@@ -7,13 +7,58 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dorothie_gym.analysis import Agreement, Alpha, agreement_of, alpha_of
+from dorothie_gym.analysis import (
+    Agreement,
+    Alpha,
+    SegmentationAgreement,
+    agreement_of,
+    alpha_of,
+    segmentation_agreement,
+    segmentation_alpha,
+)
 from dorothie_gym.annotation.log import ADJUDICATED, RECORDED, annotators_of, log_path, read_annotation
 from dorothie_gym.annotation.marks import Annotation
 from dorothie_gym.annotation.session_labels import recorded_annotation
 from dorothie_gym.annotation.source_text import SourceText
 from dorothie_gym.errors import AnnotationError
 from dorothie_gym.recording import CorpusEntry
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairAgreement:
+    """Agreement of two annotators.
+
+    Attributes:
+        labels: on spans, moves and slots.
+        exchanges: on the borders of exchanges.
+        transactions: on the borders of transactions.
+    """
+
+    labels: Agreement
+    exchanges: SegmentationAgreement
+    transactions: SegmentationAgreement
+
+    def to_json(self) -> dict[str, object]:
+        """Returns all figures in JSON types."""
+        labels = self.labels
+        return {
+            "utterances": labels.utterances,
+            "spans": {"agreement": labels.spans, "equal": labels.equal_spans},
+            "moves": {"kappa": labels.moves_of_equal_spans, "spans": labels.equal_spans},
+            "moves_of_pieces": {"kappa": labels.moves, "pieces": labels.pieces},
+            "slots": {"kappa": labels.slots, "pieces": labels.pieces},
+            "exchanges": _figures_of(self.exchanges),
+            "transactions": _figures_of(self.transactions),
+        }
+
+
+def _figures_of(found: SegmentationAgreement) -> dict[str, object]:
+    return {
+        "kappa": found.kappa,
+        "similarity": found.similarity,
+        "sites": found.sites,
+        "borders": list(found.borders),
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,12 +70,16 @@ class CorpusAgreement:
         sessions: number of sessions with two or more of them.
         pairs: agreement of each two annotators, over the sessions that both have annotated, with the number of these.
         alpha: Krippendorff's alpha of all annotators; None if the package `krippendorff` is not installed.
+        exchange_alpha: the same for the borders of exchanges; None likewise, and if it is undefined.
+        transaction_alpha: the same for the borders of transactions.
     """
 
     annotators: tuple[str, ...]
     sessions: int
-    pairs: Mapping[tuple[str, str], tuple[int, Agreement]]
+    pairs: Mapping[tuple[str, str], tuple[int, PairAgreement]]
     alpha: Alpha | None
+    exchange_alpha: float | None = None
+    transaction_alpha: float | None = None
 
     def to_json(self) -> dict[str, object]:
         """Returns all figures in JSON types."""
@@ -38,32 +87,47 @@ class CorpusAgreement:
             "annotators": list(self.annotators),
             "sessions": self.sessions,
             "pairs": [
-                {"annotators": list(names), "sessions": sessions, **figures_of(each)}
+                {"annotators": list(names), "sessions": sessions, **each.to_json()}
                 for names, (sessions, each) in self.pairs.items()
             ],
             "alpha": None
             if self.alpha is None
-            else {"moves": self.alpha.moves, "slots": self.alpha.slots, "pieces": self.alpha.pieces},
+            else {
+                "moves": self.alpha.moves,
+                "slots": self.alpha.slots,
+                "pieces": self.alpha.pieces,
+                "exchanges": self.exchange_alpha,
+                "transactions": self.transaction_alpha,
+            },
         }
 
 
-def figures_of(pair: Agreement) -> dict[str, object]:
-    """Returns the figures of two annotators in JSON types."""
-    return {
-        "utterances": pair.utterances,
-        "spans": {"agreement": pair.spans, "equal": pair.equal_spans},
-        "moves": {"kappa": pair.moves_of_equal_spans, "spans": pair.equal_spans},
-        "moves_of_pieces": {"kappa": pair.moves, "pieces": pair.pieces},
-        "slots": {"kappa": pair.slots, "pieces": pair.pieces},
-    }
+def agreement_of_two(
+    texts: Sequence[SourceText], first: Sequence[Annotation], second: Sequence[Annotation]
+) -> PairAgreement:
+    """Returns the agreement of two annotators of sessions.
+
+    Args:
+        texts: texts of the sessions.
+        first: annotations of one annotator.
+        second: those of the other one.
+    """
+    both = [[(text, each) for text, each in zip(texts, annotations, strict=True)] for annotations in (first, second)]
+    labels = [[utterance for text, each in rows for utterance in each.labels(text)] for rows in both]
+    exchanges = [[each.exchange_spans(text) for text, each in rows] for rows in both]
+    transactions = [[each.transaction_spans(text) for text, each in rows] for rows in both]
+    return PairAgreement(
+        labels=agreement_of(*labels),
+        exchanges=segmentation_agreement(*exchanges),
+        transactions=segmentation_agreement(*transactions),
+    )
 
 
-def pair_agreement(text: SourceText, annotations: Mapping[str, Annotation]) -> dict[tuple[str, str], Agreement]:
+def pair_agreement(text: SourceText, annotations: Mapping[str, Annotation]) -> dict[tuple[str, str], PairAgreement]:
     """Returns the agreement of each two annotators of a session."""
-    labels = {name: each.labels(text) for name, each in annotations.items()}
     return {
-        (first, second): agreement_of(labels[first], labels[second])
-        for first, second in itertools.combinations(labels, 2)
+        (first, second): agreement_of_two([text], [annotations[first]], [annotations[second]])
+        for first, second in itertools.combinations(annotations, 2)
     }
 
 
@@ -112,13 +176,25 @@ def corpus_agreement(
     }
     pairs = {}
     for first, second in itertools.combinations(names, 2):
-        judged = zip(labels[first], labels[second], strict=True)
-        common = [(a, b) for a, b in judged if a is not None and b is not None]
-        sessions = sum(first in each and second in each for each in found)
-        if common:
-            pairs[first, second] = sessions, agreement_of([a for a, _ in common], [b for _, b in common])
-    alpha = alpha_of([labels[name] for name in names]) if with_alpha else None
-    return CorpusAgreement(annotators=names, sessions=len(found), pairs=pairs, alpha=alpha)
+        shared = [(text, each) for text, each in zip(texts, found, strict=True) if {first, second} <= each.keys()]
+        if shared:
+            marks = ([each[name] for _, each in shared] for name in (first, second))
+            pairs[first, second] = len(shared), agreement_of_two([text for text, _ in shared], *marks)
+    if not with_alpha:
+        return CorpusAgreement(annotators=names, sessions=len(found), pairs=pairs, alpha=None)
+    marked = [[(text, each.get(name)) for text, each in zip(texts, found, strict=True)] for name in names]
+    return CorpusAgreement(
+        annotators=names,
+        sessions=len(found),
+        pairs=pairs,
+        alpha=alpha_of([labels[name] for name in names]),
+        exchange_alpha=segmentation_alpha(
+            [[None if each is None else each.exchange_spans(text) for text, each in row] for row in marked]
+        ),
+        transaction_alpha=segmentation_alpha(
+            [[None if each is None else each.transaction_spans(text) for text, each in row] for row in marked]
+        ),
+    )
 
 
 def _present(folder: Path, wanted: Sequence[str]) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from dorothie_gym.analysis import Handled, LabelledSpan
+from dorothie_gym.analysis import Handled, LabelledSpan, SegmentedSession, UnitSpan
 from dorothie_gym.annotation.source_text import SourceLine, SourceText, UtteranceId
 from dorothie_gym.errors import AnnotationError
 from dorothie_gym.ontology import DialogueAct, DialogueMove, DialogueUnit, LandmarkName, SlotValue, UnitEnd
@@ -176,6 +176,14 @@ class Annotation:
         return [
             tuple(LabelledSpan(span.words, span.act) for span in self.utterances[line.id]) for line in text.lines
         ]  # fmt: skip
+
+    def exchange_spans(self, text: SourceText) -> SegmentedSession:
+        """Returns the spans of the session with their exchanges; see `segmentation_agreement`."""
+        return [UnitSpan(span.words, span.exchange, span.act is not None) for _, _, span in self.spans(text)]
+
+    def transaction_spans(self, text: SourceText) -> SegmentedSession:
+        """Returns the spans of the session with their transactions; see `segmentation_agreement`."""
+        return [UnitSpan(span.words, span.transaction, span.act is not None) for _, _, span in self.spans(text)]
 
     def undecided(self, text: SourceText) -> Iterator[str]:
         """Yields the place of every span without a move that the annotator has decided on."""

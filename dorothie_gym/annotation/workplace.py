@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from dorothie_gym.annotation.comparison import adopted, consensus, disagreements
-from dorothie_gym.annotation.corpus_agreement import figures_of, pair_agreement
+from dorothie_gym.annotation.corpus_agreement import pair_agreement
 from dorothie_gym.annotation.log import (
     ADJUDICATED,
     Action,
@@ -221,8 +221,7 @@ class Workplace:
                 if found
                 else [],
                 "agreement": [
-                    {"annotators": list(names), **figures_of(pair)}
-                    for names, pair in pair_agreement(text, found).items()
+                    {"annotators": list(names), **pair.to_json()} for names, pair in pair_agreement(text, found).items()
                 ],
             }
 

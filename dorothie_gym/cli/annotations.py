@@ -164,7 +164,7 @@ def agreement(
     maps: Maps = None,
     as_json: AsJson = False,
 ) -> None:
-    """Print the agreement of annotators: spans, Cohen's kappa of moves and slots, Krippendorff's alpha."""
+    """Print the agreement of annotators: spans; Cohen's kappa of moves, slots, and borders of units; alpha."""
     with reporting_errors():
         from dorothie_gym.analysis import has_alpha
         from dorothie_gym.annotation.corpus_agreement import corpus_agreement
@@ -178,12 +178,14 @@ def agreement(
 
 def _show(found: CorpusAgreement) -> None:
     table = Table(box=None, pad_edge=False)
-    for title in ("annotators", "sessions", "utterances", "spans (F1)", "moves (kappa)", "by piece", "slots (kappa)"):
+    for title in ("annotators", "sessions", "utterances", "spans (F1)", "moves (kappa)", "by piece", "slots (kappa)",
+                  "exchanges (kappa)", "transactions"):  # fmt: skip
         table.add_column(title, justify="left" if title == "annotators" else "right", no_wrap=True)
     for (first, second), (sessions, pair) in found.pairs.items():
-        figures = (pair.spans, pair.moves_of_equal_spans, pair.moves, pair.slots)
-        table.add_row(f"{first}, {second}", str(sessions), str(pair.utterances), *map(coefficient, figures))
-    table.add_row("the paper", "20", "1045", "", "0.77", "", "0.85")
+        labels, units = pair.labels, (pair.exchanges.kappa, pair.transactions.kappa)
+        figures = (labels.spans, labels.moves_of_equal_spans, labels.moves, labels.slots, *units)
+        table.add_row(f"{first}, {second}", str(sessions), str(labels.utterances), *map(coefficient, figures))
+    table.add_row("the paper", "20", "1045", "", "0.77", "", "0.85", "", "")
     console = wide_stdout()
     console.print(table)
     if found.alpha is None:
@@ -191,6 +193,7 @@ def _show(found: CorpusAgreement) -> None:
     else:
         console.print(
             f"Krippendorff's alpha of {len(found.annotators)} annotators: moves {coefficient(found.alpha.moves)}, "
-            f"slots {coefficient(found.alpha.slots)} ({found.alpha.pieces} pieces).",
+            f"slots {coefficient(found.alpha.slots)} ({found.alpha.pieces} pieces), "
+            f"exchanges {coefficient(found.exchange_alpha)}, transactions {coefficient(found.transaction_alpha)}.",
             soft_wrap=True,
         )

@@ -88,7 +88,7 @@ def run(
     port: Port = PORT,
     as_json: AsJson = False,
 ) -> None:
-    """Run a study: print the link for its people, and serve it until Ctrl-C.
+    """Run a study: print the links for its people and the experimenter, and serve it until Ctrl-C.
 
     After a crash or Ctrl-C, the same command goes on: people are where they were.
     """
@@ -101,15 +101,18 @@ def run(
         check_sources(read_study(file), file)
     compile_first(pictures=read_study(file).session.pictures)
     with reporting_errors(), running_study(file, out) as (found, records):
+        server = StudyServer(found, file.parent, records)
         listener = listen(host, port)
         link = f"{address(host, listener.getsockname()[1])}/"
+        experimenter = f"{link}experimenter#{server.experimenter.token}"
         if as_json:
-            print_json({"link": link, "data": str(out)})
+            print_json({"link": link, "experimenter": experimenter, "data": str(out)})
         else:
             logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
             logging.getLogger("dorothie_gym.studies").setLevel(logging.INFO)
             _print_links(found, link, out)
-        serve(StudyServer(found, file.parent, records).app(), listener)
+            stdout().print(f"Experimenter (works once): {experimenter}", soft_wrap=True)
+        serve(server.app(), listener)
 
 
 def _print_links(found: Study, link: str, out: Path) -> None:

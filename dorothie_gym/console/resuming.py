@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dorothie_gym.console.config import ConsoleConfig
 from dorothie_gym.errors import SessionError
-from dorothie_gym.recording import SeatEvent, Session, SessionState, read_seat_log, session_state
+from dorothie_gym.ontology import Role
+from dorothie_gym.recording import SeatEvent, SeatEventKind, Session, SessionState, read_seat_log, session_state
 
 SEATS = "seats"
 """Field of a header with the planned players of a session with people, by role."""
@@ -47,6 +48,13 @@ class Resumed:
         seats = self.session.header.extra[SEATS]
         assert isinstance(seats, Mapping)
         return ",".join(f"{role}={player}" for role, player in seats.items())
+
+    def said(self, frame: int) -> Iterator[tuple[Role, str, str | None]]:
+        """Yields speaker, words and name of the recording of the spans that people said at a frame."""
+        for event in self.seat_events:
+            if event.frame == frame and event.kind is SeatEventKind.SAID and event.role is not None:
+                audio = event.data.get("audio")
+                yield event.role, str(event.data.get("text")), None if audio is None else str(audio)
 
     def config(self, usual: ConsoleConfig) -> ConsoleConfig:
         """Returns the settings of a console with the pace of the session."""

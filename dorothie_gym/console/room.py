@@ -125,7 +125,8 @@ class Room:
         if record is None or self.state is RoomState.OVER:
             return None
         name = record.add_audio(seat.name, flac)
-        seat.recordings.add(name)
+        if name is not None:
+            seat.recordings.add(name)
         return name
 
     @property
@@ -214,7 +215,12 @@ class Room:
         """Plays the recorded decisions of an interrupted session; talk and record are then as they were."""
         self._early = list(resumed.seat_events)
         self._open_record()
+        if self.record is not None:
+            self.record.adopt_audio(resumed.session.audio)
         for actions in recorded_actions(self.engine, resumed.session):
+            if self.record is not None:
+                for said in resumed.said(self.engine.session.world.frame):
+                    self.record.say(*said)
             self.engine.step(actions)
             if self.record is not None:
                 self.record.record(actions)
@@ -319,6 +325,8 @@ class Room:
         seat.done = max(seat.done, taken.done)
         if taken.spoken is not None:
             self._note(SeatEventKind.SAID, seat.role, taken.spoken.to_json())
+            if self.record is not None:
+                self.record.say(seat.role, taken.spoken.text, taken.spoken.audio)
         return taken.action.encode(self.engine.limits)
 
     def _hear(self) -> None:

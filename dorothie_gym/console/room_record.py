@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from dorothie_gym.console.recordings import SpanRecordings
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.ontology import Role
 from dorothie_gym.recording import SeatEvent, SeatLogWriter, SessionHeader, SessionWriter
 from dorothie_gym.spaces import ActionMapping
 
@@ -32,23 +35,54 @@ class RoomRecord:
         self._writer = SessionWriter(folder, header)
         self._recorder = SessionRecorder(engine, self._writer)
         self._log = SeatLogWriter(folder)
-        self._recordings = 0
+        self._spans = SpanRecordings()
+        self._audio: set[str] = set()
+        self._open = threading.Lock()  # audio comes from another thread
+        self._closed = False
+
+    def say(self, role: Role, text: str, audio: str | None) -> None:
+        """Notes that a person says a span at the present decision.
+
+        Args:
+            role: speaker.
+            text: words.
+            audio: name of the recording of its turn; None for a typed one.
+        """
+        self._spans.say(role, text, audio)
 
     def record(self, actions: Mapping[str, ActionMapping]) -> None:
         """Records a decision after the engine has played it."""
-        self._recorder.record(actions)
+        self._recorder.record(actions, self._spans.named(self._engine.last_events))
 
     def note(self, events: Sequence[SeatEvent]) -> None:
         """Records events at the seats."""
         for event in events:
             self._log.append(event)
 
-    def add_audio(self, seat: str, flac: bytes) -> str:
-        """Records a spoken turn (FLAC), and returns the name of its file; other threads may call it, one at a time."""
-        self._recordings += 1
-        name = f"{seat}_{self._recordings}.flac"
-        self._writer.add_audio(name, flac)
+    def add_audio(self, seat: str, flac: bytes) -> str | None:
+        """Records a spoken turn (FLAC); other threads may call it.
+
+        Returns:
+            The name of its file; None if the record is closed.
+        """
+        with self._open:
+            if self._closed:
+                return None
+            number = 1 + len(self._audio)
+            while (name := f"{seat}_{number}.flac") in self._audio:
+                number += 1
+            self._add(name, flac)
         return name
+
+    def adopt_audio(self, audio: Mapping[str, Path]) -> None:
+        """Copies the recordings of an interrupted session, by name, with which this one goes on."""
+        with self._open:
+            for name, path in audio.items():
+                self._add(name, path.read_bytes())
+
+    def _add(self, name: str, flac: bytes) -> None:
+        self._writer.add_audio(name, flac)
+        self._audio.add(name)
 
     def finish(self, *, broken_off: bool) -> None:
         """Closes the record of a session that is over.
@@ -56,6 +90,8 @@ class RoomRecord:
         Args:
             broken_off: whether it was broken off after the last decision, so that its end is not recorded yet.
         """
+        with self._open:
+            self._closed = True
         if broken_off:
             self._recorder.record_end()
         self._writer.finish(self._engine.summary())
@@ -63,6 +99,8 @@ class RoomRecord:
 
     def close(self) -> None:
         """Closes the record of a session that is not over; it stays incomplete."""
+        with self._open:
+            self._closed = True
         self._writer.close()
         self._log.close()
 

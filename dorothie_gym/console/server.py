@@ -66,6 +66,7 @@ class Console:
         rooms: rooms of the server when it starts.
         suspends: whether sessions in progress are interrupted when the server stops, so that another server can go on
             with them; otherwise they end.
+        speech: whether people can speak in rooms that are opened later.
 
     Attributes:
         rooms: rooms that are open.
@@ -75,13 +76,14 @@ class Console:
         SpeechError: people can speak, and the extra `speech` is not installed.
     """
 
-    def __init__(self, rooms: Sequence[Room] = (), *, suspends: bool = False) -> None:
+    def __init__(self, rooms: Sequence[Room] = (), *, suspends: bool = False, speech: bool = False) -> None:
         self.rooms = list(rooms)
         self.connections = 0
         self._suspends = suspends
         self._tasks: dict[Room, asyncio.Task[None]] = {}
         self._threads: tuple[ThreadPoolExecutor, ThreadPoolExecutor] | None = None
-        self._speech = SpokenTurns(self.find) if any(room.config.speech for room in self.rooms) else None
+        speaks = speech or any(room.config.speech for room in self.rooms)
+        self._speech = SpokenTurns(self.find) if speaks else None
 
     def find(self, token: str) -> tuple[Room, Seat] | None:
         """Returns the room and the seat of a token; None for an unknown one."""
@@ -288,11 +290,8 @@ async def _send(connection: Connection, socket: WebSocket) -> None:
 
 
 async def _text(socket: WebSocket) -> str:
-    """Returns the next text; raises `MessageError` for bytes, and `WebSocketDisconnect` at the end."""
+    """Returns the next text, an empty one for bytes, which are no message; raises `WebSocketDisconnect` at the end."""
     message = await socket.receive()
     if message["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(message.get("code", 1000))
-    text = message.get("text")
-    if text is None:
-        raise MessageError("messages are texts in JSON")
-    return str(text)
+    return str(message.get("text") or "")

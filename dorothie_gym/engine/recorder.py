@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +16,7 @@ from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import LightColour, LightProgramme, Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.recording import ACTOR_DTYPE, ActorKind, Decision, SessionWriter
+from dorothie_gym.recording import ACTOR_DTYPE, ActorKind, Decision, Event, SessionWriter
 from dorothie_gym.sim.bodies import Pedestrian
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.world import World
@@ -198,26 +198,27 @@ class SessionRecorder:
         self._frame = engine.session.world.frame
         self._append()
 
-    def record(self, actions: Mapping[str, ActionMapping]) -> None:
+    def record(self, actions: Mapping[str, ActionMapping], events: Sequence[Event] | None = None) -> None:
         """Records a decision after the engine has played it.
 
         Args:
             actions: actions that were played, by agent.
+            events: events of the decision, with what only the caller knows of them; None: those of the engine.
 
         Raises:
             SessionError: a value cannot be written.
             OSError: the folder cannot be written.
         """
         self._writer.add_decision(self._frame, compact(actions, self._engine.limits))
-        self._append()
+        self._append(events)
 
     def record_end(self) -> None:
         """Records the end of a session that was broken off after the last decision; errors as in `record`."""
         self._writer.append(self._engine.last_events)
 
-    def _append(self) -> None:
+    def _append(self, events: Sequence[Event] | None = None) -> None:
         frames, world = self._engine.last_frames, self._engine.session.world
-        self._writer.append(self._engine.last_events, frames)
+        self._writer.append(self._engine.last_events if events is None else events, frames)
         if recordings := self._engine.last_recordings:
             from dorothie_gym.speech import encode_flac  # sessions of text do not load it
 

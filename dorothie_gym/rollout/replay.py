@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from dorothie_gym._version import __version__
+from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
@@ -24,6 +25,7 @@ from dorothie_gym.recording import (
     CorpusEntry,
     Difference,
     EndReason,
+    EventType,
     Session,
     SessionHeader,
     SessionWriter,
@@ -72,7 +74,22 @@ def resimulate(session: Session, town: Town, *, storyboard: StoryboardTemplate |
                 recorder.record_end()
             if engine.over:
                 writer.finish(engine.summary())
-        return Session.load(Path(folder) / "again")
+        return _with_recordings(Session.load(Path(folder) / "again"), session)
+
+
+def _with_recordings(again: Session, session: Session) -> Session:
+    """Returns a replay whose dialogue moves name the recordings of people, who are not played, as the record does.
+
+    Audio of the channel is made again, with its names.
+    """
+    if config_of(session.header).channel is ChannelKind.SPEECH:
+        return again
+    audio = {index: event.data["audio"] for index, event in enumerate(session.events) if "audio" in event.data}
+    events = list(again.events)
+    for index, name in audio.items():
+        if index < len(events) and events[index].type is EventType.DIALOGUE_MOVE:
+            events[index] = replace(events[index], data={**events[index].data, "audio": name})
+    return replace(again, events=tuple(events))
 
 
 def watch_session(

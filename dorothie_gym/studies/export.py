@@ -15,6 +15,7 @@ from typing import Any, Final, TypeAlias
 
 from dorothie_gym.files import replacing, write_atomically
 from dorothie_gym.recording import Session, SessionState, session_state
+from dorothie_gym.recording.sound import audio_files
 from dorothie_gym.studies.folder import check_folder
 from dorothie_gym.studies.record_types import SESSIONS_FOLDER, STUDY_FILE
 from dorothie_gym.studies.records import StudyRecords
@@ -41,7 +42,7 @@ COLUMNS: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "utterances": {
         "session": "string", "condition": "string", "speaker": "string", "participant": "string", "start": "float64",
-        "end": "float64", "text": "string",
+        "end": "float64", "text": "string", "audio": "string",
     },
 }  # fmt: skip
 """Columns of the tables and their types."""
@@ -166,7 +167,9 @@ def _utterances(records: StudyRecords) -> Iterator[Row]:
         if folder is None or session_state(folder) is not SessionState.FINISHED:
             continue
         people = records.group(row.group).members
-        for spoken in Session.load(folder).utterances():
+        session = Session.load(folder)
+        for spoken in session.utterances():
+            files = [each.path.relative_to(records.folder).as_posix() for each in audio_files(session, spoken)]
             yield {
                 "session": row.id,
                 "condition": row.condition,
@@ -175,6 +178,7 @@ def _utterances(records: StudyRecords) -> Iterator[Row]:
                 "start": spoken.start,
                 "end": spoken.end,
                 "text": spoken.text,
+                "audio": "; ".join(files) or None,
             }
 
 

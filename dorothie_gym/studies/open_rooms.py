@@ -83,6 +83,10 @@ class OpenRooms:
         self._builds = asyncio.Semaphore(AT_ONCE)
         self._tasks: set[asyncio.Task[None]] = set()
 
+    def all(self) -> list[OpenRoom]:
+        """Returns all rooms, the oldest first."""
+        return list(self._rooms)
+
     # --- opening ----------------------------------------------------------------------------------------------------
 
     def of_session(self, session: str) -> OpenRoom | None:

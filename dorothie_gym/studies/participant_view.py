@@ -27,7 +27,7 @@ def participant_view(progress: Progress, person: Participant) -> dict[str, Any]:
     study, stage = progress.study, person.stage
     view: dict[str, Any] = {"title": study.title, "contact": study.contact, "stage": stage.value, "id": person.id}
     if stage is Stage.CONSENT:
-        view |= {"text": study.consent.text, "statements": study.consent.statements}
+        view |= {"text": study.consent.text, "statements": study.statements}
     elif stage in QUESTIONNAIRES:
         view["items"] = msgspec.to_builtins(study.questionnaire(QUESTIONNAIRES[stage]))
         view["part"] = person.position

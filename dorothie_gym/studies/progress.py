@@ -78,7 +78,7 @@ class Progress:
     def consent(self, person: Participant, agreed: Sequence[bool]) -> None:
         """Begins the study for a person who has agreed to all statements."""
         check_stage(person.stage, Stage.CONSENT)
-        if list(agreed) != [True] * len(self.study.consent.statements):
+        if list(agreed) != [True] * len(self.study.statements):
             raise RefusedError("Please agree to every statement, or do not take part.")
         with self.records.transaction():
             ticket = first_free(self.records.taken_tickets())

@@ -108,6 +108,11 @@ class StudyRecords:
             seen=found["seen"],
         )
 
+    def stage_counts(self) -> dict[Stage, int]:
+        """Returns the number of participants at each stage that has any."""
+        rows = self.data.rows("SELECT stage, count(*) AS number FROM participants GROUP BY stage")
+        return {Stage(row["stage"]): row["number"] for row in rows}
+
     def find_secret(self, secret: str) -> str | None:
         """Returns the id of the participant whose browser has a secret; None if there is none."""
         name: str | None = self.data.value("SELECT id FROM participants WHERE secret = ?", digest(secret))

@@ -71,6 +71,16 @@ class Wait(Body, frozen=True):
     on: bool
 
 
+class Enter(Body, frozen=True):
+    """Entry of the experimenter: the token of the link."""
+
+    token: Annotated[str, Meta(max_length=64)]
+
+
+class Overview(Body, frozen=True):
+    """Request of the experimenter for what goes on."""
+
+
 class Withdraw(Body, frozen=True):
     """Withdrawal, which the person must have confirmed."""
 

@@ -100,6 +100,7 @@ class RoomBuilder:
             max_seconds=seconds,
             word_error_rate=word_error_rate,
             pictures=self._study.session.pictures,
+            speech=self._study.session.speech,
             absence=absence,
             repeatable=False,
         )

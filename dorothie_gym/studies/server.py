@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import hashlib
 import logging
 import time
 from collections import OrderedDict
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
-import msgspec
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.requests import Request
@@ -23,7 +21,9 @@ from starlette.staticfiles import StaticFiles
 from dorothie_gym.console.rate_limit import TokenBucket
 from dorothie_gym.console.server import Console, SecurityHeaders, is_same_origin
 from dorothie_gym.studies import requests as r
+from dorothie_gym.studies.answers import answer, refusal, set_secret
 from dorothie_gym.studies.erasure import finish_erasures
+from dorothie_gym.studies.experimenter import Experimenter
 from dorothie_gym.studies.items import AnswerError
 from dorothie_gym.studies.open_rooms import OpenRooms
 from dorothie_gym.studies.participant_view import entrance_view, participant_view
@@ -82,16 +82,21 @@ class StudyServer:
     Attributes:
         console: rooms and seats.
         progress: participants.
+        experimenter: page of the experimenter, and the token of its link.
+
+    Raises:
+        SpeechError: people can speak, and the extra `speech` is not installed.
     """
 
     def __init__(self, study: Study, sources: Path, records: StudyRecords) -> None:
-        self.console = Console(suspends=True)
+        self.console = Console(suspends=True, speech=study.session.speech)
         self._presence = Presence()
         self._records = records
         self.rooms = OpenRooms(
             study, RoomBuilder(study, sources, records.folder), records, self.console, self._presence.tell
         )
         self.progress = Progress(study, records, self.rooms, self._presence)
+        self.experimenter = Experimenter(self.progress)
         self._buckets: OrderedDict[str, TokenBucket] = OrderedDict()
         self._withdrawing: set[str] = set()
 
@@ -121,6 +126,7 @@ class StudyServer:
         routes = [
             Route("/", page),
             *(Route(f"/study/{name}", self._guarded(run), methods=["POST"]) for name, run in actions.items()),
+            *self.experimenter.routes(self._guarded),
             Mount("/study-static", StaticFiles(directory=STATIC)),
             *self.console.routes(),
         ]
@@ -154,18 +160,19 @@ class StudyServer:
 
         async def handle(request: Request) -> Response:
             if not is_same_origin(request):
-                return _refusal(403, "This page belongs to another server.")
+                return refusal(403, "This page belongs to another server.")
             person = self._person(request)
-            if not self._admits(person.id if person else request.client.host if request.client else "", bool(person)):
-                return _refusal(429, "Too many requests. Please wait a moment.")
+            known = person.id if person else "experimenter" if self.experimenter.is_known(request) else None
+            if not self._admits(known or (request.client.host if request.client else ""), known is not None):
+                return refusal(429, "Too many requests. Please wait a moment.")
             try:
                 return await run(request)
             except r.BodyError as error:
-                return _refusal(error.status, str(error))
+                return refusal(error.status, str(error))
             except _NobodyError:
-                return _refusal(401, "You do not take part in this study.")
+                return refusal(401, "You do not take part in this study.")
             except (RefusedError, AnswerError) as error:
-                return _refusal(409, str(error))
+                return refusal(409, str(error))
 
         return handle
 
@@ -193,7 +200,7 @@ class StudyServer:
         """Answers with the present view of a participant."""
         self._presence.tell()
         found = self._records.participant(person.id)
-        return _answer(entrance_view(self.progress) if found is None else participant_view(self.progress, found))
+        return answer(entrance_view(self.progress) if found is None else participant_view(self.progress, found))
 
     async def _join(self, request: Request) -> Response:
         body = await r.read_body(request, r.Join, MAX_BYTES)
@@ -201,12 +208,9 @@ class StudyServer:
         if person is not None and not self.progress.is_other_person(person.id, *given):
             return self._view(person)
         name, secret = self.progress.join(*given)
-        answer = _answer(participant_view(self.progress, self._known(name)))
-        secure = request.url.scheme == "https"
-        answer.set_cookie(
-            COOKIE, secret, max_age=COOKIE_SECONDS, httponly=True, samesite="strict", secure=secure
-        )  # fmt: skip
-        return answer
+        joined = answer(participant_view(self.progress, self._known(name)))
+        set_secret(joined, request, COOKIE, secret, COOKIE_SECONDS)
+        return joined
 
     def _known(self, name: str) -> Participant:
         found = self._records.participant(name)
@@ -222,16 +226,16 @@ class StudyServer:
         end = time.monotonic() + NEWS_SECONDS
         async with self._presence.asking(person.id):
             while True:
-                answer = _answer(participant_view(self.progress, self._known(person.id)))
+                news = answer(participant_view(self.progress, self._known(person.id)))
                 left = end - time.monotonic()
-                if answer.headers["etag"] != body.have or left <= 0.0:
-                    return answer
+                if news.headers["etag"] != body.have or left <= 0.0:
+                    return news
                 try:
                     await self._presence.wait_for_news(min(left, PATIENCE))
                 except asyncio.CancelledError:
-                    return answer  # the server stops
+                    return news  # the server stops
                 if await request.is_disconnected():
-                    return answer
+                    return news
 
     async def _consent(self, request: Request) -> Response:
         person, body = await self._read(request, r.Consent)
@@ -276,23 +280,8 @@ class _NobodyError(Exception):
     """A request needs a participant and has none."""
 
 
-def _answer(view: dict[str, Any]) -> Response:
-    content = msgspec.json.encode(view)
-    return Response(
-        content,
-        media_type="application/json",
-        headers={"Cache-Control": "no-store", "ETag": hashlib.sha256(content).hexdigest()[:24]},
-    )
-
-
 def _farewell(text: str) -> Response:
     """Answers a person whose data have been deleted."""
-    answer = _answer({"gone": text})
-    answer.delete_cookie(COOKIE, httponly=True, samesite="strict")
-    return answer
-
-
-def _refusal(status: int, reason: str) -> Response:
-    answer = _answer({"error": reason})
-    answer.status_code = status
-    return answer
+    gone = answer({"gone": text})
+    gone.delete_cookie(COOKIE, httponly=True, samesite="strict")
+    return gone

@@ -94,10 +94,13 @@ class SessionSettings(_Part, frozen=True, kw_only=True):
     Attributes:
         max_seconds: simulated time after which a session ends [s].
         pictures: whether seats look through the windscreen.
+        speech: whether people can speak into a microphone and hear the others, besides typing; what they say is
+            recorded with the session.
     """
 
     max_seconds: Annotated[float, Meta(ge=5.0, le=7200.0)] = 900.0
     pictures: bool = True
+    speech: bool = False
 
 
 class Tutorial(_Part, frozen=True, kw_only=True):
@@ -158,9 +161,16 @@ class Recruitment(_Part, frozen=True, kw_only=True):
 
 
 class Consent(_Part, frozen=True, kw_only=True):
-    """Information and consent: a text, and statements that must all be agreed to."""
+    """Information and consent: a text, and statements that must all be agreed to.
+
+    Attributes:
+        text: information.
+        statements: statements to agree to.
+        voice: a further statement, on the recording of voices; needed where people can speak.
+    """
 
     text: Prose
+    voice: Annotated[str, Meta(min_length=1, max_length=1000)] | None = None
     statements: Annotated[list[Annotated[str, Meta(min_length=1, max_length=1000)]], Meta(min_length=1, max_length=20)]
 
 
@@ -242,6 +252,12 @@ class Study(_Part, frozen=True, kw_only=True):
     absence: Absence = field(default_factory=Absence)
     waiting_room: WaitingRoom = field(default_factory=WaitingRoom)
     recruitment: Recruitment = field(default_factory=Recruitment)
+
+    @property
+    def statements(self) -> list[str]:
+        """Statements to which people agree, with the one on their voice where they can speak."""
+        voice = [self.consent.voice] if self.session.speech and self.consent.voice is not None else []
+        return [*self.consent.statements, *voice]
 
     @property
     def people(self) -> tuple[Role, ...]:

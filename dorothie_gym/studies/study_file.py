@@ -161,6 +161,8 @@ def _faults(study: Study) -> Iterator[tuple[str, str]]:
     for role in study.people:
         if study.texts.instructions.of(role) is None:
             yield ".texts.instructions", f"the text for {role.value!r} is missing, which people play"
+    if study.session.speech and study.consent.voice is None:
+        yield ".consent", "field 'voice' is missing: where people can speak, they must agree that it is recorded"
     for name in ("before", "after_session", "after"):
         items = study.questionnaire(name)
         yield from _repeated(f"questionnaires.{name}", [item.id for item in items], "id")

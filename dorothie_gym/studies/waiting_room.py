@@ -34,6 +34,11 @@ class WaitingRoom:
         self._assigner = assigner
         self._waiting_since: dict[str, float] = {}
 
+    def present(self) -> list[tuple[Participant, float]]:
+        """Returns the people who wait and are present, and since when [s]; the longest waiting first."""
+        now = time.monotonic()
+        return [(person, now - self._waiting_since[person.id]) for person in self._waiting()]
+
     def forget(self, name: str) -> None:
         """Forgets since when a participant has waited."""
         self._waiting_since.pop(name, None)

@@ -237,7 +237,7 @@ def test_annotators_work_side_by_side_and_the_adjudicator_decides(room: Room) ->
         lambda: not list(room.marks("anna").undecided(room.text)) and not list(room.marks("ben").undecided(room.text))
     )
     found = corpus_agreement(Corpus.load(room.served.corpus).entries, with_alpha=False)
-    pair = found.pairs["anna", "ben"][1]
+    pair = found.pairs["anna", "ben"][1].labels
     # All but one of `count` spans agree; by chance: Check (ceil(n/2) of n)^2, Align (the rest without one)^2.
     checks, aligns = (count + 1) // 2, count // 2 - 1
     chance = (checks**2 + aligns**2) / count**2

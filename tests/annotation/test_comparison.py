@@ -131,11 +131,40 @@ def test_agreement_is_that_worked_by_hand_over_two_sessions(tmp_path: Path) -> N
     # A session has Instruct, Acknowledge, Explain, ReplyY, Instruct, Acknowledge, Explain; Ben has Confirm for one
     # Explain. 13 of 14 agree; by chance I (4/14)^2 + A (4/14)^2 + E (4/14)(3/14) + Y (2/14)^2 = 48/196.
     sessions, pair = found.pairs["anna", "ben"]
-    assert (sessions, pair.equal_spans, pair.spans) == (2, 14, 1.0)
-    assert pair.moves_of_equal_spans == pytest.approx((13 / 14 - 48 / 196) / (1 - 48 / 196))
-    assert found.pairs["anna", "carl"][0] == 1 and found.pairs["anna", "carl"][1].moves == 1.0
+    assert (sessions, pair.labels.equal_spans, pair.labels.spans) == (2, 14, 1.0)
+    assert pair.labels.moves_of_equal_spans == pytest.approx((13 / 14 - 48 / 196) / (1 - 48 / 196))
+    assert found.pairs["anna", "carl"][0] == 1 and found.pairs["anna", "carl"][1].labels.moves == 1.0
     assert found.alpha is not None and found.alpha.pieces == 14 and found.alpha.moves is not None
     assert 0.9 < found.alpha.moves < 1.0
+
+
+def test_borders_of_units_are_compared_whatever_their_numbers(tmp_path: Path) -> None:
+    pytest.importorskip("krippendorff", reason="needs the extra agreement")
+    one, text = recorded(tmp_path / "s")
+    spans = [mark for _, _, mark in recorded_annotation(one, text).spans(text)]
+    units = {"anna": (0, 0, 1, 1, 2, 2, 2), "ben": (7, 7, 7, 3, 5, 5, 5), "carl": (4, 4, 1, 1, 0, 0, 0)}
+    for name, numbers in units.items():
+        left = iter(zip(spans, numbers, strict=True))
+        change = {
+            line.id: tuple(
+                span(mark.words, mark.move, *mark.slots, exchange=unit, transaction=unit if name != "ben" else 9)
+                for mark, unit in (next(left) for _ in recorded_annotation(one, text).utterances[line.id])
+            )
+            for line in text.lines
+        }
+        annotate(tmp_path / "s", text, name, Annotation.empty(text).after(Change(utterances=change)))
+    found = corpus_agreement(Corpus.load(tmp_path).entries)
+    assert found.pairs["anna", "carl"][1].exchanges.kappa == 1.0
+    # Six sites. Anna has borders at the second and fourth, Ben at the third and fourth: 4 of 6 agree, by chance
+    # (2/6)(2/6) + (4/6)(4/6) = 20/36. One border is common, one is near: similarity 1 - (1/2)/2.
+    pair = found.pairs["anna", "ben"][1]
+    assert (pair.exchanges.sites, pair.exchanges.borders) == (6, (2, 2))
+    assert pair.exchanges.kappa == pytest.approx((4 / 6 - 20 / 36) / (1 - 20 / 36))
+    assert pair.exchanges.similarity == pytest.approx(0.75)
+    assert pair.transactions.kappa == 0.0 and pair.transactions.similarity == 0.0, "Ben has one transaction"
+    # Alpha: 18 marks, 6 of them borders; two sites on which one of three differs, with 4 ordered pairs over m - 1 = 2
+    # each; expected are 2 * 6 * 12 ordered pairs over n - 1 = 17.
+    assert found.exchange_alpha == pytest.approx(1 - (2 * 4 / 2) / (2 * 6 * 12 / 17))
 
 
 def test_labels_of_the_session_and_the_final_version_can_be_compared(tmp_path: Path) -> None:
@@ -144,7 +173,7 @@ def test_labels_of_the_session_and_the_final_version_can_be_compared(tmp_path: P
     annotate(tmp_path / "s", text, ADJUDICATED, recorded_annotation(one, text))
     entries = Corpus.load(tmp_path).entries
     found = corpus_agreement(entries, [RECORDED, ADJUDICATED], with_alpha=False)
-    assert found.pairs[ADJUDICATED, RECORDED][1].moves == 1.0 and found.alpha is None
+    assert found.pairs[ADJUDICATED, RECORDED][1].labels.moves == 1.0 and found.alpha is None
     with pytest.raises(AnnotationError, match="nothing to compare"):
         corpus_agreement(entries)
     with pytest.raises(AnnotationError, match="'x' has annotated no session of the corpus \\(anna\\)"):

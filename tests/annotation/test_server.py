@@ -20,6 +20,7 @@ from dorothie_gym.annotation.workplace import Seat
 from dorothie_gym.ontology import DECISION_TREE, DialogueMove, walk
 from tests.annotation.builders import FIRST, annotate, recorded
 from tests.annotation.serving import Served
+from tests.fuzzing import COUNTS, GROWTH, check_raw_requests, memory, needs_memory
 from tests.recording.builders import write
 
 INSTRUCT = {"words": 4, "move": "Instruct", "slots": {"Landmark": ["KFC"]}, "exchange": 0}
@@ -186,9 +187,13 @@ def test_large_and_frequent_requests_are_refused(served: Served) -> None:
     assert served.raw("/api/seat")[0] == 200, "others are not slowed down"
 
 
-def test_fuzzed_requests_get_refusals_only(served: Served, caplog: pytest.LogCaptureFixture) -> None:
-    served.application._budgets = _Unlimited()  # type: ignore[assignment]  # 1,500 requests without the limit of the rate
-    rng = random.Random(3)
+@needs_memory()
+@pytest.mark.parametrize(("seed", "count"), COUNTS)
+def test_fuzzed_requests_get_refusals_only(
+    served: Served, caplog: pytest.LogCaptureFixture, request: pytest.FixtureRequest, seed: int, count: int
+) -> None:
+    served.application._budgets = _Unlimited()  # type: ignore[assignment]  # the limit of the rate has a test of its own
+    rng = random.Random(seed + request.config.getoption("--malformed-seed"))
     served.mark(0, 0, INSTRUCT)
     before = (served.corpus / "one" / "annotations" / "anna.jsonl").read_bytes()
     sound = {
@@ -212,7 +217,10 @@ def test_fuzzed_requests_get_refusals_only(served: Served, caplog: pytest.LogCap
         "/x",
     ]
     queries = ["", "?frame=-1", "?frame=1e9", f"?frame={'9' * 400}", "?frame=0&frame=1", "?frame=%ff"]
-    for _ in range(1500):
+    memory_before = 0.0
+    for number in range(count):
+        if number == 100:
+            memory_before = memory()
         text = bytearray(json.dumps(sound).encode())
         for _ in range(rng.randint(1, 5)):
             at = rng.randrange(len(text))
@@ -226,7 +234,13 @@ def test_fuzzed_requests_get_refusals_only(served: Served, caplog: pytest.LogCap
         if status not in (200, 404, 405):
             reason = json.loads(content)["reason"]
             assert reason and "\n" not in reason and len(reason) < 1500
+    for _ in range(10):
+        large = b'{"label":"' + b"a" * 2**20 + b'"}'
+        assert served.raw("/api/sessions/0/mark", large)[0] == 413
     assert not caplog.records
+    check_raw_requests(served.port, rng, count // 20)
+    assert not [record for record in caplog.records if record.levelname == "ERROR"], caplog.text
+    assert memory() - memory_before < GROWTH
     log = (served.corpus / "one" / "annotations" / "anna.jsonl").read_bytes()
     assert log.startswith(before)
     assert served.ask("sessions/0/marks")["spans"] >= 5

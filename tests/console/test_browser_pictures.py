@@ -43,7 +43,7 @@ class Desk:
         self.pages.append(page)
         return page
 
-    def until(self, reached: Callable[[], object], seconds: float = 30.0) -> None:
+    def until(self, reached: Callable[[], object], seconds: float = 60.0) -> None:
         end = time.monotonic() + seconds
         while not reached():
             assert time.monotonic() < end, "not in time"
@@ -85,7 +85,7 @@ def test_a_car_is_driven_and_talked_to_by_keyboard_alone(desk: Desk) -> None:
     co_wizard.wait_for_selector("dialog >> text=Follow lane")
     co_wizard.keyboard.press("Escape")
     assert participant.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    participant.wait_for_function("document.querySelector('.windscreen .note').hidden", timeout=60_000)
+    desk.until(lambda: participant.evaluate("document.querySelector('.windscreen .note').hidden"), 120.0)
 
 
 def test_an_act_is_corrected_with_two_clicks(desk: Desk) -> None:

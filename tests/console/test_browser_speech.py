@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 pytest.importorskip("playwright.sync_api", reason="needs playwright")
@@ -17,8 +16,8 @@ from dorothie_gym.console.config import ConsoleConfig
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.seating import parse_roles
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.speech import encode_wav, find_synthesizer, resample, say
-from tests.chromium import IN_CHROMIUM, WAIT, chromium
+from dorothie_gym.speech import find_synthesizer, say
+from tests.chromium import IN_CHROMIUM, WAIT, chromium, microphone, talk_for
 from tests.console.people import SEED, TOWN
 from tests.console.serving import Served
 
@@ -30,15 +29,7 @@ TURN = "Turn left at the KFC, please."
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """Chromium whose microphone says `TURN` over and over, with pauses."""
-    file = tmp_path_factory.mktemp("microphone") / "turn.wav"
-    pause = np.zeros(8000, dtype=np.float32)
-    samples = np.concatenate([pause, say(find_synthesizer(), TURN), pause])
-    file.write_bytes(encode_wav(resample(samples, 16000, 48000), 48000))
-    flags = [
-        "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
-        f"--use-file-for-fake-audio-capture={file}", "--autoplay-policy=no-user-gesture-required",
-    ]  # fmt: skip
-    with chromium(*flags) as launched:
+    with chromium(*microphone(say(find_synthesizer(), TURN), tmp_path_factory.mktemp("microphone"))) as launched:
         yield launched
 
 
@@ -67,15 +58,6 @@ def until(page: Any, reached: str) -> None:
     while not page.evaluate(reached):
         assert time.monotonic() < end, reached
         time.sleep(0.1)
-
-
-def talk_for(page: Any, seconds: float) -> None:
-    """Holds the button down for a time [s]."""
-    box = page.locator(".speech .hold").bounding_box()
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    page.mouse.down()
-    time.sleep(seconds)
-    page.mouse.up()
 
 
 def test_held_button_records_and_words_appear_with_their_acts(browser: Any, served: Served, tmp_path: Path) -> None:

@@ -12,58 +12,18 @@ pytest.importorskip("playwright.sync_api", reason="needs playwright")
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
 from dorothie_gym.recording import Session
-from tests.chromium import IN_CHROMIUM, WAIT, chromium
+from tests.chromium import IN_CHROMIUM, chromium, press, tab_to
 from tests.studies.content import STUDY, write_study
+from tests.studies.laboratory import RICH, Laboratory, at, to_code, to_waiting_room
 from tests.studies.serving import ServedStudy
 
 pytestmark = IN_CHROMIUM
-
-RICH = {
-    **STUDY,
-    "session": {"max_seconds": 15.0, "pictures": True},
-    "questionnaires": {
-        "before": [
-            {"id": "age", "kind": "number", "text": "How old are you?", "min": 18, "max": 99},
-            {"id": "licence", "kind": "choice", "text": "Do you have a licence?", "options": ["Yes", "No"]},
-        ],
-        "after": [
-            {"id": "trust", "kind": "likert", "text": "I trusted the other one."},
-            {"id": "used", "kind": "choice", "several": True, "text": "What did you use?", "options": ["Map", "Talk"]},
-            {"id": "comment", "kind": "text", "long": True, "text": "Comments?", "required": False},
-        ],
-    },
-}
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     with chromium() as launched:
         yield launched
-
-
-class Laboratory:
-    """Browsers of participants; mistakes of the page fail the test."""
-
-    def __init__(self, browser: Any, served: ServedStudy) -> None:
-        self.browser, self.served = browser, served
-        self.errors: list[str] = []
-        self.pages: list[Any] = []
-
-    def open(self, link: str = "/", width: int = 1280, height: int = 720, **options: Any) -> Any:
-        page = self.browser.new_context(viewport={"width": width, "height": height}, **options).new_page()
-        page.set_default_timeout(WAIT)
-        page.on("pageerror", lambda error: self.errors.append(str(error)))
-        page.on(
-            "console", lambda line: self.errors.append(f"{line.text} {line.location}") if line.type == "error" else None
-        )
-        page.goto(f"{self.served.address}{link}")
-        page.wait_for_selector("body[data-stage]")
-        self.pages.append(page)
-        return page
-
-    def read(self, line: Any) -> None:
-        if line.type == "error":
-            self.errors.append(f"{line.text} {line.location}")
 
 
 @pytest.fixture
@@ -74,56 +34,6 @@ def laboratory(browser: Any, tmp_path: Path) -> Iterator[Laboratory]:
         for page in made.pages:
             page.context.close()
     assert made.errors == []
-
-
-def at(page: Any, stage: str) -> None:
-    page.wait_for_selector(f"body[data-stage={stage}]")
-
-
-def to_waiting_room(page: Any) -> None:
-    """Goes to the waiting room by mouse, past the practice drive."""
-    for box in page.query_selector_all(".statement input"):
-        box.check()
-    page.click("text=I take part")
-    at(page, "before")
-    page.fill("input[type=number]", "31")
-    page.check("text=Yes")
-    page.click("text=Continue")
-    at(page, "instructions")
-    page.click("text=Continue")
-    at(page, "tutorial")
-    page.click("text=Skip it")
-
-
-def to_code(page: Any) -> None:
-    """Goes from the end of the session to the code by mouse."""
-    page.wait_for_selector(".over >> text=Continue", timeout=60_000)
-    page.click(".over >> text=Continue")
-    at(page, "after")
-    page.check(".points label:nth-child(6) input")
-    page.check("text=Talk")
-    page.click("button:has-text('Continue')")
-    at(page, "debriefing")
-    page.click("text=Continue")
-    page.wait_for_selector("text=FINISHED")
-
-
-def press(page: Any, *keys: str) -> None:
-    for key in keys:
-        page.keyboard.press(key)
-
-
-def tab_to(page: Any, label: str) -> None:
-    """Moves the focus by the tabulator to the element with a label or text."""
-    for _ in range(60):
-        page.keyboard.press("Tab")
-        focused = page.evaluate(
-            "(() => { const e = document.activeElement; return [e.textContent, e.getAttribute('aria-label'),"
-            " e.labels?.[0]?.textContent].filter(Boolean).join(' '); })()"
-        )
-        if label in focused:
-            return
-    raise AssertionError(f"{label!r} cannot be reached by keyboard")
 
 
 def test_two_people_play_a_study_one_of_them_by_keyboard_on_a_phone(laboratory: Laboratory) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-import resource
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,11 +13,14 @@ import pytest
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
 from dorothie_gym.studies.server import ENTRIES, MAX_BYTES, REQUESTS
+from tests.console.malformed_messages import SOUND, STRICT, refusals
+from tests.fuzzing import COUNTS, GROWTH, check_raw_requests, malformed, memory, needs_memory
 from tests.studies.content import SOLO, write_study
 from tests.studies.serving import Client, ServedStudy
 
 JSON = {"Content-Type": "application/json"}
 ACTIONS = "join", "news", "consent", "answers", "proceed", "wait", "withdraw"
+EXPERIMENTERS = "experimenter/enter", "experimenter/overview"
 
 
 @pytest.fixture(scope="module")
@@ -121,20 +123,22 @@ def test_answers_forbid_foreign_content_and_are_not_stored(person: Client) -> No
     assert {"HttpOnly", "SameSite=strict"} <= set(headers["Set-Cookie"].split("; "))
 
 
-def test_floods_are_refused(served: ServedStudy, person: Client) -> None:
+def test_floods_are_refused(served: ServedStudy, person: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dorothie_gym.studies.server.REQUESTS", (REQUESTS[0], 0.0))  # also on a slow machine
     person.do("consent", {"agreed": [True, True]})
     statuses = [person.post("consent", {"agreed": None}) for _ in range(int(REQUESTS[0]) + 20)]
     assert statuses[0] == 409 and statuses[-1] == 429
 
 
-def test_entries_of_one_address_are_limited(tmp_path: Path) -> None:
+def test_entries_of_one_address_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dorothie_gym.studies.server.ENTRIES", (ENTRIES[0], 0.0))  # also on a slow machine
     with ServedStudy(write_study(tmp_path, SOLO), tmp_path / "data") as served:
         statuses = [Client(served.port).post("join") for _ in range(int(ENTRIES[0]) + 40)]
         assert statuses[0] == 200 and statuses[-1] == 429
 
 
 VALUES = [None, True, 0, -1, 2**70, 1.5, "", "a" * 5000, "\x00", "../..", [], {}, [[]] * 40, {"a": {"a": {}}}]
-NAMES = ["parameters", "invitation", "have", "agreed", "stage", "answers", "on", "sure", "x", ""]
+NAMES = ["parameters", "invitation", "token", "have", "agreed", "stage", "answers", "on", "sure", "x", ""]
 
 
 def body(drawn: random.Random) -> bytes:
@@ -149,33 +153,65 @@ def body(drawn: random.Random) -> bytes:
     return text[: drawn.randrange(len(text))] if kind < 0.4 else text
 
 
-def peak() -> float:
-    """Returns the largest memory that this process has had [MB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-
-
-@pytest.mark.parametrize("seed", [1])
+@needs_memory()
+@pytest.mark.parametrize(("seed", "count"), COUNTS)
 def test_random_requests_are_refused_and_leave_no_traces(
-    served: ServedStudy, person: Client, monkeypatch: pytest.MonkeyPatch, seed: int
+    served: ServedStudy,
+    person: Client,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    request: pytest.FixtureRequest,
+    seed: int,
+    count: int,
 ) -> None:
     monkeypatch.setattr("dorothie_gym.studies.server.REQUESTS", (1e6, 1e6))
     monkeypatch.setattr("dorothie_gym.studies.server.NEWS_SECONDS", 0.0)
     assert served.study is not None
     served.study._buckets.clear()
-    drawn, before = random.Random(seed), peak()
+    drawn, before = random.Random(seed + request.config.getoption("--malformed-seed")), memory()
     known = person.view["id"]
-    for _ in range(600):
-        action, content = drawn.choice(ACTIONS[1:]), body(drawn)
+    for _ in range(count):
+        action, content = drawn.choice([*ACTIONS[1:], *EXPERIMENTERS]), body(drawn)
         if (action == "consent" and content == b'{"agreed": null}') or action == "withdraw":
             continue  # what a person may do
         status, _, _ = person.send("POST", f"/study/{action}", content, JSON)
-        assert status in (200, 400, 409, 413), (action, content[:200])
+        assert status in (200, 400, 409, 413, *([401] if action in EXPERIMENTERS else [])), (action, content[:200])
         assert status != 200 or action == "news", (action, content[:200])
     large = b'{"have": "' + b"a" * 2**20 + b'"}'
-    for action in ACTIONS:
+    for action in (*ACTIONS, *EXPERIMENTERS):
         for _ in range(5):
             assert person.send("POST", f"/study/{action}", large, JSON)[0] == 413
     person.tag = ""
     person.do("news")
     assert person.view["id"] == known and person.stage == "consent"
-    assert peak() - before < 60.0
+    check_raw_requests(served.port, drawn, count // 20)
+    assert person.send("GET", "/")[0] == 200
+    assert memory() - before < GROWTH
+    assert not [record for record in caplog.records if record.levelname == "ERROR"], caplog.text
+
+
+@needs_memory()
+@pytest.mark.parametrize(("seed", "count"), COUNTS)
+def test_malformed_messages_at_a_seat_of_the_study_are_refused(
+    served: ServedStudy,
+    person: Client,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+    seed: int,
+    count: int,
+) -> None:
+    monkeypatch.setattr("dorothie_gym.console.connection.BURST", 1e9)
+    drawn = random.Random(seed + request.config.getoption("--malformed-seed"))
+    person.do("consent", {"agreed": [True, True]})
+    person.do("answers", {"stage": "before", "answers": {"age": 30}})
+    person.do("proceed", {"stage": "instructions"})
+    person.follow(lambda: person.view.get("token"))
+    before = memory()
+    for _ in range(count // 40):
+        with person.sit() as socket:
+            for _ in range(40):
+                socket.send(malformed(drawn, SOUND, STRICT).encode("utf-8", "surrogatepass").decode("utf-8", "replace"))
+            refusals(socket, 40)
+    assert memory() - before < GROWTH
+    person.do("news")
+    assert person.stage == "tutorial"

@@ -14,7 +14,7 @@ const PRESETS = [
 
 export class AdWizardPage {
   constructor(link, keys) {
-    Object.assign(this, { link, tool: null, count: 4, moving: null });
+    Object.assign(this, { link, tool: null, count: 4, moving: null, drafts: new Map() });
     this.talk = new Talk(link, { acts: false, names: { ad_wizard: 'You, to the participant' } });
     this.canvas = h('canvas', { 'aria-label': 'The world from above; choose a tool, then click' });
     this.map = new MapView(this.canvas, { onclick: (at, reach) => this.click(at, reach) });
@@ -44,6 +44,7 @@ export class AdWizardPage {
 
   begin() {
     this.map.scale = 2.6;
+    this.drafts.clear();
     const { vocabulary } = this.link.hello;
     const made = [...vocabulary.props.map(kind => [kind, words(kind), { prop: kind }]), ['vehicles', 'Vehicles', { what: 'vehicles' }], ['pedestrians', 'Pedestrians', { what: 'pedestrians' }]];
     this.tools.replaceChildren(...made.map(([id, label, tool]) => { const one = button(label, { 'aria-pressed': 'false', run: () => this.take(this.tool?.id === id ? null : { id, label, ...tool }) }); one.dataset.tool = id; return one; }),
@@ -103,15 +104,15 @@ export class AdWizardPage {
 
   showProps({ props }) {
     rebuild(this.placed, props, () => props.map(([kind], item) => h('li', {}, h('span', { text: words(kind) }),
-      button('Move', { class: 'soft', run: () => { this.take(null); this.moving = item; this.hint.textContent = 'Click the new place on the map.'; this.canvas.classList.add('armed'); this.canvas.focus(); } }),
-      button('Remove', { class: 'soft', run: () => this.link.command('remove', { item }) }))));
+      button('Move', { class: 'soft', 'data-id': `move-${item}`, run: () => { this.take(null); this.moving = item; this.hint.textContent = 'Click the new place on the map.'; this.canvas.classList.add('armed'); this.canvas.focus(); } }),
+      button('Remove', { class: 'soft', 'data-id': `remove-${item}`, run: () => this.link.command('remove', { item }) }))));
   }
 
   showTasks({ tasks }) {
     rebuild(this.tasks, tasks, () => tasks.map(task => h('li', { class: task.live || task.status === 'abandoned' ? task.status : 'untold' },
       h('p', {}, task.text, h('small', { text: task.live ? task.status : task.status === 'abandoned' ? 'dropped' : 'not yet' })),
       task.may.map(change => h('form', { class: 'change', onsubmit: event => { event.preventDefault(); const text = event.target.elements.text.value.trim(); this.link.command('task', { change, item: task.item, message: text }); } },
-        h('input', { name: 'text', type: 'text', maxlength: '300', value: task.messages[change], 'aria-label': `Message with which the participant learns it: ${CHANGES[change]} “${task.text}”`, placeholder: 'Message to the participant' }),
-        h('button', { type: 'submit', title: change === 'change' ? task.after_change : '', text: CHANGES[change] }))))));
+        h('input', { name: 'text', type: 'text', maxlength: '300', value: this.drafts.get(`${change}-${task.item}`) ?? task.messages[change], 'data-id': `text-${change}-${task.item}`, oninput: event => this.drafts.set(`${change}-${task.item}`, event.target.value), 'aria-label': `Message with which the participant learns it: ${CHANGES[change]} “${task.text}”`, placeholder: 'Message to the participant' }),
+        h('button', { type: 'submit', 'data-id': `${change}-${task.item}`, title: change === 'change' ? task.after_change : '', text: CHANGES[change] }))))));
   }
 }

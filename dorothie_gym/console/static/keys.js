@@ -2,7 +2,7 @@
 
 import { h, shownKey } from './dom.js';
 
-const TYPING = 'input, textarea, select, [contenteditable]';
+const TYPING = 'input:not([type=range], [type=checkbox], [type=radio]), textarea, select, [contenteditable]';
 
 export class Keys {
   constructor() {
@@ -18,6 +18,7 @@ export class Keys {
     if (event.ctrlKey || event.metaKey || event.defaultPrevented) return;
     const typing = event.target.closest?.(TYPING), inDialog = event.target.closest?.('dialog, .popover');
     if (inDialog) return;
+    if (typing && event.key === 'Escape') return event.target.blur();
     const digit = /^Digit\d$/.test(event.code) ? event.code.at(-1) : null;
     for (const row of this.rows) {
       if (row.alt !== event.altKey || (typing && !row.alt)) continue;
@@ -32,7 +33,7 @@ export class Keys {
   show() {
     const dialog = h('dialog', { class: 'keys', 'aria-label': 'Keys' }, h('h2', { text: 'Keys' }),
       h('dl', { tabindex: '0' }, this.rows.flatMap(({ key, label, alt }) => [h('dt', {}, h('kbd', { text: (alt ? 'Alt ' : '') + shownKey(key) })), h('dd', { text: label })])),
-      h('p', { class: 'hint', text: 'On the map: arrows move the pointer, Enter clicks, Shift and arrows move the map, + and − zoom, 0 follows the car.' }),
+      h('p', { class: 'hint', text: 'On the map: arrows move the pointer and hold the map, Enter clicks, Shift and arrows move the map, + and − zoom, 0 follows the car. Escape leaves a field.' }),
       h('button', { type: 'button', autofocus: true, onclick: () => dialog.close(), text: 'Close' }));
     dialog.addEventListener('close', () => dialog.remove());
     document.body.append(dialog);

@@ -14,7 +14,7 @@ export class MapView {
   constructor(canvas, { onclick = null } = {}) {
     Object.assign(this, {
       canvas, onclick, ink: canvas.getContext('2d'), centre: [0, 0], scale: 4, follow: true, names: [], poses: [], offset: null, hover: null,
-      cursor: null, trail: [], state: {}, layers: [], ratio: 1,
+      cursor: null, held: false, trail: [], state: {}, layers: [], ratio: 1,
     });
     canvas.tabIndex = 0;
     new ResizeObserver(() => this.fit()).observe(canvas);
@@ -71,7 +71,7 @@ export class MapView {
     const { canvas } = this;
     let held = null, moved = false;
     canvas.addEventListener('wheel', event => { event.preventDefault(); this.zoom(Math.exp(-event.deltaY / 500), [event.offsetX, event.offsetY]); }, { passive: false });
-    canvas.addEventListener('pointerdown', event => { held = [event.offsetX, event.offsetY, ...this.centre]; moved = false; canvas.setPointerCapture(event.pointerId); this.cursor = null; });
+    canvas.addEventListener('pointerdown', event => { held = [event.offsetX, event.offsetY, ...this.centre]; moved = false; canvas.setPointerCapture(event.pointerId); this.cursor = null; this.held = false; });
     canvas.addEventListener('pointermove', event => {
       this.hover = this.world(event.offsetX, event.offsetY);
       if (!held) return;
@@ -84,19 +84,31 @@ export class MapView {
     canvas.addEventListener('pointercancel', () => { held = null; });
     canvas.addEventListener('pointerleave', () => { this.hover = null; });
     canvas.addEventListener('keydown', event => this.key(event));
-    canvas.addEventListener('blur', () => { this.cursor = null; });
+    canvas.addEventListener('blur', () => this.putDown());
+  }
+
+  /** Returns the pointer of the keyboard, at first in the middle; the map stands still while there is one. */
+  pointer() {
+    if (!this.cursor) { this.cursor = [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2]; this.held = this.follow; this.follow = false; }
+    return this.cursor;
+  }
+
+  /** Takes the pointer of the keyboard away; a map that it held follows the car again. */
+  putDown() {
+    if (this.held) this.follow = true;
+    this.cursor = null; this.held = false;
   }
 
   key(event) {
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
     const [w, H] = [this.canvas.clientWidth, this.canvas.clientHeight];
     if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (step && event.shiftKey) { this.follow = false; this.centre = [this.centre[0] + step[0] * 60 / this.scale, this.centre[1] + step[1] * 60 / this.scale]; }
-    else if (step) { const [x, y] = this.cursor ?? [w / 2, H / 2]; this.cursor = [Math.min(w, Math.max(0, x + 12 * step[0])), Math.min(H, Math.max(0, y + 12 * step[1]))]; this.hover = this.world(...this.cursor); }
-    else if (event.key === 'Enter' && this.cursor) this.onclick?.(this.world(...this.cursor), 14 / this.scale);
+    if (step && event.shiftKey) { this.follow = this.held = false; this.centre = [this.centre[0] + step[0] * 60 / this.scale, this.centre[1] + step[1] * 60 / this.scale]; }
+    else if (step) { const [x, y] = this.pointer(); this.cursor = [Math.min(w, Math.max(0, x + 12 * step[0])), Math.min(H, Math.max(0, y + 12 * step[1]))]; this.hover = this.world(...this.cursor); }
+    else if (event.key === 'Enter' && this.onclick) this.onclick(this.world(...this.pointer()), 14 / this.scale);
     else if (event.key === '+' || event.key === '=') this.zoom(1.25);
     else if (event.key === '-') this.zoom(0.8);
-    else if (event.key === '0') this.follow = true;
+    else if (event.key === '0') { this.cursor = null; this.held = false; this.follow = true; }
     else return;
     event.preventDefault(); event.stopPropagation();
   }

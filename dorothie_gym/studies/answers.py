@@ -1,0 +1,42 @@
+"""Answers of the server of a study: views as JSON with a tag, refusals, and cookies."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import Response
+
+
+def answer(view: dict[str, Any]) -> Response:
+    """Answers with a view, which is not stored; equal views have equal tags (`ETag`)."""
+    content = msgspec.json.encode(view)
+    return Response(
+        content,
+        media_type="application/json",
+        headers={"Cache-Control": "no-store", "ETag": hashlib.sha256(content).hexdigest()[:24]},
+    )
+
+
+def refusal(status: int, reason: str) -> Response:
+    """Answers that a request is refused."""
+    refused = answer({"error": reason})
+    refused.status_code = status
+    return refused
+
+
+def set_secret(to: Response, request: Request, name: str, secret: str, seconds: int | None, path: str = "/") -> None:
+    """Adds a cookie with a secret that scripts of pages cannot read and pages of other hosts do not send.
+
+    Args:
+        to: the answer.
+        request: the request, whose scheme says whether the cookie needs TLS.
+        name: name of the cookie.
+        secret: its value.
+        seconds: how long browsers keep it [s]; None: until they are closed.
+        path: beginning of the paths to which it is sent.
+    """
+    secure = request.url.scheme == "https"
+    to.set_cookie(name, secret, max_age=seconds, path=path, httponly=True, samesite="strict", secure=secure)

@@ -1,0 +1,122 @@
+"""Experimenter of a running study: entrance by a link that works once, people who wait, and rooms to look after."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any, Final
+
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.routing import Route
+
+from dorothie_gym.console.seat import EXPERIMENTER, RoomState
+from dorothie_gym.studies import requests as r
+from dorothie_gym.studies.answers import answer, refusal, set_secret
+from dorothie_gym.studies.open_rooms import OpenRoom
+from dorothie_gym.studies.progress import Progress
+from dorothie_gym.studies.records import digest
+from dorothie_gym.studies.stages import RefusedError
+
+STATIC: Final = Path(__file__).parent / "static"
+
+COOKIE: Final = "dorothie_experimenter"
+"""Cookie with the secret of the experimenter's browser; scripts of pages cannot read it."""
+
+PATH: Final = "/study/experimenter"
+"""Beginning of the paths of the experimenter's requests, to which alone the cookie is sent."""
+
+MAX_BYTES: Final = 1024
+"""Largest body of a request [bytes]."""
+
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+class Experimenter:
+    """Page of the experimenter of a study.
+
+    Args:
+        progress: participants of the study.
+
+    Attributes:
+        token: token of the link, which admits one browser; the next server has another one.
+    """
+
+    def __init__(self, progress: Progress) -> None:
+        self.token = secrets.token_urlsafe(16)
+        self._progress = progress
+        self._unused = True
+        self._browser: bytes | None = None
+
+    def routes(self, guarded: Callable[[Handler], Handler]) -> list[Route]:
+        """Returns the routes of the page and its requests.
+
+        Args:
+            guarded: refuses requests of other pages, too many ones, and malformed ones.
+        """
+
+        async def page(request: Request) -> Response:
+            return FileResponse(STATIC / "experimenter.html")
+
+        return [
+            Route("/experimenter", page),
+            Route(f"{PATH}/enter", guarded(self._enter), methods=["POST"]),
+            Route(f"{PATH}/overview", guarded(self._overview), methods=["POST"]),
+        ]
+
+    def is_known(self, request: Request) -> bool:
+        """Returns whether a request comes from the browser that the link has admitted."""
+        given = request.cookies.get(COOKIE)
+        return bool(given) and self._browser is not None and secrets.compare_digest(digest(str(given)), self._browser)
+
+    async def _enter(self, request: Request) -> Response:
+        body = await r.read_body(request, r.Enter, MAX_BYTES)
+        if self.is_known(request):
+            return answer(self.overview())
+        if not self._unused or not secrets.compare_digest(digest(body.token), digest(self.token)):
+            raise RefusedError(
+                "This link is not valid, or it has been used. Stop the server and start it again: it prints a new one, "
+                "and the study goes on."
+            )
+        secret = secrets.token_urlsafe(32)
+        self._unused, self._browser = False, digest(secret)
+        entered = answer(self.overview())
+        set_secret(entered, request, COOKIE, secret, None, PATH)
+        return entered
+
+    async def _overview(self, request: Request) -> Response:
+        await r.read_body(request, r.Overview, MAX_BYTES)
+        return answer(self.overview()) if self.is_known(request) else refusal(401, "Open the link of the experimenter.")
+
+    # --- content ------------------------------------------------------------------------------------------------------
+
+    def overview(self) -> dict[str, Any]:
+        """Returns people who wait, numbers of people by stage, and open rooms with the token of the own seat there."""
+        progress = self._progress
+        rooms = [self._row(place) for place in progress.rooms.all() if place.room is not None]
+        return {
+            "title": progress.study.title,
+            "stages": {stage.value: number for stage, number in progress.records.stage_counts().items()},
+            "waiting": [
+                {"id": person.id, "role": person.role and person.role.value, "seconds": round(seconds)}
+                for person, seconds in progress.waiting.present()
+            ],
+            "rooms": sorted(rooms, key=lambda row: (row["session"] is None, row["session"] or "")),
+        }
+
+    @staticmethod
+    def _row(place: OpenRoom) -> dict[str, Any]:
+        room, row = place.room, place.session
+        assert room is not None
+        return {
+            "session": None if row is None else row.id,
+            "condition": None if row is None else row.condition,
+            "state": room.state.value,
+            "seconds": round(room.engine.session.world.time),
+            "people": [
+                {"id": name, "role": role.value, "present": room.seats[role.value].present}
+                for role, name in place.people.items()
+            ],
+            "token": None if room.state is RoomState.OVER else room.seats[EXPERIMENTER].token,
+        }

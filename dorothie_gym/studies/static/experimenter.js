@@ -1,0 +1,78 @@
+// Page of the experimenter of a study: people who wait, rooms, and the seat of the experimenter in one of them.
+
+import { button, clock, h, rebuild } from '/static/dom.js';
+import { openSeat } from '/static/seat_page.js';
+
+const PERIOD = 2000;  // between two looks [ms]
+const ROLES = { participant: 'Participant', co_wizard: 'Co-Wizard', ad_wizard: 'Ad-Wizard' };
+const STAGES = { consent: 'consent', before: 'questionnaire before', instructions: 'instructions', tutorial: 'practice drive', lobby: 'waiting room', session: 'session', after_session: 'questionnaire after a session', after: 'questionnaire after', debriefing: 'debriefing', done: 'finished' };
+const main = document.getElementById('main'), bar = document.getElementById('bar');
+const counts = h('p', {}), waiting = h('ul', {}), rooms = h('div', { class: 'rooms' });
+let seated = false;
+
+async function post(name, body) {
+  const answer = await fetch(`/study/experimenter/${name}`, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body) });
+  const view = await answer.json();
+  if (!answer.ok) throw Object.assign(new Error(view.error), { status: answer.status });
+  return view;
+}
+
+async function start() {
+  const token = location.hash.slice(1);
+  try {
+    const view = token ? await post('enter', { token }) : await post('overview', {});
+    history.replaceState(null, '', location.pathname);  // the token does not stay in the address
+    open(view);
+  } catch (error) {
+    const text = error.status ? error.message : 'The server does not answer. Load the page again in a moment.';
+    main.replaceChildren(h('div', { class: 'card' }, h('h1', { text: 'Experimenter' }), h('p', { text })));
+  }
+}
+
+function open(view) {
+  document.title = `Experimenter – ${view.title}`;
+  bar.className = 'experimenter';
+  bar.replaceChildren(h('h1', { text: view.title }), h('span', { class: 'state', role: 'status' }));
+  main.replaceChildren(h('div', { class: 'sheet' }, h('article', { class: 'text' },
+    h('h2', { text: 'People' }), counts, h('h2', { text: 'Waiting room' }), waiting, h('h2', { text: 'Rooms' }), rooms)));
+  show(view);
+  setTimeout(look, PERIOD);
+}
+
+async function look() {
+  if (seated) return;
+  try {
+    show(await post('overview', {}));
+    bar.querySelector('.state').textContent = '';
+  } catch (error) {
+    if (error.status === 401) return location.reload();
+    bar.querySelector('.state').textContent = 'The server does not answer. This page tries again.';
+  }
+  setTimeout(look, PERIOD);
+}
+
+function show(view) {
+  if (seated) return;
+  const stages = Object.keys(STAGES).filter(stage => view.stages[stage]).map(stage => `${STAGES[stage]}: ${view.stages[stage]}`);
+  rebuild(counts, stages, () => [stages.join(', ') || 'Nobody has opened the link yet.']);
+  rebuild(waiting, view.waiting, () => (view.waiting.length ? view.waiting : [null]).map(person =>
+    h('li', { text: person ? `${person.id}, ${ROLES[person.role]}, for ${clock(person.seconds)}` : 'Nobody is waiting.' })));
+  rebuild(rooms, view.rooms, () => (view.rooms.length ? view.rooms.map(room) : [h('p', { text: 'No room is open.' })]));
+}
+
+function room({ session, condition, state, seconds, people, token }) {
+  const name = session ?? `Practice of ${people[0].id}`;
+  return h('section', { class: 'room', 'aria-label': name },
+    h('p', {}, h('strong', { text: name }), condition ? ` ${condition}` : '', `: ${state}, ${clock(seconds)}`,
+      h('small', { text: people.map(each => `${ROLES[each.role]} ${each.id}${each.present ? '' : ' (away)'}`).join(', ') })),
+    token ? button('Watch and control', { run: () => sit(token), 'data-id': name, 'aria-label': `Watch and control ${name}` }) : null);
+}
+
+/** Takes the seat of the experimenter in a room, with pause, messages and end. */
+function sit(token) {
+  const back = () => location.reload();  // the seat's listeners go
+  seated = true;
+  openSeat(token, { then: { label: 'All rooms', run: back }, tools: [button('All rooms', { class: 'soft', run: back })], onFinal: why => { if (why === 'unknown') { back(); return true; } return false; } });
+}
+
+start();
