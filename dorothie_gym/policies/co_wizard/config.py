@@ -171,7 +171,7 @@ class CoWizardStyle:
             checks=within(0.4, 0.1, persona.certainty, rng),
             announces=within(0.0, 0.18, persona.talkativeness, rng),
             silent=within(0.65, 0.25, persona.talkativeness, rng),
-            asks=within(0.68, 0.25, persona.certainty, rng),
+            asks=within(0.6, 0.2, persona.certainty, rng),
             proposes=within(0.1, 0.6, persona.certainty, rng),
             mishears=within(0.05, 0.0, persona.attention, rng),
             careful=within(0.9, 1.0, persona.patience, rng),
