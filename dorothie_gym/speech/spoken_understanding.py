@@ -56,14 +56,18 @@ def readable(text: str) -> str:
 def audible(recognition: Recognition) -> str:
     """Returns the recognised words with `INAUDIBLE` in place of doubtful ones, where these may change the meaning.
 
-    They may if the hypotheses differ in the values of slots, or the speech is short. Systems of spoken dialogue
-    likewise reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial 2005).
+    They may if values of slots rest on them, if other hypotheses have further values, or if the speech is short.
+    Systems of spoken dialogue likewise reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial
+    2005).
     """
     if not any(map(_is_doubtful, recognition.words)):
         return recognition.text
     if len(recognition.words) > SHORT:
-        meanings = {guess_act(readable(hypothesis.text)).slots for hypothesis in recognition.hypotheses}
-        if len(meanings) == 1:
+        sure = " ".join(word.text for word in recognition.words if not _is_doubtful(word))
+        certain, *others = (
+            guess_act(readable(text)).slots for text in (sure, *(each.text for each in recognition.hypotheses))
+        )
+        if all(values <= certain for values in others):
             return recognition.text
     marked = (INAUDIBLE if _is_doubtful(word) else word.text for word in recognition.words)
     return " ".join(word for text, run in groupby(marked) for word in ([text] if text == INAUDIBLE else run))
