@@ -82,7 +82,8 @@ def _annotated(utterance: UtteranceRecord) -> frozenset[SlotValue]:
 
 
 def _asks(utterance: UtteranceRecord, after: Sequence[UtteranceRecord]) -> bool:
-    answer = next((each for each in after if each.speaker is not utterance.speaker), None)
+    later = (each for each in after if each.start >= utterance.end)  # what has begun meanwhile is no answer
+    answer = next((each for each in later if each.speaker is not utterance.speaker), None)
     return answer is not None and any(move.act.move in ASKS for move in answer.moves)
 
 
