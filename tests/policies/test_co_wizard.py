@@ -130,7 +130,7 @@ def test_red_light_is_explained_without_u_turn_or_question():
     talk.say(DialogueMove.INSTRUCT, talk.landmarks(hidden=False)[0].name)
     assert talk.state.route.progress is not None
     way, mentions = talk.state.route.progress.route, 0
-    for seed in range(6):
+    for seed in range(16):
         observation, state = dict(talk.observations["co_wizard"]), talk.state
         state = replace(state, seed=seed, dialogue=replace(state.dialogue, hazard_explained_at=-100.0))
         observation |= {
