@@ -9,19 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.co_wizard.features import (
+    COMMAND_SIZE,
     MAX_COMMANDS,
     MAX_PLACES,
+    PLACE_SIZE,
+    STATE_SIZE,
     command_vectors,
     place_vectors,
     state_vector,
 )
-from dorothie_gym.baselines.co_wizard.hearing import KEPT, Utterance, utterance_vector, word_rows
+from dorothie_gym.baselines.co_wizard.hearing import KEPT, UTTERANCE_SIZE, Utterance, utterance_vector, word_rows
 from dorothie_gym.baselines.co_wizard.memory import Memory, Update
 from dorothie_gym.baselines.co_wizard.remarks import topic_of
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ActionValue, DialogueMove, Role, Slot
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import drive_options
+from dorothie_gym.policies.language_model.navigator import RouteStep
 from dorothie_gym.policies.observation_parser import heard_utterance
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark
@@ -101,28 +105,40 @@ class Inputs:
 
 def listening_inputs(scene: Scene, *, queued: bool) -> Inputs:
     """Returns the inputs of the first step, which updates the memory."""
-    vectors = place_vectors(scene.memory, scene.view, scene.utterances)
-    rows = tuple(mark.row for mark in scene.view.landmarks if mark.row < MAX_PLACES)
-    return _inputs(scene, scene.memory, vectors, rows, MAX_PLACES, queued)
+    vectors = place_vectors(scene.memory, scene.view, scene.utterances) if scene.heard else []
+    rows = tuple(mark.row for mark in scene.view.landmarks if mark.row < MAX_PLACES) if scene.heard else ()
+    return _inputs(scene, scene.memory, vectors, rows, MAX_PLACES, queued, _step(scene, scene.memory))
 
 
 def acting_inputs(scene: Scene, memory: Memory, *, queued: bool) -> tuple[Inputs, list[Physical | None]]:
     """Returns the inputs of the second step, which drives and talks, and the possible commands."""
-    step = memory.navigator.step(memory.town, scene.view, memory.clock.interval, 0.0)
+    step = _step(scene, memory)
     commands = list(drive_options(scene.view, memory.town).values())[:MAX_COMMANDS]
     vectors = command_vectors(commands, memory, scene.view, step)
-    return _inputs(scene, memory, vectors, tuple(range(len(commands))), MAX_COMMANDS, queued), commands
+    return _inputs(scene, memory, vectors, tuple(range(len(commands))), MAX_COMMANDS, queued, step), commands
+
+
+def blank_inputs() -> Inputs:
+    """Returns inputs of the second step without content, with the command "none" as the only one."""
+    return Inputs(
+        state=np.zeros(STATE_SIZE + KEPT * UTTERANCE_SIZE, dtype=np.float32), words=word_rows(""),
+        options=np.zeros((MAX_COMMANDS, COMMAND_SIZE), dtype=np.float32), rows=(0,),
+    )  # fmt: skip
+
+
+def _step(scene: Scene, memory: Memory) -> RouteStep | None:
+    return memory.navigator.step(memory.town, scene.view, memory.clock.interval, 0.0)
 
 
 def _inputs(
-    scene: Scene, memory: Memory, vectors: list[list[float]], rows: tuple[int, ...], most: int, queued: bool
-) -> Inputs:
+    scene: Scene, memory: Memory, vectors: list[list[float]], rows: tuple[int, ...], most: int, queued: bool,
+    step: RouteStep | None,
+) -> Inputs:  # fmt: skip
     view = scene.view
-    step = memory.navigator.step(memory.town, view, memory.clock.interval, 0.0)
     state = state_vector(memory, view, step, scene.utterances, queued=queued)
     for k in range(KEPT):
         state += utterance_vector(scene.utterances[k] if k < len(scene.utterances) else None, view.time)
-    options = np.zeros((most, len(vectors[0]) if vectors else 0), dtype=np.float32)
+    options = np.zeros((most, PLACE_SIZE if most == MAX_PLACES else COMMAND_SIZE), dtype=np.float32)
     if vectors:
         options[: len(vectors)] = vectors
     latest = scene.latest

@@ -11,12 +11,13 @@ from dorothie_gym.baselines.co_wizard.decision import (
     Attention,
     Scene,
     acting_inputs,
+    blank_inputs,
     finished,
     listening_inputs,
     perceive,
     remember,
 )
-from dorothie_gym.baselines.co_wizard.examples import Example, make_example
+from dorothie_gym.baselines.co_wizard.examples import Example, correcting_example, make_example
 from dorothie_gym.baselines.co_wizard.memory import Memory, initial_values
 from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
 from dorothie_gym.baselines.co_wizard.remarks import sources
@@ -78,7 +79,7 @@ class Pupil:
         listening = listening_inputs(scene, queued=lesson.queued)
         memory = remember(scene, lesson.update)
         acting, commands = acting_inputs(scene, memory, queued=lesson.queued)
-        available = sources(memory, scene.view, scene.utterances)
+        available = sources(memory, scene.view, scene.utterances) if lesson.remarks else {}
         example = make_example(scene, listening, acting, commands, lesson, available, self._rng)
         if example is not None:
             on_example(example)
@@ -128,6 +129,7 @@ def practise(
     teacher = Teacher(town, limits, own, CALM)
     pupil, rng = Pupil(town, limits, own, teacher), np.random.default_rng((own, 2))
     attention, left, leads = pupil.attention, 0, False
+    blank = blank_inputs()
     while not engine.over:
         if left <= 0:
             left, leads = int(rng.integers(SHORTEST_TURN, LONGEST_TURN)), bool(rng.random() < share)
@@ -142,6 +144,9 @@ def practise(
         if leads and player is not None:
             seen = perceive(observation, attention, pupil.last)
             after, physical, _ = player.decide(seen, rng, queued=lesson.queued, silent=True)
+            correction = correcting_example(seen, listening_inputs(seen, queued=lesson.queued), blank, memory, lesson)
+            if correction is not None:
+                on_example(correction)
             mental, attention = finished(seen, after, physical, lesson.remarks)
             action = CoWizardAction(speech=lesson.action.speech, physical=physical, mental=mental)
         pupil.did(scene, memory, action.physical, lesson)
@@ -152,5 +157,3 @@ def practise(
 def _observed(engine: SessionEngine) -> ObservationMapping:
     """Returns the observation of the Co-Wizard, with its action mask."""
     return {**engine.observations.of([CO_WIZARD])[str(CO_WIZARD)], "action_mask": engine.mask(CO_WIZARD)}
-
-

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from dorothie_gym.baselines.co_wizard.decision import Inputs, Scene
-from dorothie_gym.baselines.co_wizard.memory import GoalEvent
+from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory
 from dorothie_gym.baselines.co_wizard.remarks import Sources, form_of
 from dorothie_gym.baselines.co_wizard.teacher import Lesson
 from dorothie_gym.spaces import Physical
@@ -89,6 +89,36 @@ def make_example(
         listening=listening, acting=acting, before=before, values=update.values, fresh=update.fresh, goal=goal,
         status=update.status, command=command if lesson.ready else UNKNOWN, remarks=(first, second),
         weight=1.0 / IDLE_SHARE if idle else 1.0,
+    )  # fmt: skip
+
+
+def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Memory, lesson: Lesson) -> Example | None:
+    """Returns an example of how a memory that differs from the teacher's gets back to it; None if it does not differ.
+
+    Args:
+        scene: what the player perceived, with its own memory.
+        listening: inputs of the first step.
+        acting: inputs of the second step, from which nothing is learnt.
+        led: memory that the teacher has led to.
+        lesson: what the teacher did.
+    """
+    own, update = scene.memory, lesson.update
+    same_goal = own.goal is led.goal and own.goal_mark == led.goal_mark
+    if own.values == update.values and same_goal and not update.goal:
+        return None
+    latest = scene.latest
+    goal = UNKNOWN
+    if same_goal:
+        goal = int(GoalEvent.KEEP)
+    elif led.goal is None:
+        goal = int(GoalEvent.CLEAR)
+    elif led.goal_mark in listening.rows:
+        goal = len(GoalEvent) + listening.rows.index(led.goal_mark)
+    elif led.goal_mark < 0 and latest is not None and led.goal in latest.places[:2]:
+        goal = GoalEvent.OFF_MAP_FIRST + latest.places.index(led.goal)
+    return Example(
+        listening=listening, acting=acting, before=own.values, values=update.values, fresh=update.fresh, goal=goal,
+        status=update.status, command=UNKNOWN, remarks=(None, None), weight=1.0,
     )  # fmt: skip
 
 

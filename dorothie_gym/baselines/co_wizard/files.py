@@ -19,7 +19,7 @@ from dorothie_gym.baselines.co_wizard.remarks import check_form
 from dorothie_gym.baselines.tensor_files import save_tensors
 from dorothie_gym.errors import InputFileError, ModelFileError, one_line
 from dorothie_gym.files import replacing
-from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, parse_json, raising, read_json
+from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, raising, read_json
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 
 KIND: Final = "co-wizard"
@@ -127,7 +127,9 @@ def load_network(folder: Path) -> tuple[CoWizardNetwork, ModelPage]:
     if page.format != MODEL_FORMAT or page.kind != KIND:
         raise ModelFileError(f"{card}: is no {KIND} of format {MODEL_FORMAT}; it is of another version of dorothie_gym")
     if page.layout != Layout.of(len(page.vocabulary)):
-        raise ModelFileError(f"{card}: field 'layout' is that of another version of dorothie_gym; train the model again")
+        raise ModelFileError(
+            f"{card}: field 'layout' is that of another version of dorothie_gym; train the model again"
+        )
     for number, form in enumerate(page.vocabulary[1:], start=1):
         try:
             check_form(form)

@@ -6,6 +6,7 @@ import re
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -53,14 +54,14 @@ class Utterance:
     time: float
     heard: HeardUtterance
 
-    @property
+    @cached_property
     def places(self) -> tuple[LandmarkName, ...]:
         """Places named, those of the acts first."""
         acts = [name for act in self.heard.acts for name in act.values(Slot.LANDMARK)]
         named = dict.fromkeys([*self.heard.words.landmarks, *acts])
         return tuple(name for name in named if isinstance(name, LandmarkName) and name not in _UNNAMED)
 
-    @property
+    @cached_property
     def streets(self) -> tuple[StreetName, ...]:
         """Streets named."""
         acts = [name for act in self.heard.acts for name in act.values(Slot.STREET)]
@@ -68,7 +69,12 @@ class Utterance:
         unnamed = (StreetName.UNKNOWN, StreetName.QUERIED)
         return tuple(name for name in named if isinstance(name, StreetName) and name not in unnamed)
 
-    @property
+    @cached_property
+    def said(self) -> tuple[float, ...]:
+        """Moves, slot values other than names, and what the words say, as numbers."""
+        return tuple(_numbers(self))
+
+    @cached_property
     def asked(self) -> Proposition | None:
         """What a question asks, by its words or else by its slots; None if that cannot be told."""
         if self.heard.words.asked is not None:
@@ -105,13 +111,16 @@ def word_rows(text: str) -> NDArray[np.int64]:
 
 
 def utterance_vector(utterance: Utterance | None, now: float) -> list[float]:
-    """Returns an utterance as numbers: age, moves, slot values other than names, and what its words say."""
-    return [0.0] * UTTERANCE_SIZE if utterance is None else _numbers(utterance, now)
-
-
-def _numbers(utterance: Utterance, now: float) -> list[float]:
-    acts, words = utterance.heard.acts, utterance.heard.words
+    """Returns an utterance as numbers: its age, and what it says."""
+    if utterance is None:
+        return [0.0] * UTTERANCE_SIZE
     age = now - utterance.time
+    ages = (1.0, float(age <= 0.0), float(age < 1.0), float(age < 3.0), float(age < 8.0), min(age, 30.0) / 30.0)
+    return [*ages, *utterance.said]
+
+
+def _numbers(utterance: Utterance) -> list[float]:
+    acts, words = utterance.heard.acts, utterance.heard.words
     first, rest = [0.0] * len(_MOVES), [0.0] * len(_MOVES)
     labels = [0.0] * len(LABELS)
     for k, act in enumerate(acts):
@@ -126,7 +135,6 @@ def _numbers(utterance: Utterance, now: float) -> list[float]:
     if told is not None:
         predicates[len(_PREDICATES) + _PREDICATES.index(told.predicate)] = -1.0 if told.negated else 1.0
     return [
-        1.0, float(age <= 0.0), float(age < 1.0), float(age < 3.0), float(age < 8.0), min(age, 30.0) / 30.0,
         *first, *rest, *(labels[k] for k in _LABELS_HEARD), *turns, *predicates,
         min(len(acts), 4) / 4.0, *(float((words.ordinal or 0) == k) for k in range(1, 5)),
         float(words.distance is not None), min(words.distance or 0, 200) / 100.0,
@@ -144,5 +152,5 @@ def _sign(value: bool | None) -> float:
     return 0.0 if value is None else 1.0 if value else -1.0
 
 
-UTTERANCE_SIZE: Final = len(_numbers(Utterance(time=0.0, heard=HeardUtterance(acts=(), words=understand(""))), 0.0))
+UTTERANCE_SIZE: Final = 6 + len(Utterance(time=0.0, heard=HeardUtterance(acts=(), words=understand(""))).said)
 """Length of `utterance_vector`."""

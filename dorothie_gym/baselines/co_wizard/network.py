@@ -68,7 +68,9 @@ class CoWizardNetwork(nn.Module):
         self.command = _scorer(WIDTH + layout.command)
         self.first = nn.Linear(WIDTH, layout.remarks)
         self.remarks = nn.Embedding(layout.remarks, REMARK_WIDTH)
-        self.second = nn.Sequential(nn.Linear(WIDTH + REMARK_WIDTH, WIDTH // 2), nn.ReLU(), nn.Linear(WIDTH // 2, layout.remarks))
+        self.second = nn.Sequential(
+            nn.Linear(WIDTH + REMARK_WIDTH, WIDTH // 2), nn.ReLU(), nn.Linear(WIDTH // 2, layout.remarks)
+        )
 
     def listen(self, state: Tensor, words: Tensor, places: Tensor, count: Tensor, before: Tensor) -> Heard:
         """Returns the logits of the next memory.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from dorothie_gym.baselines.co_wizard.decision import (
     Attention,
@@ -136,13 +137,19 @@ class LearnedCoWizard(Policy[LearnedState]):
         physical = commands[int(scores[0].argmax())]
         if silent:
             return physical, ()
+        shares = torch.softmax(first[0].double() / TEMPERATURE, dim=0).numpy()
+        if rng.random() < shares[0]:
+            return physical, ()
         available = sources(memory, scene.view, scene.utterances)
-        allowed = torch.tensor([needs <= available.keys() for needs in self._needs])
-        chosen = _drawn(first[0], allowed, rng)
+        allowed = np.array([bool(needs <= available.keys()) for needs in self._needs])
+        allowed[0] = False
+        chosen = _drawn(shares * allowed, rng)
         if not chosen:
             return physical, ()
+        allowed[0] = True
         remarks = [filled(self._vocabulary[chosen], available)]
-        more = _drawn(self._network.then(hidden, torch.tensor([chosen]))[0], allowed, rng)
+        then = self._network.then(hidden, torch.tensor([chosen]))[0]
+        more = _drawn(torch.softmax(then.double() / TEMPERATURE, dim=0).numpy() * allowed, rng)
         if more:
             remarks.append(filled(self._vocabulary[more], available, joined=True))
         return physical, tuple(remark for remark in remarks if remark is not None)
@@ -157,10 +164,12 @@ def _tensors(inputs: Inputs) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, 
     )  # fmt: skip
 
 
-def _drawn(logits: torch.Tensor, allowed: torch.Tensor, rng: np.random.Generator) -> int:
-    """Returns a number drawn by logits, among those allowed."""
-    shares = torch.softmax(logits.masked_fill(~allowed, -1e9).double() / TEMPERATURE, dim=0).numpy()
-    return int(min(np.searchsorted(np.cumsum(shares), rng.random()), len(shares) - 1))
+def _drawn(shares: NDArray[np.float64], rng: np.random.Generator) -> int:
+    """Returns a number drawn in proportion to shares; 0 if all are 0."""
+    total = float(shares.sum())
+    if total <= 0.0:
+        return 0
+    return int(min(np.searchsorted(np.cumsum(shares), rng.random() * total), len(shares) - 1))
 
 
 def _scene(view: CoWizardView, memory: Memory) -> WordingContext:

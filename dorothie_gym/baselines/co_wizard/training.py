@@ -72,12 +72,12 @@ class CoWizardTraining:
     corpus: Path
     seed: int = 0
     rounds: int = 3
-    sessions: int = 60
+    sessions: int = 45
     share: float = 0.6
-    max_seconds: float = 400.0
-    first_epochs: int = 10
-    epochs: int = 6
-    last_epochs: int = 10
+    max_seconds: float = 300.0
+    first_epochs: int = 8
+    epochs: int = 4
+    last_epochs: int = 8
     least: int = 3
 
     def __post_init__(self) -> None:
