@@ -125,17 +125,32 @@ def train(
         if given is not None:
             fail(f"{option} is for {' and '.join(VISION_MODELS)} only")
     if model == CO_WIZARD:
-        for option, refused in (
-            ("--detector", detector is not None),
-            ("--hubert", hubert is not None),
-            ("--strict", strict),
-        ):
-            if refused:
-                fail(f"{option} is not for {CO_WIZARD}")
+        if detector is not None or hubert is not None or strict:
+            fail(f"--detector, --hubert and --strict are not for {CO_WIZARD}")
         with _reporting_errors():
             train_co_wizard(*_places(corpus, out), seeds=seeds or 1, workers=workers, as_json=as_json)
         return
-    seeds = seeds or 5
+    _train_benchmark_model(
+        model, corpus, out, size=size, seeds=seeds or 5, encoder=encoder, workers=workers, strict=strict,
+        detector=detector, hubert=hubert, as_json=as_json,
+    )  # fmt: skip
+
+
+def _train_benchmark_model(
+    model: str,
+    corpus: Path | None,
+    out: Path | None,
+    *,
+    size: str,
+    seeds: int,
+    encoder: str,
+    workers: int | None,
+    strict: bool,
+    detector: Path | None,
+    hubert: Path | None,
+    as_json: bool,
+) -> None:
+    """Trains a row of the results table with several seeds, and prints its scores."""
     with _reporting_errors():
         from dorothie_gym.baselines.experiment import gather_table, table_experiments
         from dorothie_gym.baselines.model_zoo import find_row

@@ -28,10 +28,10 @@ def train_co_wizard(corpus: Path, out: Path, *, seeds: int, workers: int | None,
             for seed in range(seeds):
                 folder = out / CO_WIZARD / f"seed-{seed}"
                 settings = training.CoWizardTraining(corpus=corpus, seed=seed)
-                stages = training.train_co_wizard(
+                fits = training.train_co_wizard(
                     settings, folder, workers=workers or available_processors(), on_stage=on_stage
                 )
-                found.append((folder, stages))
+                found.append((folder, fits))
     except KeyboardInterrupt:
         exit_interrupted(f"Interrupted with {len(found)} of {seeds} trainings finished; resume with the same command.")
     if as_json:

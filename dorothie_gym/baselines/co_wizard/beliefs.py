@@ -16,7 +16,7 @@ from dorothie_gym.policies.sight import FAR_SIGHT, camera_fault, sight
 from dorothie_gym.spaces import Motion
 
 LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.25
-"""Variances of the position at which the car does not know where it is, and which show that it is not measured [m^2]."""
+"""Variances of the position: the car does not know where it is; the position is not measured [m^2]."""
 
 CLOSE_DISTANCE: Final = 120.0
 """Way to the goal that is called short [m]."""

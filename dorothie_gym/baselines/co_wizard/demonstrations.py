@@ -27,7 +27,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.ontology import DialogueMove, Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedParticipant
 from dorothie_gym.policies.persona import parse_traits
-from dorothie_gym.policies.policy import policy_inputs, policy_seed, replace
+from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed, replace
 from dorothie_gym.recording import Session
 from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.rollout.replay import begin_replay, recorded_actions
@@ -123,7 +123,10 @@ def practise(
     """
     engine.reset(seed=seed)
     town, limits = engine.town, engine.limits
-    others = {Role.PARTICIPANT: ScriptedParticipant(limits, traits=TRAINED), Role.AD_WIZARD: ScriptedAdWizard(limits)}
+    others: dict[Role, AnyPolicy] = {
+        Role.PARTICIPANT: ScriptedParticipant(limits, traits=TRAINED),
+        Role.AD_WIZARD: ScriptedAdWizard(limits),
+    }
     states = {role: policy.initial_state(policy_seed(seed, role), town) for role, policy in others.items()}
     own = policy_seed(seed, CO_WIZARD)
     teacher = Teacher(town, limits, own, CALM)

@@ -15,10 +15,9 @@ from dorothie_gym.baselines.co_wizard.memory import (
     STATUSES,
     VARIABLES,
     Memory,
-    ahead_of,
-    junction_meant,
     seconds_since,
 )
+from dorothie_gym.baselines.co_wizard.way import ahead_of, junction_meant
 from dorothie_gym.dialogue import Direction, Predicate
 from dorothie_gym.maps.model import Exit
 from dorothie_gym.ontology import DialogueMove, GoalStatus, ObjectClass, PhysicalAction
@@ -30,11 +29,14 @@ from dorothie_gym.policies.sight import Limit, camera_fault, limit_of, sight, su
 from dorothie_gym.spaces import Motion, Physical
 
 HAZARDS: Final = (
-    ObjectClass.TRAFFIC_LIGHT, ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC, ObjectClass.TRAFFIC_SIGN
+    ObjectClass.TRAFFIC_LIGHT, ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC,
+    ObjectClass.TRAFFIC_SIGN,
 )  # fmt: skip
 PHYSICAL: Final = tuple(PhysicalAction)
 TOPICS: Final = (*(str(predicate) for predicate in Predicate), *(move.label for move in DialogueMove))
 """What remarks are about: their predicate or, without content, their move."""
+
+_SILENCES: Final = (4.0, 7.0, 8.0, 10.0)  # silences after which the scripted Co-Wizard asks [s]
 
 MAX_PLACES: Final = 24
 """Number of places on the map among which the goal is chosen."""
@@ -82,8 +84,9 @@ def _car(memory: Memory, view: CoWizardView) -> list[float]:
     fault, limit = camera_fault(view.raw), limit_of(view.raw)
     hazard = HAZARDS.index(view.hazard) if view.hazard in HAZARDS else -1 if view.hazard is ObjectClass.UNLABELED else 5
     return [
-        min(view.time, 60.0) / 60.0, float(view.time < 5.0), view.speed / 15.0, float(view.standing), view.cruise / 60.0,
-        float(view.lights), *_one_hot(int(view.motion), len(Motion)), *_one_hot(hazard, len(HAZARDS) + 1),
+        min(view.time, 60.0) / 60.0, float(view.time < 5.0), view.speed / 15.0, float(view.standing),
+        view.cruise / 60.0, float(view.lights), *_one_hot(int(view.motion), len(Motion)),
+        *_one_hot(hazard, len(HAZARDS) + 1),
         min(float(view.raw["hazard_distance"][0]), 60.0) / 60.0,
         *_one_hot(-1 if view.manoeuvre is None else PHYSICAL.index(view.manoeuvre), len(PHYSICAL)),
         math.sin(math.radians(view.angle)), math.cos(math.radians(view.angle)), float(view.manoeuvring),
@@ -133,7 +136,8 @@ def _route(memory: Memory, view: CoWizardView, step: RouteStep | None) -> list[f
     crossing = None if progress is None else progress.next_crossing(memory.town, view.station)
     here = crossing is not None and view.choice is not None and crossing.lane == view.choice.lane
     return [
-        float(memory.navigator.arrives), *_distance(left), float(step is not None), float(step is not None and step.due),
+        float(memory.navigator.arrives), *_distance(left), float(step is not None),
+        float(step is not None and step.due),
         *_one_hot(-1 if step is None else PHYSICAL.index(step.action), len(PHYSICAL)),
         *_distance(AWAY if step is None else step.distance), 0.0 if step is None else step.angle / 90.0,
         float(near is not None), *_distance(AWAY if near is None else near - stopping_distance(view.speed)),
@@ -180,7 +184,7 @@ def _talk(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance], q
     return [
         *ages, *_time(seconds_since(view.time, memory.heard_at)), *_time(seconds_since(view.time, memory.spoke_at)),
         *_time(seconds_since(view.time, memory.asked_at)), float(memory.asked_at > memory.heard_at), float(queued),
-        *(float(seconds_since(view.time, max(memory.asked_at, memory.heard_at)) > wait) for wait in (4.0, 7.0, 8.0, 10.0)),
+        *(float(seconds_since(view.time, max(memory.asked_at, memory.heard_at)) > wait) for wait in _SILENCES),
         *(float(seconds_since(view.time, memory.spoke_at) > wait) for wait in (4.0, 8.0, 10.0, 20.0)),
         float(view.speaking > 0.0), float(view.other_speaking), float(memory.heard_at > -AWAY),
         float(found is True), float(found is False), float(asked is not None and found is None),

@@ -1,4 +1,4 @@
-"""Files of the learned Co-Wizard: lessons of a session, and the model; tensors in safetensors, everything else in JSON."""
+"""Files of the learned Co-Wizard, lessons and models: tensors in safetensors, everything else in JSON."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def read_lessons(paths: Sequence[Path], vocabulary: Sequence[str]) -> Batch:
 
 def forms_of(path: Path) -> list[str]:
     """Returns the forms of the remarks in a file of lessons."""
-    with safe_open(path, framework="pt") as file:  # type: ignore[no-untyped-call]  # without types
+    with safe_open(path, framework="pt") as file:
         found: list[str] = json.loads(file.metadata()[_FORMS])
     return found
 
@@ -133,7 +133,7 @@ def load_network(folder: Path) -> tuple[CoWizardNetwork, ModelPage]:
     for number, form in enumerate(page.vocabulary[1:], start=1):
         try:
             check_form(form)
-        except (ValueError, LookupError, TypeError) as error:
+        except (ValueError, LookupError, TypeError, InputFileError) as error:
             raise ModelFileError(f"{card}: vocabulary[{number}] is no remark ({one_line(error)})") from None
     network = CoWizardNetwork(page.layout)
     try:

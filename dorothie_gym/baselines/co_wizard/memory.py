@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
+from dorothie_gym.baselines.co_wizard.way import ahead_of, junction_meant, place_ahead
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
@@ -23,8 +24,6 @@ from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
 from dorothie_gym.policies.language_model.navigator import Navigator
 from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.policy import DecisionClock, replace
-from dorothie_gym.policies.route_progress import Choice, default_lane_distance, lanes_ahead
-from dorothie_gym.policies.turn_lanes import next_turn_lane
 from dorothie_gym.spaces import LanePosition, Mental
 
 ORDERS: Final = (None, Direction.LEFT, Direction.RIGHT, Direction.STRAIGHT, Direction.BACK, "street")
@@ -298,29 +297,6 @@ def initial_values(speed: int) -> tuple[int, ...]:
 def speed_index(speed: float) -> int:
     """Returns the index of the nearest speed in `SPEEDS`."""
     return min(max(round((speed - SPEEDS[0]) / 5.0), 0), len(SPEEDS) - 1)
-
-
-def junction_meant(town: Town, view: CoWizardView) -> Choice | None:
-    """Returns the next junction with a choice or with turn lanes."""
-    turn_lane = next_turn_lane(town, view.lane, view.station)
-    nearer = turn_lane is not None and (view.choice is None or turn_lane.distance < view.choice.distance)
-    return turn_lane if nearer else view.choice
-
-
-def ahead_of(town: Town, view: CoWizardView, place: Place) -> float | None:
-    """Returns the distance to a place along the default lanes [m]; None if it is not near on them."""
-    return default_lane_distance(town, view.here, place, 80.0)
-
-
-def place_ahead(town: Town, view: CoWizardView, distance: float) -> Place:
-    """Returns the place some way ahead on the default lanes [m]; the end of the last lane before a junction."""
-    left = view.station + distance
-    lanes = lanes_ahead(town, view.lane, view.station, distance)
-    for lane in lanes[:-1]:
-        if left <= town.lanes[lane].length:
-            return lane, left
-        left -= town.lanes[lane].length
-    return lanes[-1], min(left, town.lanes[lanes[-1]].length)
 
 
 def seconds_since(now: float, then: float) -> float:

@@ -84,7 +84,7 @@ class CoWizardNetwork(nn.Module):
         """
         hidden = self.listening(torch.cat([state, self.words(words)], dim=1))
         hot = torch.cat([nn.functional.one_hot(before[:, k], size) for k, size in enumerate(SIZES)], dim=1)
-        values = torch.split(self.values(hidden) + self.kept * hot, SIZES, dim=1)
+        values = torch.split(self.values(hidden) + self.kept * hot, list(SIZES), dim=1)
         goal = torch.cat([self.goal(hidden), _scores(self.place, hidden, places, count)], dim=1)
         return Heard(values=values, fresh=self.fresh(hidden), goal=goal, status=self.status(hidden))
 

@@ -169,7 +169,7 @@ def _drawn(shares: NDArray[np.float64], rng: np.random.Generator) -> int:
     total = float(shares.sum())
     if total <= 0.0:
         return 0
-    return int(min(np.searchsorted(np.cumsum(shares), rng.random() * total), len(shares) - 1))
+    return min(int(np.searchsorted(np.cumsum(shares), rng.random() * total)), len(shares) - 1)
 
 
 def _scene(view: CoWizardView, memory: Memory) -> WordingContext:

@@ -16,6 +16,7 @@ from typing import Any, Final
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import Memory
 from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording
+from dorothie_gym.input_files import parse_json
 from dorothie_gym.ontology import (
     ActionValue,
     DialogueAct,
@@ -37,7 +38,9 @@ from dorothie_gym.policies.travel_time import travel_time
 
 _ENUMS: Final = {
     kind.__name__: kind
-    for kind in (ActionValue, StreetName, LandmarkName, GoalStatus, ObjectClass, Direction, PropKind, Sensor, WeatherParameter)
+    for kind in (
+        ActionValue, StreetName, LandmarkName, GoalStatus, ObjectClass, Direction, PropKind, Sensor, WeatherParameter
+    )
 }  # fmt: skip
 _OPEN: Final = ("QUERIED", "UNKNOWN")
 _WORDING: Final = ("topic", "direction", "faster", "lights", "speed", "distance", "dropped", "ordinal")
@@ -93,7 +96,8 @@ def form_of(remark: Remark, available: Sources) -> str | None:
         content = remark.wording.content
         slots = sorted(_coded(value, available) for value in remark.act.slots)
         page = {
-            "move": remark.act.move.label, "slots": slots, "meaning": [_form(said, available) for said in remark.meaning],
+            "move": remark.act.move.label, "slots": slots,
+            "meaning": [_form(said, available) for said in remark.meaning],
             "content": None if content is None else _form(content, available), "wording": wording,
         }  # fmt: skip
     except LookupError:
@@ -170,10 +174,17 @@ def _decoded(code: Sequence[Any], available: Sources) -> Any:
 
 def check_form(form: str) -> None:
     """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
-    anything = dict.fromkeys(sources_of(form), 1)
-    page = json.loads(form)
-    if filled(form, anything) is None and not isinstance(page, dict):
+    if not isinstance(parse_json(form, "form"), dict):
         raise ValueError(form[:80])
+    filled(form, {name: _example(name) for name in sources_of(form)})
+
+
+def _example(source: str) -> object:
+    """Returns what a source can be."""
+    if source in ("goal", "former", "near", "place0", "place1"):
+        return LandmarkName.KFC
+    numbers = ("seconds", "said_speed", "suitable", "slow", "sight", "since")
+    return 30 if source in numbers else StreetName.BEAL
 
 
 def sources_of(form: str) -> frozenset[str]:

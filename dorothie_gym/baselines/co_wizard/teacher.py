@@ -64,7 +64,9 @@ class Teacher:
             style: style; None for the persona of the seed.
         """
         self._state = ScriptedCoWizard(limits, style).initial_state(seed, town)
-        self._before_drive, self._physical = self._state, None
+        self._former = self._state
+        self._physical: Physical | None = None
+        self._intentions, self._commands = self._state.intentions, self._state.commands
 
     @property
     def usual_speed(self) -> int:

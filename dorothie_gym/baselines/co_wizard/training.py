@@ -1,8 +1,8 @@
 """Training of the learned Co-Wizard: imitation of a corpus, then rounds of practice beside the teacher (DAgger).
 
 A round plays sessions in which the player of the round before and the teacher drive in turns, adds the teacher's
-decisions to the examples, and fits the network again (Ross, Gordon and Bagnell, AISTATS 2011). Each session is a file of
-lessons, and each fit a model, so that an interrupted training goes on where it was; all follow from the seed.
+decisions to the examples, and fits the network again (Ross, Gordon and Bagnell, AISTATS 2011). Each session is a file
+of lessons, and each fit a model, so that an interrupted training goes on where it was; all follow from the seed.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class CoWizardTraining:
     corpus: Path
     seed: int = 0
     rounds: int = 3
-    sessions: int = 45
+    sessions: int = 25
     share: float = 0.6
     max_seconds: float = 300.0
     first_epochs: int = 8
