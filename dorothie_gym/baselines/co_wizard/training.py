@@ -161,7 +161,8 @@ def _fit(
     loss = fit(network, examples, epochs=epochs, seed=seed, on_epoch=lambda epoch, _: on_stage(title, epoch, epochs))
     page = ModelPage(
         format=MODEL_FORMAT, kind=KIND, layout=network.layout, vocabulary=vocabulary, steps=len(examples) * epochs,
-        seconds=round(time.process_time() - begun, 1), settings=settings.as_json(),
+        seconds=round(time.process_time() - begun, 1),
+        settings={**settings.as_json(), "corpus": settings.corpus.name},
     )  # fmt: skip
     save_network(network, page, folder)
     return Stage(name=folder.name, examples=len(examples), loss=loss)

@@ -55,14 +55,14 @@ def test_examples_have_the_lengths_that_the_network_takes(trained):
 
 
 def test_interrupted_training_ends_with_the_same_weights(corpus, trained, tmp_path):
-    class Stop(Exception):
+    class InterruptedTrainingError(Exception):
         pass
 
     def stop(stage, done, total):
         if stage.startswith("Practice") and done == 1:
-            raise Stop
+            raise InterruptedTrainingError
 
-    with pytest.raises(Stop):
+    with pytest.raises(InterruptedTrainingError):
         train_co_wizard(settings(corpus), tmp_path / "two", workers=1, on_stage=stop)
     assert not (tmp_path / "two" / "model.json").exists()
     stages = train_co_wizard(settings(corpus), tmp_path / "two", workers=1, on_stage=lambda *_: None)
