@@ -10,7 +10,7 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -21,6 +21,7 @@ from safetensors import safe_open
 
 from dorothie_gym import __version__
 from dorothie_gym.baselines.checkpoints import KIND, ModelCard
+from dorothie_gym.baselines.co_wizard import files as co_wizard
 from dorothie_gym.baselines.experiment import RESULT_FILE
 from dorothie_gym.baselines.rl.checkpoint import TENSORS, load_model, save_model
 from dorothie_gym.baselines.rl.run import BEST, PROGRESS
@@ -37,6 +38,9 @@ SEED: Final = 0
 """Seed of every training."""
 
 GENERATE: Final = "generate --sessions 183 --seed 77 --out corpus"
+
+GENERATE_TALKS: Final = "generate --sessions 160 --seed 2300 --out talks"
+"""Corpus of the learned Co-Wizard."""
 
 _DRIVER: Final = (
     "train-rl {algorithm} --out {algorithm} --warm-start corpus --steps 100000 --workers 0 --evaluate-every 25000 "
@@ -58,14 +62,21 @@ CHECKED: Final = EnvConfig(max_seconds=60.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """Training of a shipped model: the command, and the folders of the results within the work folder."""
+    """Training of a shipped model: the commands, and the folders of the results within the work folder."""
 
     description: str
     command: str
     folders: tuple[str, ...]
+    generate: str = GENERATE
 
 
 RECIPES: Final[Mapping[str, Recipe]] = {
+    "co-wizard": Recipe(
+        description="The learned Co-Wizard understands, remembers, talks and drives",
+        command="train co-wizard --corpus talks --workers 1 --out models",
+        folders=(f"models/co-wizard/seed-{SEED}",),
+        generate=GENERATE_TALKS,
+    ),
     "maskable-ppo": Recipe(
         description="MaskablePPO drives; understanding and speech are scripted",
         command=_DRIVER.format(algorithm="maskable_ppo"),
@@ -102,9 +113,9 @@ def main(
         raise SystemExit(f"there is no model {unknown[0]!r}; choose from {', '.join(RECIPES)}")
     work.mkdir(parents=True, exist_ok=True)
     work = work.resolve()  # rollouts keep the paths of their models
-    _call(GENERATE, work)
     for name in chosen:
         recipe = RECIPES[name]
+        _call(recipe.generate, work)
         _call(recipe.command, work)
         card = _export(name, recipe, work, *_choose(recipe, work))
         mean, low, high = (100 * value for value in asdict(card.figures["success"]).values())
@@ -135,19 +146,19 @@ def _export(name: str, recipe: Recipe, work: Path, trained: Path, result: Rollou
     shutil.rmtree(shipped, ignore_errors=True)
     shipped.mkdir(parents=True)
     page = json.loads((trained / DESCRIPTION).read_text(encoding="utf-8"))
-    benchmark = page["kind"] == KIND
-    scores = _export_benchmark_model(trained, shipped) if benchmark else _export_driver(trained, shipped)
+    export = _EXPORTS.get(page["kind"], _export_driver)
+    scores = export(trained, shipped)
     _check_same_actions(trained, shipped, work / "checks" / name)
     card = PretrainedCard(
         description=recipe.description,
-        commands=tuple(f"dorothie-gym {command}" for command in (GENERATE, recipe.command)),
+        commands=tuple(f"dorothie-gym {command}" for command in (recipe.generate, recipe.command)),
         version=__version__,
         licence="MIT",
         seed=SEED,
         steps=page["steps"],
         seconds=page["seconds"],
         weights=_count_weights(shipped),
-        observation=None if benchmark else dict(FIELDS),
+        observation=dict(FIELDS) if export is _export_driver else None,
         rollout=command_of({**result.settings, str(Role.CO_WIZARD): f"{PREFIX}{name}"}),
         sessions=VALIDATION_SESSIONS,
         figures=_figures(result),
@@ -186,6 +197,20 @@ def _export_benchmark_model(trained: Path, shipped: Path) -> dict[str, float | N
     card.write(shipped)
     scores: dict[str, float | None] = json.loads((trained / RESULT_FILE).read_text(encoding="utf-8"))["validation"]
     return scores
+
+
+def _export_co_wizard(trained: Path, shipped: Path) -> dict[str, float | None]:
+    """Writes a learned Co-Wizard; its training has no validation."""
+    for name in (DESCRIPTION, TENSORS):
+        shutil.copyfile(trained / name, shipped / name)
+    return {}
+
+
+_EXPORTS: Final[Mapping[str, Callable[[Path, Path], dict[str, float | None]]]] = {
+    KIND: _export_benchmark_model,
+    co_wizard.KIND: _export_co_wizard,
+}
+"""Functions that write models into the package, by kind; all others are drivers."""
 
 
 def _check_same_actions(trained: Path, shipped: Path, folder: Path) -> None:

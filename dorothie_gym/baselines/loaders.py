@@ -13,6 +13,7 @@ from dorothie_gym.spaces import SpaceLimits
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.acting.policy import BenchmarkCoWizard
+    from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
     from dorothie_gym.baselines.selfplay.policy import LearnedPolicy
     from dorothie_gym.policies.navigation import NavigationPolicy
 
@@ -53,6 +54,29 @@ def load_navigation_model(path: Path, role: Role, limits: SpaceLimits) -> Naviga
     from dorothie_gym.baselines.rl.evaluation import make_player
 
     return make_player(path, limits)
+
+
+def load_co_wizard(path: Path, role: Role, limits: SpaceLimits) -> LearnedCoWizard:
+    """Returns a learned Co-Wizard (`dorothie-gym train co-wizard`).
+
+    Args:
+        path: folder of the model, or `model.json` in it.
+        role: the role to play.
+        limits: sizes of the spaces.
+
+    Raises:
+        ValueError: the role is not the Co-Wizard, or the files are missing or damaged.
+    """
+    if role is not Role.CO_WIZARD:
+        raise ValueError(f"{path}: plays the co_wizard, not the {role}")
+    import torch
+
+    from dorothie_gym.baselines.co_wizard.files import load_network
+    from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
+
+    torch.set_num_threads(1)  # a small network: more threads only wait for each other
+    network, page = load_network(path)
+    return LearnedCoWizard(network, page.vocabulary, limits)
 
 
 def load_selfplay_model(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:

@@ -23,6 +23,7 @@ from dorothie_gym.cli.output import (
     stdout,
     wide_stdout,
 )
+from dorothie_gym.cli.train_co_wizard import CO_WIZARD, train_co_wizard
 from dorothie_gym.cli.train_vision import VISION_MODELS, train_vision
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ Size = Annotated[str, typer.Option("--config", "--size", help="small (two cores)
 Seeds = Annotated[int, typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...")]
 SomeSeeds = Annotated[
     int | None,
-    typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...; default 5, of segformer and detr 1."),
+    typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...; default 5, of segformer, detr and co-wizard 1."),
 ]
 Device = Annotated[
     str | None, typer.Option(help="segformer and detr: cpu, cuda, ...; default the GPU where there is one.")
@@ -87,7 +88,7 @@ def train(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="toto, toto-belief, bert, ... (see `table`); segformer, detr.",
+            help="toto, toto-belief, bert, ... (see `table`); segformer, detr; co-wizard.",
             autocompletion=complete_model,
         ),
     ],
@@ -108,7 +109,7 @@ def train(
     """Train a model with several seeds, test it, and print its scores.
 
     An interrupted run is resumed by the same command. The vision models, segformer and detr, learn from pictures of the
-    recorded sessions.
+    recorded sessions; co-wizard learns to talk and drive by imitation and practice.
     """
     if model in VISION_MODELS:
         if detector is not None:
@@ -123,7 +124,33 @@ def train(
     for option, given in (("--device", device), ("--inputs", inputs), ("--epochs", epochs)):
         if given is not None:
             fail(f"{option} is for {' and '.join(VISION_MODELS)} only")
-    seeds = seeds or 5
+    if model == CO_WIZARD:
+        if detector is not None or hubert is not None or strict:
+            fail(f"--detector, --hubert and --strict are not for {CO_WIZARD}")
+        with _reporting_errors():
+            train_co_wizard(*_places(corpus, out), seeds=seeds or 1, workers=workers, as_json=as_json)
+        return
+    _train_benchmark_model(
+        model, corpus, out, size=size, seeds=seeds or 5, encoder=encoder, workers=workers, strict=strict,
+        detector=detector, hubert=hubert, as_json=as_json,
+    )  # fmt: skip
+
+
+def _train_benchmark_model(
+    model: str,
+    corpus: Path | None,
+    out: Path | None,
+    *,
+    size: str,
+    seeds: int,
+    encoder: str,
+    workers: int | None,
+    strict: bool,
+    detector: Path | None,
+    hubert: Path | None,
+    as_json: bool,
+) -> None:
+    """Trains a row of the results table with several seeds, and prints its scores."""
     with _reporting_errors():
         from dorothie_gym.baselines.experiment import gather_table, table_experiments
         from dorothie_gym.baselines.model_zoo import find_row

@@ -310,6 +310,22 @@ def _training(folder: Path) -> Training:
     return Training(settings, folder)
 
 
+def _co_wizard_model(folder: Path) -> None:
+    from dorothie_gym.baselines.co_wizard.files import KIND, MODEL_FORMAT, ModelPage, save_network
+    from dorothie_gym.baselines.co_wizard.network import CoWizardNetwork, Layout
+
+    form = (
+        '{"content":null,"meaning":[["goal",0,[["place",["from","goal"]]]]],"move":"Acknowledge",'
+        '"slots":[["from","goal"]],"wording":{"topic":["text","taken"]}}'
+    )
+    vocabulary = ("", form)
+    layout = Layout.of(len(vocabulary))
+    page = ModelPage(
+        format=MODEL_FORMAT, kind=KIND, layout=layout, vocabulary=vocabulary, steps=3, seconds=1.0, settings={"seed": 0}
+    )
+    save_network(CoWizardNetwork(layout), page, folder / "co-wizard")
+
+
 def _benchmark_model(folder: Path) -> None:
     import torch
 
@@ -439,6 +455,7 @@ SUBJECTS: Final = MappingProxyType(
         "cache": Subject(_cache, _read_cache),
         "rl": Subject(_rl_model, _read_model, slow=True),
         "selfplay": Subject(_selfplay_model, _read_model, slow=True),
+        "co-wizard": Subject(_co_wizard_model, _read_model, slow=True),
         "run": Subject(_unfinished_run, _resume_run, slow=True),
         "benchmark": Subject(_benchmark_model, _read_model),
     }

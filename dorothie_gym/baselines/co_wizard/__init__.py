@@ -1,0 +1,6 @@
+"""Learned Co-Wizard: one network that listens, keeps a working memory, drives and talks.
+
+`memory` is what it remembers, `hearing` what it hears, `features` what it sees, `remarks` what it can say, `network`
+the network, `teacher` the scripted Co-Wizard whose decisions it imitates, `demonstrations`, `fitting` and `training`
+the training, and `policy` the player.
+"""

@@ -1,0 +1,201 @@
+"""Examples to learn from: the inputs of decisions, and what the teacher did."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dorothie_gym.baselines.co_wizard.decision import Inputs, Scene
+from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory
+from dorothie_gym.baselines.co_wizard.remarks import Sources, form_of
+from dorothie_gym.baselines.co_wizard.teacher import Lesson
+from dorothie_gym.spaces import Physical
+
+IDLE_SHARE: Final = 0.25
+"""Share of the decisions at which nothing happens that is kept; each then counts as often as it stands for."""
+
+UNKNOWN: Final = -1
+"""Target of what is not learnt from an example."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Example:
+    """A decision with its targets.
+
+    Attributes:
+        listening: inputs of the first step.
+        acting: inputs of the second step.
+        before: values of the memory before (v,).
+        values: values of the memory after (v,).
+        fresh: which variables are set anew.
+        goal: `GoalEvent`, or their number + position of the place among `listening.rows`; `UNKNOWN` if it is missing.
+        status: status given to an errand.
+        command: index of the command; `UNKNOWN` if it could not be commanded.
+        remarks: forms of the first two remarks; "" for none, None if it is not learnt from.
+        weight: number of decisions that it stands for.
+    """
+
+    listening: Inputs
+    acting: Inputs
+    before: tuple[int, ...]
+    values: tuple[int, ...]
+    fresh: tuple[bool, ...]
+    goal: int
+    status: int
+    command: int
+    remarks: tuple[str | None, str | None]
+    weight: float
+
+
+def make_example(
+    scene: Scene, listening: Inputs, acting: Inputs, commands: Sequence[Physical | None], lesson: Lesson,
+    available: Sources, rng: np.random.Generator,
+) -> Example | None:  # fmt: skip
+    """Returns the example of a decision; None if it is one of those left out because nothing happens.
+
+    Args:
+        scene: what was perceived.
+        listening: inputs of the first step.
+        acting: inputs of the second step.
+        commands: possible commands.
+        lesson: what the teacher did.
+        available: names and numbers that could be said.
+        rng: draws which idle decisions are kept.
+    """
+    update = lesson.update
+    before = scene.memory.values
+    idle = not (
+        scene.heard or lesson.physical or lesson.remarks or update.goal or update.status or any(update.fresh)
+        or update.values != before
+    )  # fmt: skip
+    if idle and rng.random() >= IDLE_SHARE:
+        return None
+    goal = update.goal
+    if goal >= len(GoalEvent):
+        row = goal - len(GoalEvent)
+        goal = len(GoalEvent) + listening.rows.index(row) if row in listening.rows else UNKNOWN
+    command = commands.index(lesson.physical) if lesson.physical in commands else UNKNOWN
+    first, second = "", ""
+    if lesson.remarks:
+        first = form_of(lesson.remarks[0], available)  # type: ignore[assignment]
+    if len(lesson.remarks) > 1:
+        second = form_of(lesson.remarks[1], available)  # type: ignore[assignment]
+    return Example(
+        listening=listening, acting=acting, before=before, values=update.values, fresh=update.fresh, goal=goal,
+        status=update.status, command=command if lesson.ready else UNKNOWN, remarks=(first, second),
+        weight=1.0 / IDLE_SHARE if idle else 1.0,
+    )  # fmt: skip
+
+
+def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Memory, lesson: Lesson) -> Example | None:
+    """Returns an example of how a memory that differs from the teacher's gets back to it; None if it does not differ.
+
+    Args:
+        scene: what the player perceived, with its own memory.
+        listening: inputs of the first step.
+        acting: inputs of the second step, from which nothing is learnt.
+        led: memory that the teacher has led to.
+        lesson: what the teacher did.
+    """
+    own, update = scene.memory, lesson.update
+    same_goal = own.goal is led.goal and own.goal_mark == led.goal_mark
+    if own.values == update.values and same_goal and not update.goal:
+        return None
+    latest = scene.latest
+    goal = UNKNOWN
+    if same_goal:
+        goal = int(GoalEvent.KEEP)
+    elif led.goal is None:
+        goal = int(GoalEvent.CLEAR)
+    elif led.goal_mark in listening.rows:
+        goal = len(GoalEvent) + listening.rows.index(led.goal_mark)
+    elif led.goal_mark < 0 and latest is not None and led.goal in latest.places[:2]:
+        goal = GoalEvent.OFF_MAP_FIRST + latest.places.index(led.goal)
+    return Example(
+        listening=listening, acting=acting, before=own.values, values=update.values, fresh=update.fresh, goal=goal,
+        status=update.status, command=UNKNOWN, remarks=(None, None), weight=1.0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Examples as tensors; the first axis of each is that of the examples."""
+
+    listening: torch.Tensor
+    words: torch.Tensor
+    places: torch.Tensor
+    place_count: torch.Tensor
+    before: torch.Tensor
+    values: torch.Tensor
+    fresh: torch.Tensor
+    goal: torch.Tensor
+    status: torch.Tensor
+    acting: torch.Tensor
+    commands: torch.Tensor
+    command_count: torch.Tensor
+    command: torch.Tensor
+    first: torch.Tensor
+    second: torch.Tensor
+    weight: torch.Tensor
+
+    def __len__(self) -> int:
+        """Returns the number of examples."""
+        return len(self.weight)
+
+    def rows(self, index: torch.Tensor) -> Batch:
+        """Returns some examples."""
+        return Batch(*(getattr(self, one.name)[index] for one in fields(self)))
+
+    @classmethod
+    def joined(cls, batches: Sequence[Batch]) -> Batch:
+        """Returns all examples of some batches."""
+        return cls(*(torch.cat([getattr(batch, one.name) for batch in batches]) for one in fields(cls)))
+
+
+def batch_of(found: Sequence[Example], forms: Sequence[str]) -> Batch:
+    """Returns examples as tensors.
+
+    Args:
+        found: the examples, at least one.
+        forms: forms of remarks that are numbered; others are not learnt. The first one, "", stands for silence.
+    """
+    numbers = {form: k for k, form in enumerate(forms)}
+
+    def number(form: str | None) -> int:
+        return UNKNOWN if form is None else numbers.get(form, UNKNOWN)
+
+    return Batch(
+        listening=_reals([one.listening.state for one in found]),
+        words=torch.from_numpy(np.stack([one.listening.words for one in found]).astype(np.int16)),
+        places=_reals([one.listening.options for one in found]),
+        place_count=_whole([len(one.listening.rows) for one in found]),
+        before=_whole([one.before for one in found]), values=_whole([one.values for one in found]),
+        fresh=_reals([np.asarray(one.fresh, dtype=np.float32) for one in found]),
+        goal=_whole([one.goal for one in found]), status=_whole([one.status for one in found]),
+        acting=_reals([one.acting.state for one in found]),
+        commands=_reals([one.acting.options for one in found]),
+        command_count=_whole([len(one.acting.rows) for one in found]),
+        command=_whole([one.command for one in found]),
+        first=_whole([number(one.remarks[0]) for one in found]),
+        second=_whole([number(one.remarks[1]) for one in found]),
+        weight=torch.tensor([one.weight for one in found], dtype=torch.float32),
+    )  # fmt: skip
+
+
+def forms_in(found: Sequence[Example]) -> tuple[str, ...]:
+    """Returns the forms of the remarks of some examples, sorted, behind silence."""
+    return ("", *sorted({form for one in found for form in one.remarks if form}))
+
+
+def _reals(vectors: Sequence[NDArray[np.float32]]) -> torch.Tensor:
+    """Returns vectors as half-precision numbers: inputs are coarse, and there are many."""
+    return torch.from_numpy(np.stack(vectors).astype(np.float16))
+
+
+def _whole(numbers: Sequence[object]) -> torch.Tensor:
+    return torch.tensor(numbers, dtype=torch.int16)

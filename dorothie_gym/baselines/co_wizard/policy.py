@@ -1,0 +1,183 @@
+"""Player of the learned Co-Wizard."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dorothie_gym.baselines.co_wizard.decision import (
+    Attention,
+    Inputs,
+    Scene,
+    acting_inputs,
+    finished,
+    listening_inputs,
+    perceive,
+    remember,
+)
+from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory, Update
+from dorothie_gym.baselines.co_wizard.network import CoWizardNetwork
+from dorothie_gym.baselines.co_wizard.remarks import filled, sources, sources_of
+from dorothie_gym.dialogue import WordingContext, draw_style
+from dorothie_gym.maps import Town
+from dorothie_gym.ontology import LandmarkName, Role, StreetName
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
+from dorothie_gym.policies.policy import Policy, replace
+from dorothie_gym.policies.speech import Remark, SpeechState
+from dorothie_gym.spaces import ActionDict, CoWizardAction, ObservationMapping, Physical, SpaceLimits
+
+TEMPERATURE = 0.7
+"""Temperature at which remarks are drawn."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearnedState:
+    """State of the policy.
+
+    Attributes:
+        seed: seed of the draws.
+        attention: memory and last utterances.
+        voice: own remarks, queued and said.
+        count: number of decisions.
+    """
+
+    seed: int
+    attention: Attention
+    voice: SpeechState
+    count: int = 0
+
+
+class LearnedCoWizard(Policy[LearnedState]):
+    """Co-Wizard that listens, remembers, drives and talks by its own network.
+
+    Memory and commands are the likeliest ones; remarks are drawn. Names, numbers and words of a remark are filled in
+    (see `remarks`); belief updates say how the memory has changed.
+    """
+
+    reads_mask = True
+
+    def __init__(self, network: CoWizardNetwork, vocabulary: Sequence[str], limits: SpaceLimits | None = None) -> None:
+        """Prepares the policy.
+
+        Args:
+            network: trained network.
+            vocabulary: forms of remarks; the first one stands for silence.
+            limits: sizes of the spaces.
+        """
+        super().__init__(Role.CO_WIZARD, limits)
+        self._network, self._vocabulary = network.eval(), tuple(vocabulary)
+        self._needs = [frozenset() if not form else sources_of(form) for form in self._vocabulary]
+
+    def initial_state(self, seed: int, town: Town) -> LearnedState:
+        """Returns the state before the first observation."""
+        style = draw_style(Role.CO_WIZARD, np.random.default_rng((seed, 0)))
+        return LearnedState(
+            seed=seed, attention=Attention.begin(town), voice=SpeechState(role=Role.CO_WIZARD, style=style)
+        )  # fmt: skip
+
+    def step(self, observation: ObservationMapping, state: LearnedState) -> tuple[ActionDict, LearnedState]:
+        """Listens, remembers, drives and talks."""
+        rng = np.random.default_rng((state.seed, state.count))
+        voice = state.voice
+        scene = perceive(observation, state.attention, None if voice.last is None else voice.last.act.move)
+        view, queued = scene.view, not voice.idle
+        if scene.latest is not None:
+            late = scene.memory.clock.interval / 2.0
+            voice = voice.heard_other(view.time, scene.latest.heard.acts, rng, late).cleared()
+        memory, physical, remarks = self.decide(scene, rng, queued=queued, silent=not voice.idle)
+        voice = voice.plan(*remarks)
+        speech, voice = voice.speak(
+            view.time, view.speaking, rng, _scene(view, memory), interval=memory.clock.interval,
+            other_speaking=view.other_speaking,
+        )  # fmt: skip
+        mental, attention = finished(scene, memory, physical, remarks)
+        action = CoWizardAction(speech=speech, physical=physical, mental=mental)
+        return action.encode(self.limits), replace(state, attention=attention, voice=voice, count=state.count + 1)
+
+    def decide(
+        self, scene: Scene, rng: np.random.Generator, *, queued: bool, silent: bool
+    ) -> tuple[Memory, Physical | None, tuple[Remark, ...]]:  # fmt: skip
+        """Returns the new memory, the command, and what is to be said.
+
+        Args:
+            scene: what is perceived.
+            rng: draws the remarks.
+            queued: whether own remarks waited to be said.
+            silent: whether nothing is to be said.
+        """
+        with torch.inference_mode():
+            memory = remember(scene, self._listen(scene, listening_inputs(scene, queued=queued)))
+            inputs, commands = acting_inputs(scene, memory, queued=queued)
+            return memory, *self._act(scene, memory, inputs, commands, rng, silent=silent)
+
+    def _listen(self, scene: Scene, inputs: Inputs) -> Update:
+        """Returns the likeliest update of the memory."""
+        state, words, places, count = _tensors(inputs)
+        before = torch.tensor([scene.memory.values])
+        heard = self._network.listen(state, words, places, count, before)
+        goal = int(heard.goal[0].argmax())
+        if goal >= len(GoalEvent):
+            goal = len(GoalEvent) + inputs.rows[goal - len(GoalEvent)]
+        return Update(
+            values=tuple(int(logits[0].argmax()) for logits in heard.values),
+            fresh=tuple(bool(flag > 0.0) for flag in heard.fresh[0]), goal=goal, status=int(heard.status[0].argmax()),
+        )  # fmt: skip
+
+    def _act(
+        self, scene: Scene, memory: Memory, inputs: Inputs, commands: Sequence[Physical | None],
+        rng: np.random.Generator, *, silent: bool,
+    ) -> tuple[Physical | None, tuple[Remark, ...]]:  # fmt: skip
+        """Returns the likeliest command, and remarks that are drawn."""
+        scores, first, hidden = self._network.act(*_tensors(inputs))
+        physical = commands[int(scores[0].argmax())]
+        if silent:
+            return physical, ()
+        shares = torch.softmax(first[0].double() / TEMPERATURE, dim=0).numpy()
+        if rng.random() < shares[0]:
+            return physical, ()
+        available = sources(memory, scene.view, scene.utterances)
+        allowed = np.array([bool(needs <= available.keys()) for needs in self._needs])
+        allowed[0] = False
+        chosen = _drawn(shares * allowed, rng)
+        if not chosen:
+            return physical, ()
+        allowed[0] = True
+        remarks = [filled(self._vocabulary[chosen], available)]
+        then = self._network.then(hidden, torch.tensor([chosen]))[0]
+        more = _drawn(torch.softmax(then.double() / TEMPERATURE, dim=0).numpy() * allowed, rng)
+        if more:
+            remarks.append(filled(self._vocabulary[more], available, joined=True))
+        return physical, tuple(remark for remark in remarks if remark is not None)
+
+
+def _tensors(inputs: Inputs) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Returns inputs as a batch of one, rounded as in training."""
+    state, options = (array.astype(np.float16).astype(np.float32) for array in (inputs.state, inputs.options))
+    return (
+        torch.from_numpy(state)[None], torch.from_numpy(inputs.words)[None], torch.from_numpy(options)[None],
+        torch.tensor([len(inputs.rows)]),
+    )  # fmt: skip
+
+
+def _drawn(shares: NDArray[np.float64], rng: np.random.Generator) -> int:
+    """Returns a number drawn in proportion to shares; 0 if all are 0."""
+    total = float(shares.sum())
+    if total <= 0.0:
+        return 0
+    return min(int(np.searchsorted(np.cumsum(shares), rng.random() * total)), len(shares) - 1)
+
+
+def _scene(view: CoWizardView, memory: Memory) -> WordingContext:
+    """Returns what the words may refer to."""
+    near = nearest_landmark(view.raw, view.landmarks, *view.position)
+    street = street_of(view.raw, memory.town, view.lane)
+    return WordingContext(
+        street=None if street is StreetName.UNKNOWN else street,
+        landmark=None if near is None or near.name is LandmarkName.UNKNOWN else near.name,
+        exception=bool(memory.value("detour")),
+    )
