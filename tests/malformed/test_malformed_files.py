@@ -38,7 +38,7 @@ GROUPS = (
         "audio",
     ),
     ("yaml",),
-    ("rl", "selfplay", "run", "benchmark"),
+    ("rl", "selfplay", "run", "benchmark", "co-wizard"),
 )
 """Kinds that share a process, by the time that they take."""
 

@@ -48,7 +48,7 @@ def test_file_is_read_by_loader_of_its_kind(tmp_path: Path, as_folder: bool) -> 
     (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
     player = find_player(str(tmp_path if as_folder else tmp_path / "model.json"), Role.CO_WIZARD)
     assert isinstance(player.make(Role.CO_WIZARD, LIMITS), SilentPolicy)
-    assert loadable_kinds() == ("benchmark", "dorothie_gym-rl", "quiet", "selfplay")
+    assert loadable_kinds() == ("benchmark", "co-wizard", "dorothie_gym-rl", "quiet", "selfplay")
 
 
 def test_file_without_kind_is_read_by_suffix(tmp_path: Path) -> None:
@@ -68,7 +68,9 @@ def test_kind_with_line_breaks_is_refused_in_one_line(tmp_path: Path) -> None:
 
 def test_kind_without_loader_raises_error(tmp_path: Path) -> None:
     (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
-    message = r"of the kind 'quiet' or '.json', which cannot be played \(known: benchmark, dorothie_gym-rl, selfplay\)"
+    known = ", ".join(loadable_kinds())
+    assert "quiet" not in known
+    message = rf"of the kind 'quiet' or '.json', which cannot be played \(known: {known}\)"
     with pytest.raises(PolicyLoadError, match=message):
         find_player(str(tmp_path / "model.json"), Role.CO_WIZARD)
     register_loader(".weights", load_silent)
