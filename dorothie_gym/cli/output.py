@@ -75,6 +75,22 @@ def coefficient(value: float | None) -> str:
     return "undefined" if value is None else f"{value:.2f}"
 
 
+@contextmanager
+def stage_progress(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """Shows a progress bar on a terminal; the callback takes a stage, the number of its steps done, and their total."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = stderr()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
+        bar = progress.add_task("")
+
+        def on_stage(stage: str, done: int, planned: int) -> None:
+            progress.update(bar, description=stage[:1].upper() + stage[1:], completed=done, total=planned)
+
+        yield on_stage
+
+
 def print_json(value: Mapping[str, object] | Sequence[object]) -> None:
     """Prints one JSON value on standard output."""
     typer.echo(json.dumps(value, allow_nan=False))

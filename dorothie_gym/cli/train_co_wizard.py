@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym.cli.output import exit_interrupted, print_json, stderr, stdout
+from dorothie_gym.cli.output import exit_interrupted, print_json, stage_progress, stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.co_wizard.training import OnStage, Stage
+    from dorothie_gym.baselines.co_wizard.training import Stage
 
 CO_WIZARD: Final = "co-wizard"
 """Command of the model."""
@@ -24,7 +23,7 @@ def train_co_wizard(corpus: Path, out: Path, *, seeds: int, workers: int | None,
 
     found: list[tuple[Path, Sequence[Stage]]] = []
     try:
-        with _progress(quiet=as_json) as on_stage:
+        with stage_progress(quiet=as_json) as on_stage:
             for seed in range(seeds):
                 folder = out / CO_WIZARD / f"seed-{seed}"
                 settings = training.CoWizardTraining(corpus=corpus, seed=seed)
@@ -50,19 +49,3 @@ def train_co_wizard(corpus: Path, out: Path, *, seeds: int, workers: int | None,
         stdout().print(
             f"Play: dorothie-gym rollout --co-wizard {shlex.quote(str(folder))}", markup=False, soft_wrap=True
         )  # fmt: skip
-
-
-@contextmanager
-def _progress(*, quiet: bool) -> Iterator[OnStage]:
-    """Shows a progress bar on a terminal."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = stderr()
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
-        bar = progress.add_task("")
-
-        def on_stage(stage: str, done: int, planned: int) -> None:
-            progress.update(bar, description=stage, completed=done, total=planned)
-
-        yield on_stage

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from dorothie_gym.cli.output import Facts, exit_interrupted, fail, print_json, stderr, stdout, wide_stdout
-
-if TYPE_CHECKING:
-    from dorothie_gym.baselines.vision.experiment import OnStage
+from dorothie_gym.cli.output import Facts, exit_interrupted, fail, print_json, stage_progress, stdout, wide_stdout
 
 VISION_MODELS: Final = ("segformer", "detr")
 """Commands of the vision models."""
@@ -53,7 +49,7 @@ def train_vision(
         fail("--inputs is for detr only")
     results: list[Facts] = []
     try:
-        with _progress(quiet=as_json) as on_stage:
+        with stage_progress(quiet=as_json) as on_stage:
             for seed in range(seeds):
                 job = VisionExperiment(
                     corpus=corpus, model=model, size=size, seed=seed, out=out, epochs=epochs,  # type: ignore[arg-type]
@@ -69,22 +65,6 @@ def train_vision(
         print_json({"model": model, "corpus": str(corpus), "runs": results})
         return
     _show(model, results)
-
-
-@contextmanager
-def _progress(*, quiet: bool) -> Iterator[OnStage]:
-    """Shows a progress bar on a terminal."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = stderr()
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
-        bar = progress.add_task("")
-
-        def on_stage(stage: str, done: int, planned: int) -> None:
-            progress.update(bar, description=stage.capitalize(), completed=done, total=planned)
-
-        yield on_stage
 
 
 def _show(model: str, results: Sequence[Mapping[str, Any]]) -> None:

@@ -122,6 +122,17 @@ def default_lane_distance(town: Town, here: Place, place: Place, distance: float
     return None
 
 
+def default_lane_place(town: Town, here: Place, distance: float) -> Place:
+    """Returns the place some way ahead [m] on the default lanes; the end of the last lane before a junction."""
+    lane, station = here
+    lanes, left = lanes_ahead(town, lane, station, distance), station + distance
+    for passed in lanes[:-1]:
+        if left <= town.lanes[passed].length:
+            return passed, left
+        left -= town.lanes[passed].length
+    return lanes[-1], min(left, town.lanes[lanes[-1]].length)
+
+
 def lanes_ahead(town: Town, lane: int, station: float, distance: float) -> tuple[int, ...]:
     """Returns a lane and those that follow by default within `distance` [m]."""
     found, ahead = [lane], town.lanes[lane].length - station

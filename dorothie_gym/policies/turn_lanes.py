@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from dorothie_gym.maps import Town
-from dorothie_gym.maps.routing import LaneEntry
+from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, RouteProgress, lanes_beside
 from dorothie_gym.policies.route_tables import default_successor, is_choice
@@ -71,6 +71,19 @@ def next_turn(progress: RouteProgress, town: Town, station: float) -> RouteJunct
         if following.entry is LaneEntry.FOLLOW and leg.lane in turn_lanes(town):
             return RouteJunction(lane=leg.lane, exit=town.exits(leg.lane)[0], distance=distance)
     return crossing
+
+
+def junction_meant(town: Town, here: Place, choice: Choice | None) -> Choice | None:
+    """Returns the nearer of the next junction with a choice and the next one with turn lanes.
+
+    Args:
+        town: the map.
+        here: place of the car.
+        choice: the next junction with a choice.
+    """
+    turn_lane = next_turn_lane(town, *here)
+    nearer = turn_lane is not None and (choice is None or turn_lane.distance < choice.distance)
+    return turn_lane if nearer else choice
 
 
 def leads_beside(town: Town, lane: int, wanted: int) -> bool:

@@ -1,4 +1,4 @@
-"""What people say into a microphone is the audio of their dialogue moves, and replays are exact."""
+"""Recordings of people at a microphone are the audio of their dialogue moves, and replays are exact."""
 
 from __future__ import annotations
 

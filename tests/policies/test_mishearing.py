@@ -1,4 +1,4 @@
-"""What is misheard is found out and repaired."""
+"""Misheard words are noticed and repaired."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What the learned Co-Wizard can tell about a proposition from its own observation, memory and map."""
+"""Evidence of the learned Co-Wizard for or against a proposition, from its own observation, memory and map."""
 
 from __future__ import annotations
 
@@ -7,12 +7,18 @@ from typing import Final
 
 from dorothie_gym.baselines.co_wizard.memory import Memory
 from dorothie_gym.dialogue import Predicate, Proposition
-from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass, PhysicalAction, Sensor, StreetName
+from dorothie_gym.ontology import ObjectClass, Sensor, StreetName
+from dorothie_gym.policies.co_wizard.judgement import (
+    is_localised,
+    is_located,
+    is_red_ahead,
+    present_action,
+    sees,
+    sees_far,
+)
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import street_of
-from dorothie_gym.policies.route_progress import light_ahead
-from dorothie_gym.policies.sight import FAR_SIGHT, camera_fault, sight
+from dorothie_gym.policies.sight import camera_fault
 from dorothie_gym.spaces import Motion
 
 LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.25
@@ -20,12 +26,6 @@ LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.25
 
 CLOSE_DISTANCE: Final = 120.0
 """Way to the goal that is called short [m]."""
-
-_NAMED: Final = {
-    PhysicalAction.J_TURN: ActionValue.J_TURN,
-    PhysicalAction.U_TURN: ActionValue.U_TURN,
-    PhysicalAction.LANE_SWITCH: ActionValue.LANE_SWITCH,
-}
 
 _Evidence = Callable[[Memory, CoWizardView, Proposition], bool | None]
 
@@ -37,17 +37,6 @@ def evidence(memory: Memory, view: CoWizardView, said: Proposition) -> bool | No
     return found if found is None else found is not said.negated
 
 
-def variance(view: CoWizardView) -> float:
-    """Returns the variance of the position [m^2]."""
-    covariance = view.raw["pose_covariance"]
-    return float(covariance[0][0]) + float(covariance[1][1])
-
-
-def red_ahead(memory: Memory, view: CoWizardView) -> bool:
-    """Returns whether the next traffic light is near and not green."""
-    return light_ahead(memory.town, view.lane, view.station, view.time) not in (None, LightColour.GREEN)
-
-
 def goal_left(memory: Memory, view: CoWizardView) -> float | None:
     """Returns the way to a goal on the map [m]; None without one."""
     return memory.navigator.left(view) if memory.goal_mark >= 0 else None
@@ -57,26 +46,11 @@ def _about_goal(memory: Memory, said: Proposition) -> bool:
     return said.get("place") in (None, memory.goal)
 
 
-def _sees(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
-    kind, place = said.get("object"), said.get("place")
-    if isinstance(kind, ObjectClass):
-        return any(thing.kind is kind for thing in view.objects) or view.hazard is kind
-    if isinstance(place, LandmarkName):
-        x, y = view.position
-        return any(mark.name is place and abs(mark.x - x) + abs(mark.y - y) < 60.0 for mark in view.landmarks)
-    return None
-
-
 def _on_street(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
     here = street_of(view.raw, memory.town, view.lane)
-    if here is StreetName.UNKNOWN or variance(view) > LOST_VARIANCE:
+    if here is StreetName.UNKNOWN or not is_localised(view, LOST_VARIANCE):
         return None
     return here is said.get("street")
-
-
-def _located(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
-    marks = [mark for mark in view.landmarks if mark.name is said.get("place")]
-    return any(mark.street is said.get("street") for mark in marks) if marks else None
 
 
 def _close(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
@@ -95,14 +69,9 @@ def _right_way(memory: Memory, view: CoWizardView, said: Proposition) -> bool | 
 
 
 def _failed(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
-    found = {camera_fault(view.raw), None if variance(view) <= GPS_VARIANCE else Sensor.GPS} - {None}
+    found = {camera_fault(view.raw), None if is_localised(view, GPS_VARIANCE) else Sensor.GPS} - {None}
     asked = said.get("sensor")
     return bool(found) if asked is None else asked in found
-
-
-def _does(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
-    doing = ActionValue.LANE_FOLLOW if view.manoeuvre is None else _NAMED.get(view.manoeuvre, ActionValue.LANE_FOLLOW)
-    return (ActionValue.STOP if view.standing else doing) is said.get("action")
 
 
 def _has_goal(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
@@ -110,24 +79,24 @@ def _has_goal(memory: Memory, view: CoWizardView, said: Proposition) -> bool | N
 
 
 _EVIDENCE: Final[dict[Predicate, _Evidence]] = {
-    Predicate.SEES: _sees,
+    Predicate.SEES: lambda memory, view, said: sees(view, said),
     Predicate.ON_STREET: _on_street,
-    Predicate.LOCATED: _located,
+    Predicate.LOCATED: lambda memory, view, said: is_located(view, said),
     Predicate.CLOSE: _close,
     Predicate.KNOWS: _knows,
     Predicate.HAS_ROUTE: lambda memory, view, said: memory.navigator.arrives and _about_goal(memory, said),
     Predicate.RIGHT_WAY: _right_way,
-    Predicate.RED: lambda memory, view, said: red_ahead(memory, view),
+    Predicate.RED: lambda memory, view, said: is_red_ahead(memory.town, view),
     Predicate.SAFE: lambda memory, view, said: (
-        view.hazard is ObjectClass.UNLABELED and sight(view.raw) >= FAR_SIGHT and variance(view) <= LOST_VARIANCE
+        view.hazard is ObjectClass.UNLABELED and sees_far(view) and is_localised(view, LOST_VARIANCE)
     ),
-    Predicate.DOES: _does,
+    Predicate.DOES: lambda memory, view, said: present_action(view) is said.get("action"),
     Predicate.ARRIVED: lambda memory, view, said: (
         bool(memory.value("arrived")) and view.standing and _about_goal(memory, said)
     ),
     Predicate.STANDS: lambda memory, view, said: view.standing,
-    Predicate.LOCALISED: lambda memory, view, said: variance(view) <= LOST_VARIANCE,
-    Predicate.VISIBILITY: lambda memory, view, said: sight(view.raw) >= FAR_SIGHT,
+    Predicate.LOCALISED: lambda memory, view, said: is_localised(view, LOST_VARIANCE),
+    Predicate.VISIBILITY: lambda memory, view, said: sees_far(view),
     Predicate.FAILED: _failed,
     Predicate.LIGHTS_ON: lambda memory, view, said: view.lights,
     Predicate.GOAL: _has_goal,

@@ -6,26 +6,33 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from dorothie_gym.baselines.co_wizard.beliefs import evidence, goal_left, red_ahead, variance
+from dorothie_gym.baselines.co_wizard.beliefs import GPS_VARIANCE, LOST_VARIANCE, evidence, goal_left
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import (
     AWAY,
-    COMMON,
     ORDERS,
     STATUSES,
     VARIABLES,
     Memory,
     seconds_since,
 )
-from dorothie_gym.baselines.co_wizard.way import ahead_of, junction_meant
 from dorothie_gym.dialogue import Direction, Predicate
 from dorothie_gym.maps.model import Exit
 from dorothie_gym.ontology import DialogueMove, GoalStatus, ObjectClass, PhysicalAction
+from dorothie_gym.policies.co_wizard.judgement import is_red_ahead
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
 from dorothie_gym.policies.language_model.navigator import RouteStep
 from dorothie_gym.policies.observation_parser import SeenLandmark, is_dark
-from dorothie_gym.policies.route_progress import Choice, direction_of, find_exit, stopping_distance, streets_named
+from dorothie_gym.policies.route_progress import (
+    Choice,
+    direction_of,
+    find_exit,
+    stopping_distance,
+    streets_named,
+)
 from dorothie_gym.policies.sight import Limit, camera_fault, limit_of, sight, suitable_speed
+from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.spaces import Motion, Physical
 
 HAZARDS: Final = (
@@ -94,13 +101,13 @@ def _car(memory: Memory, view: CoWizardView) -> list[float]:
         min(standing or 0.0, 30.0) / 30.0, float((standing or 0.0) > 4.0), float((standing or 0.0) > 5.0),
         *_one_hot(-1 if limit is None else tuple(Limit).index(limit), len(Limit)), float(is_dark(view.raw)),
         float(fault is not None), sight(view.raw) / 100.0, suitable_speed(sight(view.raw)) / 60.0,
-        math.tanh(variance(view)), float(variance(view) > 0.25), float(variance(view) > 36.0),
-        float(red_ahead(memory, view)),
+        math.tanh(view.variance), float(view.variance > GPS_VARIANCE), float(view.variance > LOST_VARIANCE),
+        float(is_red_ahead(memory.town, view)),
     ]  # fmt: skip
 
 
 def _road(memory: Memory, view: CoWizardView) -> list[float]:
-    choice, meant = view.choice, junction_meant(memory.town, view)
+    choice, meant = view.choice, junction_meant(memory.town, view.here, view.choice)
     directions = () if choice is None else tuple(direction_of(way) for way in choice.exits)
     ordered = ordered_exit(memory, view, meant)
     counts = [sum(thing.kind is kind for thing in view.objects) for kind in HAZARDS]
@@ -130,9 +137,8 @@ def ordered_exit(memory: Memory, view: CoWizardView, choice: Choice | None) -> E
 
 def _route(memory: Memory, view: CoWizardView, step: RouteStep | None) -> list[float]:
     left, progress = memory.navigator.left(view), memory.navigator.route.progress
-    target = None if memory.target is None else ahead_of(memory.town, view, memory.target)
-    place = memory.navigator.goal
-    near = None if place is None else ahead_of(memory.town, view, place)
+    target = memory.distance_to(memory.target, view)
+    near = memory.distance_to(memory.navigator.goal, view)
     crossing = None if progress is None else progress.next_crossing(memory.town, view.station)
     here = crossing is not None and view.choice is not None and crossing.lane == view.choice.lane
     return [
@@ -164,7 +170,7 @@ def _remembered(memory: Memory, view: CoWizardView) -> list[float]:
     left = goal_left(memory, view)
     fault = float(any(status is GoalStatus.COMPLETE for _, status in memory.statuses))
     return [
-        *hot, *ages, float(memory.goal is not None), float(memory.goal_mark >= 0), float(memory.goal in COMMON),
+        *hot, *ages, float(memory.goal is not None), float(memory.goal_mark >= 0), float(memory.goal in SHARED_NAMES),
         *_time(seconds_since(view.time, memory.goal_at)), float(left is not None and abs(left) < 2.0),
         float(left is not None and left < 120.0), float(left is not None and left < 70.0),
         float(bool(memory.statuses)), fault, float(bool(memory.updates)),
@@ -190,7 +196,7 @@ def _talk(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance], q
         float(found is True), float(found is False), float(asked is not None and found is None),
         float(bool(places) and places[0] is memory.goal), float(len(places) > 1 and places[1] is memory.goal),
         float(bool(on_map) and on_map[0]), float(len(on_map) > 1 and on_map[1]),
-        float(bool(places) and places[0] in COMMON),
+        float(bool(places) and places[0] in SHARED_NAMES),
     ]  # fmt: skip
 
 
@@ -222,7 +228,7 @@ def _place(mark: SeenLandmark, memory: Memory, view: CoWizardView, utterances: S
         ]  # fmt: skip
     return [
         *told, float(latest is not None), float(mark.row == memory.goal_mark), float(mark.name is memory.goal),
-        float(mark.name is memory.former), float(mark.place in memory.ruled_out), float(mark.name in COMMON),
+        float(mark.name is memory.former), float(mark.place in memory.ruled_out), float(mark.name in SHARED_NAMES),
         float(len(free) > 1), float(bool(free) and free[0] is mark),
         float(any(other.street in latest.streets for other in free) if latest is not None else False),
         *_one_hot(STATUSES.index(status) if status in STATUSES else -1, len(STATUSES)), *_distance(distance),
@@ -237,7 +243,7 @@ def command_vectors(
     commands: Sequence[Physical | None], memory: Memory, view: CoWizardView, step: RouteStep | None
 ) -> list[list[float]]:
     """Returns a vector for each physical action that can be commanded, "none" among them."""
-    meant = junction_meant(memory.town, view)
+    meant = junction_meant(memory.town, view.here, view.choice)
     way, ways = ordered_exit(memory, view, meant), () if meant is None else meant.exits
     names = {exit_.angle: direction_of(exit_) for exit_ in (*ways, *(() if view.choice is None else view.choice.exits))}
     return [_command(command, memory, view, step, way, names) for command in commands]

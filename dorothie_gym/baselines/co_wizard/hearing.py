@@ -1,4 +1,4 @@
-"""What the learned Co-Wizard hears: the last utterances of the participant, as numbers and as words."""
+"""Utterances of the participant as inputs of the learned Co-Wizard: numbers and words."""
 
 from __future__ import annotations
 

@@ -14,16 +14,18 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.baselines.co_wizard.way import ahead_of, junction_meant, place_ahead
 from dorothie_gym.dialogue import Direction
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import GoalStatus, LandmarkName, MentalAction, PhysicalAction, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
+from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
 from dorothie_gym.policies.language_model.navigator import Navigator
 from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.policy import DecisionClock, replace
+from dorothie_gym.policies.route_progress import default_lane_distance, default_lane_place
+from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.spaces import LanePosition, Mental
 
 ORDERS: Final = (None, Direction.LEFT, Direction.RIGHT, Direction.STRAIGHT, Direction.BACK, "street")
@@ -66,11 +68,11 @@ class GoalEvent(enum.IntEnum):
     OFF_MAP_SECOND = 4
 
 
-COMMON: Final = (LandmarkName.HOUSE, LandmarkName.PERSON)
-"""Names that several places bear."""
-
 CREEP_SHORTFALL, CREEP_LEAST, CREEP_LEAD, CREEP_RENEW, SLOWER_DISTANCE = 12.0, 10.0, 16.0, 6.0, 30.0
 """Place of a slow approach [m]: how much nearer than said, at least; where it is carried along; when; if not said."""
+
+PLACE_SIGHT: Final = 80.0
+"""Distance along the default lanes within which a place is looked for [m]; as that of the scripted Co-Wizard."""
 
 AWAY: Final = 300.0
 """Time that stands for "never" or "long ago" [s]."""
@@ -151,6 +153,10 @@ class Memory:
     heard_at: float = -AWAY
     clock: DecisionClock = DecisionClock()
 
+    def distance_to(self, place: Place | None, view: CoWizardView) -> float | None:
+        """Returns the distance to a place along the default lanes [m]; None if it is not near on them, or no place."""
+        return None if place is None else default_lane_distance(self.town, view.here, place, PLACE_SIGHT)
+
     def value(self, name: str) -> int:
         """Returns the value of a variable."""
         return self.values[_INDEX[name]]
@@ -184,12 +190,12 @@ class Memory:
         )
         memory = replace(self, values=update.values, changed_at=changed)
         if fresh["order"] or memory.value("skip") < self.value("skip"):
-            choice = junction_meant(self.town, view)
+            choice = junction_meant(self.town, view.here, view.choice)
             street = streets[0] if streets and memory.value("onto_street") else self.street
             street = street if memory.value("onto_street") else StreetName.UNKNOWN
             memory = replace(memory, junction=-1 if choice is None else choice.junction, street=street)
         if fresh["nudging"]:
-            memory = replace(memory, target=place_ahead(self.town, view, float(distance or NUDGE_DISTANCE)))
+            memory = replace(memory, target=default_lane_place(self.town, view.here, float(distance or NUDGE_DISTANCE)))
         elif fresh["creeping"] and memory.value("creeping"):
             ahead = max((distance or SLOWER_DISTANCE) - CREEP_SHORTFALL, CREEP_LEAST)
             memory = replace(memory, target=None)._marked(view, ahead)
@@ -200,7 +206,7 @@ class Memory:
         """Carries the place of a slow approach along, and sends the plan if the route has changed."""
         memory = self
         if self.value("creeping") and not self.value("halted") and view.manoeuvre is not PhysicalAction.U_TURN:
-            left = None if self.target is None else ahead_of(self.town, view, self.target)
+            left = self.distance_to(self.target, view)
             if left is None or left < CREEP_RENEW:
                 memory = memory._marked(view, CREEP_LEAD)
         progress = memory.navigator.route.progress
@@ -215,7 +221,7 @@ class Memory:
 
     def _marked(self, view: CoWizardView, ahead: float) -> Memory:
         """Marks the goal as close ahead, so that the car approaches it slowly."""
-        place, name = place_ahead(self.town, view, ahead), self.goal or LandmarkName.UNKNOWN
+        place, name = default_lane_place(self.town, view.here, ahead), self.goal or LandmarkName.UNKNOWN
         where = LanePosition(lane=place[0], metres=round(place[1]))
         memory = replace(self, target=place)
         if self.target is None:
@@ -235,7 +241,7 @@ class Memory:
         if status is None or place is None:
             return self
         memory = self._noting(place, status)
-        if status is GoalStatus.COMPLETE and place in COMMON and self.navigator.goal is not None:
+        if status is GoalStatus.COMPLETE and place in SHARED_NAMES and self.navigator.goal is not None:
             memory = replace(memory, ruled_out=(*memory.ruled_out, self.navigator.goal))
         return memory
 
@@ -257,7 +263,7 @@ class Memory:
             return replace(memory, goal=None, former=self.goal)
         if event == GoalEvent.DOUBT:
             place = self.navigator.goal
-            ruled = () if place is None or self.goal not in COMMON else (place,)
+            ruled = () if place is None or self.goal not in SHARED_NAMES else (place,)
             return replace(memory, ruled_out=(*self.ruled_out, *ruled))
         which = event - GoalEvent.OFF_MAP_FIRST
         if which >= len(named):

@@ -19,14 +19,14 @@ from dorothie_gym.policies.route_progress import (
     Choice,
     RouteJunction,
     default_lane_distance,
+    default_lane_place,
     find_exit,
-    lanes_ahead,
     lanes_beside,
     light_ahead,
     stopping_distance,
     streets_named,
 )
-from dorothie_gym.policies.turn_lanes import next_turn_lane
+from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.spaces import Motion, Physical
 
 CRUISE_TOLERANCE = 2.6
@@ -100,17 +100,6 @@ def _way_to_next_decision(state: CoWizardState, view: CoWizardView) -> float:
 def distance_ahead(state: CoWizardState, view: CoWizardView, place: Place) -> float | None:
     """Returns the distance to a place along the default lanes [m]; None if it is not within sight on them."""
     return default_lane_distance(state.town, view.here, place, state.config.place_sight)
-
-
-def place_ahead(state: CoWizardState, view: CoWizardView, distance: float) -> Place:
-    """Returns the place some way ahead on the default lanes [m]; the end of the last lane if a junction is nearer."""
-    left = view.station + distance
-    lanes = lanes_ahead(state.town, view.lane, view.station, distance)
-    for lane in lanes[:-1]:
-        if left <= state.town.lanes[lane].length:
-            return lane, left
-        left -= state.town.lanes[lane].length
-    return lanes[-1], min(left, state.town.lanes[lanes[-1]].length)
 
 
 def _carry_out_wish(state: CoWizardState, view: CoWizardView) -> Physical | None:
@@ -199,14 +188,7 @@ def junction_ahead(state: CoWizardState, view: CoWizardView) -> Choice | None:
     directive = state.intentions.directive
     if directive is None or (view.choice is not None and directive.junction == view.choice.junction):
         return view.choice
-    return junction_meant(state, view)
-
-
-def junction_meant(state: CoWizardState, view: CoWizardView) -> Choice | None:
-    """Returns the next junction with a choice or with turn lanes."""
-    turn_lane = next_turn_lane(state.town, view.lane, view.station)
-    nearer = turn_lane is not None and (view.choice is None or turn_lane.distance < view.choice.distance)
-    return turn_lane if nearer else view.choice
+    return junction_meant(state.town, view.here, view.choice)
 
 
 def wanted_exit(state: CoWizardState, view: CoWizardView) -> Exit | None:
@@ -382,4 +364,4 @@ def creep(state: CoWizardState, view: CoWizardView) -> None:
     distance = distance_ahead(state, view, beliefs.place) if beliefs.place is not None else None
     if distance is None or distance < CREEP_RENEW:
         landmark = beliefs.goal or LandmarkName.UNKNOWN
-        state.beliefs = beliefs.with_guess(landmark, place_ahead(state, view, CREEP_LEAD))
+        state.beliefs = beliefs.with_guess(landmark, default_lane_place(state.town, view.here, CREEP_LEAD))

@@ -19,12 +19,11 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark, sign_of_hearing
-from dorothie_gym.policies.co_wizard.driving import place_ahead
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.story import kept_for_later
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
-from dorothie_gym.policies.route_progress import RouteProgress, streets_named
+from dorothie_gym.policies.route_progress import RouteProgress, default_lane_place, streets_named
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.spaces import LanePosition, Mental
 
@@ -214,7 +213,7 @@ def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName |
     state.intentions = state.intentions.creeping_up()
     state.route = state.route.with_progress(None)
     # nearer than said: spoken distances are rounded, and a slow car can be stopped at once
-    guess = place_ahead(state, view, max(distance - 12.0, 10.0))
+    guess = default_lane_place(state.town, view.here, max(distance - 12.0, 10.0))
     state.beliefs = state.beliefs.with_guess(state.beliefs.goal or LandmarkName.UNKNOWN, guess)
 
 

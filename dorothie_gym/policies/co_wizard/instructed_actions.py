@@ -10,10 +10,11 @@ from typing import Final, TypeAlias
 from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition
 from dorothie_gym.ontology import SPEED_STEP, ActionValue, DialogueAct, StreetName
 from dorothie_gym.policies import contents
-from dorothie_gym.policies.co_wizard.driving import junction_meant, place_ahead
 from dorothie_gym.policies.co_wizard.goals import approach_stop
 from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP, CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.route_progress import default_lane_place
+from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.spaces import Motion
 
 STRAIGHT_ON_DISTANCE = 60.0
@@ -34,7 +35,7 @@ Obey: TypeAlias = Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText
 
 def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     """Intends the turn that was asked for."""
-    streets, junction = contents.named_streets(act), junction_meant(state, view)
+    streets, junction = contents.named_streets(act), junction_meant(state.town, view.here, view.choice)
     directive = Directive(
         direction=words.direction,
         street=streets[0] if streets else StreetName.UNKNOWN,
@@ -45,13 +46,14 @@ def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: P
 
 
 def _do_follow(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
-    close, choice = state.intentions.halted or state.intentions.creeping or view.standing, junction_meant(state, view)
+    close = state.intentions.halted or state.intentions.creeping or view.standing
+    choice = junction_meant(state.town, view.here, view.choice)
     way = math.inf if choice is None else choice.distance
     across = words.direction is Direction.STRAIGHT or way < STRAIGHT_ON_DISTANCE
     if close and (words.further or words.distance is not None):
         distance = float(words.distance) if words.distance is not None else state.config.nudge_distance
         if distance <= way:
-            state.intentions = state.intentions.nudged(place_ahead(state, view, distance))
+            state.intentions = state.intentions.nudged(default_lane_place(state.town, view.here, distance))
             return
         across = True  # at the junction, the car would wait for the way
     state.intentions = state.intentions.proceeding()

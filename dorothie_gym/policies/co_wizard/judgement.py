@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Final
 
 from dorothie_gym.dialogue import Predicate, Proposition
+from dorothie_gym.maps import Town
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass, PhysicalAction, Sensor, StreetName
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
@@ -49,8 +50,7 @@ def seconds_to_goal(state: CoWizardState, view: CoWizardView) -> int | None:
 
 def is_localised(view: CoWizardView, most: float) -> bool:
     """Returns whether the variance of the position is at most `most` [m^2]."""
-    covariance = view.raw["pose_covariance"]
-    return float(covariance[0][0]) + float(covariance[1][1]) <= most
+    return view.variance <= most
 
 
 def sees_far(view: CoWizardView) -> bool:
@@ -58,9 +58,9 @@ def sees_far(view: CoWizardView) -> bool:
     return sight(view.raw) >= FAR_SIGHT
 
 
-def is_red_ahead(state: CoWizardState, view: CoWizardView) -> bool:
+def is_red_ahead(town: Town, view: CoWizardView) -> bool:
     """Returns whether the next traffic light on the way is near and not green."""
-    return light_ahead(state.town, view.lane, view.station, view.time) not in (None, LightColour.GREEN)
+    return light_ahead(town, view.lane, view.station, view.time) not in (None, LightColour.GREEN)
 
 
 def present_action(view: CoWizardView) -> ActionValue:
@@ -70,10 +70,8 @@ def present_action(view: CoWizardView) -> ActionValue:
     return NAMED_ACTIONS.get(view.manoeuvre or PhysicalAction.LANE_FOLLOW, ActionValue.LANE_FOLLOW)
 
 
-# --- beliefs by predicate ---------------------------------------------------------------------------------------------
-
-
-def _sees(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
+def sees(view: CoWizardView, said: Proposition) -> bool | None:
+    """Returns whether an object or place is in sight; None if the proposition names neither."""
     kind, place = said.get("object"), said.get("place")
     if isinstance(kind, ObjectClass):
         return any(thing.kind is kind for thing in view.objects) or view.hazard is kind
@@ -83,16 +81,20 @@ def _sees(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool |
     return None
 
 
+def is_located(view: CoWizardView, said: Proposition) -> bool | None:
+    """Returns whether a place is on a street, by the map; None if the map does not show it."""
+    marks = [mark for mark in view.landmarks if mark.name is said.get("place")]
+    return any(mark.street is said.get("street") for mark in marks) if marks else None
+
+
+# --- beliefs by predicate ---------------------------------------------------------------------------------------------
+
+
 def _is_on_street(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
     here = street_of(view.raw, state.town, view.lane)
     if here is StreetName.UNKNOWN or not is_localised(view, state.config.lost_variance):
         return None
     return here is said.get("street")
-
-
-def _is_located(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    marks = [mark for mark in view.landmarks if mark.name is said.get("place")]
-    return any(mark.street is said.get("street") for mark in marks) if marks else None
 
 
 def _is_close(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
@@ -121,7 +123,7 @@ def _is_right_way(state: CoWizardState, view: CoWizardView, said: Proposition) -
 
 
 def _is_red(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
-    return is_red_ahead(state, view)
+    return is_red_ahead(state.town, view)
 
 
 def _is_safe(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
@@ -148,9 +150,9 @@ def _about_goal(state: CoWizardState, said: Proposition) -> bool:
 
 
 _BELIEFS: Final[dict[Predicate, Belief]] = {
-    Predicate.SEES: _sees,
+    Predicate.SEES: lambda state, view, said: sees(view, said),
     Predicate.ON_STREET: _is_on_street,
-    Predicate.LOCATED: _is_located,
+    Predicate.LOCATED: lambda state, view, said: is_located(view, said),
     Predicate.CLOSE: _is_close,
     Predicate.KNOWS: _knows,
     Predicate.HAS_ROUTE: _has_route,
@@ -184,7 +186,7 @@ def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | N
     if state.dialogue.detour_asked_at is not None:
         return Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
     if hazard is ObjectClass.TRAFFIC_LIGHT:
-        return Proposition.of(Predicate.RED, object=hazard) if is_red_ahead(state, view) else None
+        return Proposition.of(Predicate.RED, object=hazard) if is_red_ahead(state.town, view) else None
     if hazard is not ObjectClass.UNLABELED:
         return Proposition.of(Predicate.HINDERS, object=hazard)
     since = view.time if commands.standing_since is None else commands.standing_since

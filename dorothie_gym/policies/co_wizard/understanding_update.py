@@ -22,7 +22,6 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
-from dorothie_gym.policies.co_wizard.driving import junction_meant
 from dorothie_gym.policies.co_wizard.goals import (
     abandon,
     accept_offer,
@@ -46,6 +45,7 @@ from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend, repeated
+from dorothie_gym.policies.turn_lanes import junction_meant
 
 NEAR = 100
 """Distance up to which a place that is said to be ahead is approached slowly [m]."""
@@ -265,7 +265,7 @@ def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetN
         over = contents.action(None, street=street)
         state.say(intend(Function.ACCEPT, over, wording=Wording(topic="detour")))
         return
-    junction = junction_meant(state, view)
+    junction = junction_meant(state.town, view.here, view.choice)
     directive = Directive(direction=None, street=street, junction=-1 if junction is None else junction.junction)
     state.intentions = state.intentions.directed(directive).resumed()
     state.say(intend(Function.ACCEPT, contents.action(None, street=street), wording=Wording(topic="taken")))

@@ -97,6 +97,12 @@ class CoWizardView:
         return float(x), float(y)
 
     @property
+    def variance(self) -> float:
+        """Variance of the estimated position [m^2]."""
+        covariance = self.raw["pose_covariance"]
+        return float(covariance[0][0]) + float(covariance[1][1])
+
+    @property
     def here(self) -> Place:
         """Lane and station of the car."""
         return self.lane, self.station

@@ -26,7 +26,7 @@ from dorothie_gym.policies.language_model.role_interface import (
     weather_words,
     words_fields,
 )
-from dorothie_gym.policies.route_progress import direction_of, lanes_ahead, streets_named
+from dorothie_gym.policies.route_progress import default_lane_place, direction_of, streets_named
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.spaces import ExitColumn, Motion, Physical
 
@@ -109,7 +109,7 @@ def goal_options(view: CoWizardView, town: Town) -> dict[str, tuple[LandmarkName
 def mark_options(view: CoWizardView, town: Town) -> dict[str, Place]:
     """Returns the places that can be marked by their labels: ahead, beside places on the map, and on streets."""
     options = {"here": (view.lane, view.station)}
-    options |= {f"{metres} m ahead": _place_ahead(town, view, float(metres)) for metres in AHEAD}
+    options |= {f"{metres} m ahead": default_lane_place(town, view.here, float(metres)) for metres in AHEAD}
     options |= {f"beside {label}": mark.place for label, mark in named_places(view.raw, town).items()}
     names = sorted({int(value) for value in view.raw["street_names"]} - {StreetName.UNKNOWN.value})
     for street in (StreetName(value) for value in names):
@@ -117,17 +117,6 @@ def mark_options(view: CoWizardView, town: Town) -> dict[str, Place]:
         if place is not None:
             options[f"on {street_name(street)}"] = place
     return options
-
-
-def _place_ahead(town: Town, view: CoWizardView, distance: float) -> Place:
-    """Returns the place some way ahead on the default lanes [m]; the end of the last lane before a junction."""
-    left = view.station + distance
-    lanes = lanes_ahead(town, view.lane, view.station, distance)
-    for lane in lanes[:-1]:
-        if left <= town.lanes[lane].length:
-            return lane, left
-        left -= town.lanes[lane].length
-    return lanes[-1], min(left, town.lanes[lanes[-1]].length)
 
 
 def _middle_of(town: Town, view: CoWizardView, street: StreetName) -> Place | None:
