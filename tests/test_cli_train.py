@@ -29,6 +29,8 @@ runner = CliRunner()
         (["train", "toto-detections"], "run first: dorothie-gym train detr"),
         (["train", "detector-queries"], "run first: dorothie-gym train detr"),
         (["table", "--models", "toto,et-detections"], "run first: dorothie-gym train detr"),
+        (["train", "co-wizard", "--config", "paper"], "--config and --encoder are not for co-wizard"),
+        (["train", "co-wizard", "--encoder", "minilm"], "--config and --encoder are not for co-wizard"),
         (["train", "detr"], "run first: dorothie-gym train segformer"),
     ],
 )

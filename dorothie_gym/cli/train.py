@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 RUNS = Path("runs")
 """Default folder of trainings; it contains one folder per corpus."""
 
+SMALL, AUTO = "small", "auto"
+"""Default size and text encoder of models."""
+
 _DETECTOR = Path("detr", "small", "seed-0")
 _NOT_OF_DETECTIONS = "--detector is for models of detections and queries only, such as toto-detections"
 
@@ -93,9 +96,9 @@ def train(
         ),
     ],
     corpus: CorpusOption = None,
-    size: Size = "small",
+    size: Size = SMALL,
     seeds: SomeSeeds = None,
-    encoder: Encoder = "auto",
+    encoder: Encoder = AUTO,
     out: Out = None,
     workers: Workers = None,
     strict: Strict = False,
@@ -125,8 +128,8 @@ def train(
         if given is not None:
             fail(f"{option} is for {' and '.join(VISION_MODELS)} only")
     if model == CO_WIZARD:
-        if detector is not None or hubert is not None or strict:
-            fail(f"--detector, --hubert and --strict are not for {CO_WIZARD}")
+        if detector is not None or hubert is not None or strict or size != SMALL or encoder != AUTO:
+            fail(f"--detector, --hubert, --strict, --config and --encoder are not for {CO_WIZARD}")
         with _reporting_errors():
             train_co_wizard(*_places(corpus, out), seeds=seeds or 1, workers=workers, as_json=as_json)
         return
@@ -185,10 +188,10 @@ def _train_benchmark_model(
 
 def table(
     corpus: CorpusOption = None,
-    size: Size = "small",
+    size: Size = SMALL,
     seeds: Seeds = 5,
     models: Annotated[str, typer.Option(help="all, or a list of models: toto,bert,...")] = "all",
-    encoder: Encoder = "auto",
+    encoder: Encoder = AUTO,
     out: Out = None,
     workers: Workers = None,
     strict: Strict = False,

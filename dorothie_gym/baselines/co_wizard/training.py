@@ -120,8 +120,10 @@ def train_co_wizard(
     """
     torch.set_num_threads(1)  # small layers: more threads only wait for each other, and change the last bits
     begun, done = time.process_time(), []
+    entries = Corpus.load(settings.corpus).filter(fold="train").entries
+    if not entries:
+        raise SessionError(f"{settings.corpus}: there is no session in the fold 'train' to learn from")
     with locked_folder(out, SETTINGS_FILE, settings.as_json()):
-        entries = [entry for entry in Corpus.load(settings.corpus).filter(fold="train").entries]
         paths = [out / LESSONS / "corpus" / f"{entry.path.name}.safetensors" for entry in entries]
         plans = [CorpusPlan(number=k, file=path) for k, path in enumerate(paths)]
         _gather(partial(_Follower, settings.corpus), plans, workers, partial(on_stage, "Sessions of the corpus"))

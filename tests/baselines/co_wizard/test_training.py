@@ -76,6 +76,13 @@ def test_folder_of_other_settings_is_refused(corpus, trained):
         train_co_wizard(other, trained, workers=1, on_stage=lambda *_: None)
 
 
+def test_corpus_that_cannot_be_read_leaves_no_training_behind(tmp_path):
+    missing = CoWizardTraining(corpus=tmp_path / "missing")
+    with pytest.raises(SessionError, match="no such folder"):
+        train_co_wizard(missing, tmp_path / "out", workers=1, on_stage=lambda *_: None)
+    assert not (tmp_path / "out").exists()
+
+
 def test_player_talks_and_drives_the_same_session_twice(trained, tmp_path):
     engine = SessionEngine("midtown", config=EnvConfig(max_seconds=60.0))
     logs = []
