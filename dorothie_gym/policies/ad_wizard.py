@@ -80,7 +80,7 @@ class AdWizardConfig:
     bad_weather_time: tuple[float, float] = (80.0, 140.0)
     crowd_ahead: tuple[float, float] = (60.0, 110.0)
     crowd_extent: int = 25
-    crowd_sizes: tuple[int, int] = (3, 6)
+    crowd_sizes: tuple[int, int] = (4, 8)
     crowd_of_people: float = 0.6
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -161,9 +160,10 @@ def notice(
         if not told and not (high and parameter in handled) and rng.random() < chance:
             return weather_change_remark(parameter, high=high), noticed
     near, now = [thing.kind for thing in objects if thing.distance < CROWD_DISTANCE], scalar(observation, "time")
-    kind = crowd_among(near, noticed.usual)
+    recent = {kind for kind, at in noticed.crowds if now - at < CROWD_INTERVAL}
+    kind = next((kind for kind in crowds_among(near, noticed.usual) if kind not in recent), None)
     noticed = noticed.after_looking(near, now)
-    if kind is None or now - dict(noticed.crowds).get(kind, -math.inf) < CROWD_INTERVAL:
+    if kind is None:
         return None, noticed
     noticed = noticed.with_crowd(kind, now)
     return crowd_remark(kind) if rng.random() < chance else None, noticed
@@ -180,12 +180,13 @@ def changes(observation: ObservationMapping, noted: frozenset[W]) -> Iterator[tu
             yield parameter, False
 
 
-def crowd_among(near: Sequence[ObjectClass], usual: Sequence[float]) -> ObjectClass | None:
-    """Returns pedestrians or vehicles if conspicuously many of them are near, and more than usual; None otherwise."""
-    for (kind, least), mean in zip(CROWDS.items(), usual, strict=True):
-        if near.count(kind) >= max(least, mean + MORE_THAN_USUAL):
-            return kind
-    return None
+def crowds_among(near: Sequence[ObjectClass], usual: Sequence[float]) -> list[ObjectClass]:
+    """Returns those of pedestrians and vehicles of which conspicuously many are near, and more than usual."""
+    return [
+        kind
+        for (kind, least), mean in zip(CROWDS.items(), usual, strict=True)
+        if near.count(kind) >= max(least, mean + MORE_THAN_USUAL)
+    ]
 
 
 def crowd_remark(kind: ObjectClass) -> Remark:

@@ -11,7 +11,7 @@ from dorothie_gym.policies.noticing import (
     CROWDS,
     Noticed,
     changes,
-    crowd_among,
+    crowds_among,
     notice,
     weather_change_remark,
 )
@@ -103,8 +103,18 @@ def test_usual_traffic_is_no_crowd():
     noticed = Noticed()
     for decision in range(400):
         noticed = noticed.after_looking([CARS] * 5, 0.5 * decision)
-    assert crowd_among([CARS] * 5, noticed.usual) is None
-    assert crowd_among([CARS] * 8, noticed.usual) is CARS
+    assert crowds_among([CARS] * 5, noticed.usual) == []
+    assert crowds_among([CARS] * 8, noticed.usual) == [CARS]
+
+
+def test_a_crowd_is_noticed_beside_one_that_has_been_mentioned():
+    noticed = Noticed(looked_at=99.5).with_crowd(PEOPLE, 95.0)
+    crowd = [
+        SeenObject(kind=kind, x=20.0, y=float(k), distance=20.0) for k, kind in enumerate([PEOPLE] * 5 + [CARS] * 5)
+    ]
+    seen = observed() | {"time": np.array([100.0])}
+    said, _ = notice(noticed, seen, crowd, np.random.default_rng(0), chance=1.0, handled=())
+    assert said is not None and said.act.slots == {CARS}
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ class CoWizardConfig:
     close_distance: float = 120.0
     ask_distance: float = 75.0
     ask_interval: float = 8.0
-    goal_interval: float = 10.0
+    goal_interval: float = 14.0
     hazard_delay: float = 5.0
     hazard_interval: float = 20.0
     hazard_again: float = 60.0
