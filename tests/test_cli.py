@@ -56,6 +56,7 @@ class TestRun:
         assert facts["session"] is None and facts["arrived"] is False
         assert not any(Path().iterdir()), "nothing is written that was not asked for"
 
+    @pytest.mark.long
     def test_standard_output_is_json_and_nothing_else(self, tmp_path: Path) -> None:
         picture, session = tmp_path / "p.png", tmp_path / "s"
         arguments = ("run", "--max-seconds", 2, "--json", "--picture", picture, "--out", session)
@@ -138,6 +139,7 @@ class TestRun:
         facts = loaded("run", "--town", "brookside", "--storyboard", "poorly_cat", "--max-seconds", 1, "--json")
         assert (facts["town"], facts["storyboard"]) == ("brookside", "poorly_cat")
 
+    @pytest.mark.long
     def test_video_has_ten_frames_per_second(self) -> None:
         ffmpeg = pytest.importorskip("imageio_ffmpeg")
         # In a process of its own: imageio-ffmpeg leaves pipes open, which is a warning here.

@@ -134,6 +134,7 @@ def test_mistakes_are_reported_in_one_line() -> None:
     assert "two people have the same name" in refused("annotate", "corpus", "--annotator", "a", "--adjudicator", "A")
 
 
+@pytest.mark.long
 def test_annotate_prints_a_link_for_each_person_and_ends_at_a_signal(tmp_path: Path) -> None:
     pytest.importorskip("uvicorn", reason="needs the extra console")
     corpus()
@@ -157,6 +158,7 @@ def test_annotate_prints_a_link_for_each_person_and_ends_at_a_signal(tmp_path: P
         server.wait(20)
 
 
+@pytest.mark.long
 def test_a_killed_server_loses_no_acknowledged_mark(tmp_path: Path) -> None:
     pytest.importorskip("uvicorn", reason="needs the extra console")
     one, text = recorded(Path("one"))

@@ -32,6 +32,7 @@ def test_without_arguments_the_measurements_are_listed() -> None:
     assert all(name in result.output for name in ("world", "env", "vector", "import"))
 
 
+@pytest.mark.long
 def test_standard_output_is_json_and_nothing_else() -> None:
     command = [sys.executable, "-m", "dorothie_gym.cli", "bench", "world", *map(str, SMALL), "--json"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

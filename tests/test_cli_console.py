@@ -34,6 +34,7 @@ def test_mistakes_are_named(options: list[str], message: str) -> None:
     assert message in " ".join(result.stderr.split())
 
 
+@pytest.mark.long
 def test_a_link_for_each_seat_and_a_complete_record_at_the_end(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "dorothie_gym.cli", "console", "--port", "0", "--json", "--no-pictures"]
     command += ["--roles", "ad_wizard=silent", "--out", str(tmp_path)]

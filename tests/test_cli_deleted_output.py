@@ -21,6 +21,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", COMMANDS)
 @pytest.mark.parametrize("again", [False, True], ids=["deleted", "replaced by an empty folder"])
 def test_deleted_output_folder_is_named_and_not_made_again(name: str, again: bool, tmp_path: Path) -> None:

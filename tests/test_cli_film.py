@@ -86,6 +86,7 @@ def call(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
+@pytest.mark.long
 def test_a_film_has_ten_frames_in_a_second(filmed: tuple[Path, list[NDArray[np.uint8]]]) -> None:
     _, frames = filmed
     assert len(frames) == 121 and {frame.shape for frame in frames} == {(720, 1280, 3)}
@@ -105,6 +106,7 @@ def test_between_decisions_a_film_shows_what_the_record_shows(filmed: tuple[Path
     assert np.median(moves) > 0.02, "the car drives"
 
 
+@pytest.mark.long
 def test_a_recorded_session_is_filmed_in_every_view(
     filmed: tuple[Path, list[NDArray[np.uint8]]], reels: list[Reel], tmp_path: Path
 ) -> None:

@@ -154,6 +154,7 @@ def test_boxes_in_space_project_around_the_boxes_in_the_picture(exported: Path) 
     assert compared > 30
 
 
+@pytest.mark.long
 def test_two_exports_give_equal_bytes_with_any_number_of_processes(
     exported: Path, corpus: Path, tmp_path: Path
 ) -> None:

@@ -92,6 +92,7 @@ def check_command_on_full_disk(name: str, size: str, corpus: Path, disk: Path) -
     return full
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "size"), [("train", "300k"), ("train-rl", "200k")])
 def test_training_on_full_disk_is_reported_and_goes_on(name: str, size: str, corpus: Path, disk: Path) -> None:
     assert check_command_on_full_disk(name, size, corpus, disk)

@@ -76,6 +76,7 @@ def results(out: Path) -> dict[str, object]:
     return found
 
 
+@pytest.mark.long
 def test_killed_and_interrupted_training_ends_as_an_undisturbed_one(tmp_path: Path) -> None:
     training = ("a2c", "--steps", "3072", "--workers", "0")  # its rollouts are the shortest
     whole, cut = tmp_path / "whole", tmp_path / "cut"

@@ -69,6 +69,7 @@ def test_invalid_arguments_are_reported(
     assert done.exit_code == 2 and message in done.stderr and "Traceback" not in done.stderr
 
 
+@pytest.mark.long
 def test_ctrl_c_names_the_results_and_the_command_that_resumes(tmp_path: Path) -> None:
     out = tmp_path / "stopped"
     arguments = [*SHORT[:4], "--max-seconds", "40", "--workers", "1", "--sessions", "40", "--out", str(out)]

@@ -76,6 +76,7 @@ def interrupted(
     assert not left, where
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "sent", "seconds"),
     [

@@ -137,6 +137,7 @@ def test_sound_track_has_each_utterance_at_its_time(session: Path, tmp_path: Pat
     assert read_session(again.save(tmp_path / "native")).audio.keys() == again.audio.keys()
 
 
+@pytest.mark.long
 def test_film_of_a_spoken_session_has_its_sound(session: Path, tmp_path: Path) -> None:
     for name in ("v.mp4", "v.mkv"):
         done = call("film", session, "--out", tmp_path / name, "--view", "map", "--fps", 2, "--json")
@@ -149,6 +150,7 @@ def test_film_of_a_spoken_session_has_its_sound(session: Path, tmp_path: Path) -
         assert likeness(heard, track) > 0.9  # AAC delays by 64 ms
 
 
+@pytest.mark.long
 def test_video_of_a_run_has_its_sound(tmp_path: Path) -> None:
     pytest.importorskip("imageio_ffmpeg", reason="needs the extra 'video'")
     options = ("--town", "brookside", "--seed", 5, "--max-seconds", 12, "--view", "map", "--json")

@@ -147,6 +147,7 @@ def test_an_invitation_admits_one_person_once(tmp_path: Path) -> None:
         assert one.view["id"] != first, "another person at a shared computer"
 
 
+@pytest.mark.long
 def test_data_are_not_mixed_with_those_of_a_changed_study(tmp_path: Path) -> None:
     file, data = write_study(tmp_path, SOLO), tmp_path / "data"
     with running(file, data):

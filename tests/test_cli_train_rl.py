@@ -79,6 +79,7 @@ def test_ctrl_c_while_a_corpus_is_read_is_reported(
     assert result.exit_code == 130 and "before the first step" in result.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -150,6 +150,7 @@ def test_only_content_decides_whether_a_function_is_compiled_again(tmp_path):
     assert square(tmp_path, factor=2, doc="'Another docstring.'", seconds=3000) == (18, 1)
 
 
+@pytest.mark.long
 def test_damaged_machine_code_is_compiled_again(tmp_path):
     assert square(tmp_path, factor=2, seconds=1000) == (18, 0)
     for file in (tmp_path / "cache").iterdir():
@@ -173,6 +174,7 @@ def test_folder_of_machine_code_is_private(tmp_path):
     assert (tmp_path / "cache").stat().st_mode & 0o077 == 0
 
 
+@pytest.mark.long
 def test_network_answers_the_same_without_compilation():
     program = """
 import numpy as np

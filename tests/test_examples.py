@@ -60,6 +60,7 @@ def test_example_is_short_and_documented(name: str) -> None:
     assert len(source.splitlines()) <= LONGEST.get(name, 80)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(ARGUMENTS))
 def test_example_runs(name: str, tmp_path: Path) -> None:
     if name in REQUIRED:

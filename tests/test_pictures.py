@@ -40,6 +40,7 @@ def share_of_different_pixels(first: Path, second: Path) -> float:
     return 1.0 if one.shape != other.shape else float((np.abs(one - other).max(axis=2) > 60).mean())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DRAWN)
 def test_picture_is_up_to_date(name: str, pictures: ModuleType, tmp_path: Path) -> None:
     pictures.PICTURES[name](tmp_path / "now.png")

@@ -102,6 +102,7 @@ def test_frozen_encoders_tell_words_apart_and_repeat_themselves(hubert: Path) ->
         assert all(np.abs(vectors[a] - vectors[b]).max() > 1e-3 for a, b in ((0, 1), (1, 2), (0, 2)))
 
 
+@pytest.mark.long
 def test_points_of_the_participant_have_the_sound_of_their_utterance(corpus: Path) -> None:
     material = Dataset.load(corpus, "hashing")
     spec = TOTOConfig.small().spec

@@ -24,6 +24,7 @@ SMALL = ["--town", "brookside", "--vehicles", "3", "--pedestrians", "2", "--seco
 ROW = {"width", "height", "outputs", "antialias", "milliseconds", "milliseconds_p99", "milliseconds_drive"}
 
 
+@pytest.mark.long
 def test_rows_are_the_sizes_and_outputs_that_are_asked_for(tmp_path: Path) -> None:
     figures = measure("brookside", sizes=((16, 12), (32, 24)), vehicles=3, pedestrians=2, seconds=2.0, repeats=1)
     assert json.loads(json.dumps(figures)) == figures
@@ -43,6 +44,7 @@ def test_rows_are_the_sizes_and_outputs_that_are_asked_for(tmp_path: Path) -> No
     assert (tmp_path / "chart.png").is_file()
 
 
+@pytest.mark.long
 def test_command_prints_rows_as_json() -> None:
     result = CliRunner().invoke(app, ["bench", "camera", *SMALL, "--size", "16x12", "--outputs", "rgb,depth", "--json"])
     assert result.exit_code == 0, result.output

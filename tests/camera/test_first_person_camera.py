@@ -361,6 +361,7 @@ def small_picture() -> str:
     return digest.hexdigest()
 
 
+@pytest.mark.long
 def test_another_process_without_the_compiler_draws_the_same_bytes() -> None:
     script = "from tests.camera.test_first_person_camera import small_picture; print(small_picture())"
     root = Path(__file__).parents[2]

@@ -49,6 +49,7 @@ def digest_of(names: Sequence[str]) -> str:
     return hashlib.sha256(b"".join(draw(IMAGES[name]).tobytes() for name in names)).hexdigest()
 
 
+@pytest.mark.long
 def test_other_processes_and_numbers_of_threads_draw_the_same_bytes() -> None:
     script = f"from tests.camera.test_golden_images import digest_of; print(digest_of({DRAWN!r}))"
     runs = [

@@ -109,6 +109,7 @@ def test_signs_are_not_mirrored(name: LandmarkName) -> None:
     assert shown.sum() >= 6
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("town", town_names())
 def test_landmarks_stand_on_no_road_and_no_footway(town: str) -> None:
     loaded = load_town(town)

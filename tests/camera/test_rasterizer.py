@@ -79,6 +79,7 @@ def rays_hit(view: View, mesh: Mesh) -> tuple[Array, NDArray[np.int64]]:
     return depth.reshape(shape), np.where(hit >= 0, facing[hit], SKY).reshape(shape)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(4))
 def test_pixels_see_what_rays_hit(seed: int) -> None:
     rng = np.random.default_rng(seed)

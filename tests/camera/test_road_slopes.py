@@ -50,6 +50,7 @@ def test_level_towns_have_no_slopes() -> None:
     assert rise_at(slopes, 0.0, 0.0, 0.0, 1.0, 0.0) == 0.0
 
 
+@pytest.mark.long
 def test_the_camera_is_fixed_to_a_car_on_a_slope() -> None:
     town = load_town("northgate")
     camera = SessionCamera(SessionScene(town_scene(town)), CameraConfig(width=16, height=16))

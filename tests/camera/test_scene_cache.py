@@ -56,6 +56,7 @@ def test_a_scene_is_built_once_and_read_again_in_equal_bytes(town: Town, builds:
     np.testing.assert_array_equal(again.ground.height_at(places), first.ground.height_at(places))
 
 
+@pytest.mark.long
 def test_an_altered_town_has_a_scene_of_its_own(town: Town, builds: list[str]) -> None:
     town_scene(town)
     lanes = [replace(lane, points=lane.points + (0.0, 0.0, 0.5)) for lane in town.lanes]
@@ -65,6 +66,7 @@ def test_an_altered_town_has_a_scene_of_its_own(town: Town, builds: list[str]) -
     assert len(builds) == 2
 
 
+@pytest.mark.long
 def test_a_damaged_entry_is_built_again(town: Town, builds: list[str], tmp_path: Path) -> None:
     town_scene(town)
     (entry,) = (tmp_path / "cache" / "scenes").glob("*.npz")
@@ -76,6 +78,7 @@ def test_a_damaged_entry_is_built_again(town: Town, builds: list[str], tmp_path:
     assert len(builds) == 2
 
 
+@pytest.mark.long
 def test_without_a_cache_folder_scenes_are_built(
     town: Town, builds: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -61,6 +61,7 @@ def footways(name: str) -> list[shapely.Polygon]:
     return [shapely.LineString(line).buffer(0.6) for line in lines]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TOWNS)
 def test_buildings_stand_on_no_road_pavement_footway_or_site(name: str) -> None:
     ground = shapely.STRtree([shapely.Polygon(building.outline) for building in buildings_of(name)])
@@ -119,6 +120,7 @@ def test_street_lamps_stand_beside_the_roads_and_shine_on_them(name: str) -> Non
     assert len(over) > 0.95 * len(places)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TOWNS)
 def test_each_light_of_the_map_has_three_lenses_with_its_signal(name: str) -> None:
     layers = layers_of(name)
@@ -263,6 +265,7 @@ def test_stamps_turn_and_scale_a_mesh_with_its_texture() -> None:
     assert mesh.colours[2].tolist() == [50, 100, 200]
 
 
+@pytest.mark.long
 def test_a_town_has_few_triangles_and_the_same_bytes_in_another_process() -> None:
     mesh = scenery_of("midtown").mesh
     assert 15_000 < mesh.size < 40_000

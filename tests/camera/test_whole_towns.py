@@ -194,6 +194,7 @@ def test_instances_are_the_bodies_that_rays_reach(name: str, count: int) -> None
     assert np.mean(same) >= 0.999
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "count"), TOWNS)
 def test_classes_of_the_ground_are_those_of_the_map_there(name: str, count: int) -> None:
     stage = stage_of(name)

@@ -212,6 +212,7 @@ def test_the_session_goes_on_without_a_person_where_the_rules_say_so() -> None:
     assert table.time == pytest.approx(5.0)
 
 
+@pytest.mark.long
 def test_a_script_takes_over_and_finishes_the_errands(tmp_path: Path) -> None:
     rules = AbsenceRules(seconds=2.0, then=AfterAbsence.SCRIPT)
     table = Table(

@@ -59,6 +59,7 @@ def until(socket: Any, wanted: str) -> dict[str, Any]:
             return message
 
 
+@pytest.mark.long
 def test_recording_is_recognised_said_kept_and_spoken_to_the_other(served: Served, tmp_path: Path) -> None:
     participant, driver = (served.room.seats[name] for name in ("participant", "co_wizard"))
     with served.connect(participant.token) as first, served.connect(driver.token) as second:

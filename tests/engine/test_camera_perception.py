@@ -233,6 +233,7 @@ print(found.hexdigest())
 """
 
 
+@pytest.mark.long
 def test_two_processes_observe_the_same_bytes() -> None:
     runs = [subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True) for _ in "ab"]
     assert runs[0].stdout == runs[1].stdout
@@ -249,6 +250,7 @@ def test_the_model_is_part_of_the_record_unless_it_is_the_usual_one() -> None:
     assert "perception" not in SYMBOLIC.record()
 
 
+@pytest.mark.long
 def test_a_session_without_it_does_not_import_the_camera() -> None:
     program = (
         "import sys; from dorothie_gym.engine.session_engine import SessionEngine; e = SessionEngine('brookside');"
@@ -276,6 +278,7 @@ def test_environments_take_it_by_name() -> None:
         assert env.observation_space(agent).contains(observations[agent])
 
 
+@pytest.mark.long
 def test_the_co_wizard_drives_by_itself_to_a_goal_that_it_recognises() -> None:
     engine, taken = SessionEngine(TOWN, config=EnvConfig(perception=PerceptionModel.CAMERA)), 0
     engine.reset(4)

@@ -12,6 +12,7 @@ from dorothie_gym.ontology import StreetName
 DRAWS = 1000
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", town_names())
 def test_every_seed_binds_storyboard_with_reachable_places(name: str) -> None:
     town = load_town(name)

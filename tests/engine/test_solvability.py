@@ -142,6 +142,7 @@ def play_session_at_random(seed: int, seconds: float) -> tuple[int, int]:
     return env.summary()["exceptions"], blocked
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 2, 4, 7, 8, 20])
 def test_session_with_random_actions_stays_solvable(seed: int) -> None:
     exceptions, blocked = play_session_at_random(seed, 10.0)

@@ -90,6 +90,7 @@ def test_sdn_layout_has_one_file_for_each_utterance(session: Session, tmp_path: 
     assert [move.recognised for move in again.all_moves] == [move.recognised for move in session.all_moves]
 
 
+@pytest.mark.long
 def test_copies_of_a_session_hear_the_same(tmp_path: Path) -> None:
     engine = SessionEngine(TOWN, config=CONFIG)
     policies = {role: player.make(role, engine.limits) for role, player in ALL_SCRIPTED.items()}

@@ -129,6 +129,7 @@ COPIES: dict[str, Callable[[Any], Any]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("by", COPIES)
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_copy_goes_on_as_the_original_does(name: str, by: str) -> None:
@@ -141,6 +142,7 @@ def test_copy_goes_on_as_the_original_does(name: str, by: str) -> None:
         assert_equal(player.play(steps), ahead, name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_environment_goes_back_to_a_state_any_number_of_times(name: str) -> None:
     player = Player(ENVIRONMENTS[name](), seed=3)

@@ -35,6 +35,7 @@ def play_in_a_process(folder: Path, hash_seed: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.long
 def test_two_processes_observe_and_record_the_same(tmp_path: Path) -> None:
     one = play_in_a_process(tmp_path / "one", "1")
     other = play_in_a_process(tmp_path / "other", "2")

@@ -179,6 +179,7 @@ def make_both(
     return batch, [Single(k, mode, town=towns[k % len(towns)], **arguments) for k in range(count)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 @pytest.mark.parametrize("choose", [Single.at_random, Single.by_script])
 def test_batch_is_equal_to_single_environments(mode: AutoresetMode, choose: Choose) -> None:
@@ -200,6 +201,7 @@ def test_towns_take_turns_and_worlds_may_grow() -> None:
 TINY = CameraConfig(width=24, height=16, outputs=tuple(CameraOutput))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_pictures_are_those_of_single_environments(mode: AutoresetMode) -> None:
     batch, singles = make_both(3, mode, towns=("brookside", "midtown"), config=EnvConfig(camera=TINY), max_cycles=8)

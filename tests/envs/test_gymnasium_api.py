@@ -25,6 +25,7 @@ def no_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", IDS)
 def test_gymnasium_accepts_it(name: str) -> None:
     check_env(make(name).unwrapped)  # its warnings are errors here

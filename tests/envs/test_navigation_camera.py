@@ -78,15 +78,18 @@ def test_other_observations_rewards_and_ends_are_those_of_vectors() -> None:
             break
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_batch_is_equal_to_single_environments(mode: AutoresetMode) -> None:
     assert play_both(NAVIGATION, mode, lambda rng: rng.integers(0, 18, 3), 90, threads=2, camera=TINY, **SHORT) >= 3
 
 
+@pytest.mark.long
 def test_batch_with_pedals_is_equal_to_single_environments() -> None:
     assert play_both(CONTINUOUS, AutoresetMode.SAME_STEP, pedals, 320, threads=2, camera=TINY, **SHORT) >= 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("settings", [{"guidance": "goals", "exceptions": 4.0}, {"town": "midtown"}])
 def test_settings_are_those_of_the_single_environment(settings: dict[str, Any]) -> None:
     """Weather and faulty sensors of the Ad-Wizard, and another town."""

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 EPISODE = """
 import hashlib
 import numpy as np
@@ -28,6 +30,7 @@ def run(disabled: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", EPISODE], env=environment, capture_output=True, text=True, cwd=root)
 
 
+@pytest.mark.long
 def test_episodes_are_the_same_bytes_compiled_and_in_plain_python() -> None:
     compiled, plain = run("0"), run("1")
     assert compiled.returncode == plain.returncode == 0, compiled.stderr + plain.stderr

@@ -239,6 +239,7 @@ def test_an_unknown_view_is_refused_with_the_known_ones() -> None:
         gym.make("dorothie_gym/Navigation-v0", render_view="windscreen")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["Navigation-v0", "Navigation-continuous-v0"])
 def test_batches_show_the_windscreens_of_their_environments(name: str) -> None:
     batch: Any = gym.make_vec(

@@ -31,6 +31,7 @@ def run(code: str, folder: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_the_first_example_runs(tmp_path: Path) -> None:
     assert run(example(""), tmp_path).splitlines()[0] == "True"
 

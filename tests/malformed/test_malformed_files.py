@@ -77,6 +77,7 @@ def test_every_kind_of_file_is_in_a_group() -> None:
     assert sorted(kind for group in GROUPS for kind in group) == sorted(SUBJECTS)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(0)
 @pytest.mark.parametrize("kinds", GROUPS, ids="-".join)
 def test_mutated_files_are_read_or_refused_in_one_line(kinds: tuple[str, ...], request: pytest.FixtureRequest) -> None:

@@ -102,6 +102,7 @@ def test_large_deep_and_recursive_files_are_refused(
     assert name in refusal(*command, tmp_path / name, *sessions)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("column", ["session", "slots"])
 def test_small_file_of_predictions_cannot_stand_for_gigabytes(column: str, tmp_path: Path) -> None:
     rows, long = 600, pa.array(["x" * 30_000_000])
@@ -219,6 +220,7 @@ def test_repeated_column_of_an_sdn_trajectory_is_refused(tmp_path: Path) -> None
     assert "trajectory.csv" in message and "choose from all" not in message
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["show", "stats", "replay", "transcript", "compare", "convert", "evaluate"])
 def test_commands_never_end_in_a_traceback_over_damaged_sessions(command: str, tmp_path: Path) -> None:
     for number in range(6):

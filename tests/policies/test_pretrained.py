@@ -79,6 +79,7 @@ def test_model_plays_the_co_wizard_by_name(name: str, tmp_path: Path) -> None:
     assert by_path.settings["sha256"] == result.settings["sha256"], "the hash covers the weights"
 
 
+@pytest.mark.long
 def test_masked_driver_completes_errands_that_driving_on_does_not(tmp_path: Path) -> None:
     pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
     learned, idle = (play(name, tmp_path / name, 4, 480.0) for name in ("pretrained:maskable-ppo", "lane-follow"))
@@ -100,6 +101,7 @@ def test_unknown_name_is_one_line_with_the_list() -> None:
         pretrained_folder("dqn")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("module", ["torch", "sb3_contrib"])
 def test_missing_library_is_one_line_that_names_the_extra(module: str) -> None:
     code = (

@@ -33,6 +33,7 @@ def cut_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["events.jsonl", "frames.journal"])
 def test_session_cut_off_at_any_byte_loads_up_to_the_last_complete_record(
     cut_off: Path, tmp_path: Path, name: str
@@ -100,6 +101,7 @@ def test_death_at_each_step_of_the_end_leaves_a_session(tmp_path: Path, monkeypa
     assert sorted(path.name for path in folder.iterdir()) == ["events.jsonl", "frames.parquet", "session.json"]
 
 
+@pytest.mark.long
 def test_killed_process_leaves_a_session_and_a_second_one_ends_in_the_same_bytes(tmp_path: Path) -> None:
     code = """
         import sys

@@ -44,6 +44,7 @@ def straight(index: int, length: float, y: float = 0.0, street: int = 0) -> Lane
     )
 
 
+@pytest.mark.long
 def test_every_street_is_named(sheet: MapPainter) -> None:
     assert {label.street for label in sheet.labels} == {street.id for street in sheet.town.streets}
     assert sheet.missing == ()

@@ -336,6 +336,7 @@ def test_a_lay_by_lies_beside_the_lane_at_a_site() -> None:
     assert colour_at(painter, (50.0, -3.0)) != palette.BAY
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["Town02", "Town05"])
 def test_no_ground_shows_through_the_junctions_of_imported_towns(name: str) -> None:
     file = MAPS / f"{name}.xodr"

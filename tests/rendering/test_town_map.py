@@ -184,6 +184,7 @@ def test_pictures_need_neither_display_nor_its_modules(tmp_path: Path) -> None:
     assert done.stdout == ""
 
 
+@pytest.mark.long
 def test_imported_town_with_an_overpass_is_painted(tmp_path: Path) -> None:
     file = MAPS / "Town05.xodr"
     if not file.exists():

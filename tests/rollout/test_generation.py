@@ -55,6 +55,7 @@ def test_missing_session_is_played_again_with_the_same_bytes(corpus: Path, tmp_p
     assert contents(corpus) == before
 
 
+@pytest.mark.long
 def test_corpus_with_word_errors_has_transcripts_and_says_so(tmp_path: Path) -> None:
     settings = EnvConfig(max_seconds=40.0, word_error_rate=0.4)
     process = begin(tmp_path / "one", sessions=2, seconds=40.0, workers=1, more={"word-errors": 0.4})
@@ -95,6 +96,7 @@ def test_run_killed_at_random_moments_gives_the_bytes_of_an_undisturbed_run(tmp_
     kill_again_and_again(tmp_path, times=6, sessions=6, seconds=60.0, longest=3.0)
 
 
+@pytest.mark.long
 def test_two_workers_make_the_same_bytes_and_ctrl_c_prints_how_to_resume(corpus: Path, tmp_path: Path) -> None:
     out = tmp_path / "two"
     process = begin(out, sessions=6, seconds=8, workers=2)

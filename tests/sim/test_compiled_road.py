@@ -225,6 +225,7 @@ print(hashlib.sha256(arrays.tobytes()).hexdigest())
 """
 
 
+@pytest.mark.long
 def test_a_world_with_a_guest_is_the_same_bytes_compiled_and_in_plain_python() -> None:
     told = []
     for disabled in ("0", "1"):

@@ -103,6 +103,7 @@ def digests():
         return dict(zip(("one", "other", "plain"), pool.map(run, "001", "121"), strict=True))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", ["traffic", "session"])
 def test_ten_seconds_are_the_same_bytes_compiled_and_in_plain_python(digests, what):
     assert digests["one"][what] == digests["plain"][what]

@@ -6,6 +6,7 @@ import gc
 import tracemalloc
 
 import numpy as np
+import pytest
 
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.population import populate
@@ -40,6 +41,7 @@ def traced(make: object, count: int) -> float:
         tracemalloc.stop()
 
 
+@pytest.mark.long
 def test_another_world_of_traffic_takes_less_than_48_kib() -> None:
     roads = network("northgate")
     arrays = town_arrays(roads)

@@ -58,6 +58,7 @@ def test_observation_without_a_road_is_zero() -> None:
     assert not env.observation_type.observe().any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("town", ["brookside", "northgate"])
 @pytest.mark.parametrize(
     "config",

@@ -46,6 +46,7 @@ def soak(name, *, minutes, seed, vehicles=60, pedestrians=40, strollers=20, ever
     return int(world.clock[0].collisions), int(world.clock[0].run_over)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["brookside", "millbrook", "midtown", "northgate", "Town02.xodr"])
 def test_no_body_gets_stuck_or_crashes_in_two_minutes(name):
     assert soak(name, minutes=2, seed=6, vehicles=40) == (0, 0)

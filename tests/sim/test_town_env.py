@@ -108,6 +108,7 @@ def parts(space: Any) -> list[Any]:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OBSERVATIONS)
 def test_all_observation_types_work(name: str) -> None:
     config, shape = OBSERVATIONS[name]

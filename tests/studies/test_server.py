@@ -171,6 +171,7 @@ def test_people_who_wait_in_vain_finish_with_another_code(tmp_path: Path) -> Non
         assert one.view["code"] == "WAITED"
 
 
+@pytest.mark.long
 def test_all_conditions_are_played_in_turn(tmp_path: Path) -> None:
     study = {
         **SOLO,
@@ -218,6 +219,7 @@ def test_a_script_takes_over_for_a_person_who_leaves(tmp_path: Path) -> None:
     assert exported(data, tmp_path / "out", "sessions")[0]["reason"] == "out of time"
 
 
+@pytest.mark.long
 def test_people_go_back_to_the_waiting_room_if_their_partner_does_not_come(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -48,6 +48,7 @@ def enter(person: Client) -> None:
     person.do("proceed", {"stage": "instructions"})
 
 
+@pytest.mark.long
 def test_what_people_say_is_recorded_exported_and_deleted(tmp_path: Path) -> None:
     data = tmp_path / "data"
     with ServedStudy(write_study(tmp_path, SPOKEN), data) as served:

@@ -33,10 +33,12 @@ def has_hidden(town: str, seed: int) -> bool:
     return any(landmark.hidden for landmark in draw_scenario(load_town(town), None, seed).storyboard.landmarks)
 
 
+@pytest.mark.long
 def test_pictures_and_what_is_seen_by_them_do_not_leak() -> None:
     check_observations_do_not_leak(DuoWizardEnv("brookside", config=CONFIG), seed=2, decisions=16)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("town", "config"),
     [("brookside", CONFIG), ("midtown", CONFIG), ("brookside", SYMBOLIC)],

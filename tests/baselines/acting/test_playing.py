@@ -48,6 +48,7 @@ def settings(folder: Path, seconds: float, observe_acts: bool = True) -> Rollout
     )
 
 
+@pytest.mark.long
 def test_two_rollouts_with_one_worker_or_two_give_the_same_bytes(folders: dict[str, Path], tmp_path: Path) -> None:
     plan = settings(folders["reader"], 30.0)
     result = roll_out(plan, tmp_path / "one")

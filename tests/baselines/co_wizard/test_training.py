@@ -44,6 +44,7 @@ def weights(folder):
     return {name: value.numpy().tobytes() for name, value in load_file(folder / "model.safetensors").items()}
 
 
+@pytest.mark.long
 def test_examples_have_the_lengths_that_the_network_takes(trained):
     lessons = load_file(next((trained / LESSONS).rglob("*.safetensors")))
     assert lessons["listening"].shape[1] == STATE_SIZE + KEPT * UTTERANCE_SIZE

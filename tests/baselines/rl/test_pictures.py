@@ -38,6 +38,7 @@ def settings_for(algorithm: str, **changes: Any) -> TrainingSettings:
     return TrainingSettings(algorithm=algorithm, **given)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("algorithm", "env"), [("maskable_ppo", NAVIGATION), ("ppo", CONTINUOUS)])
 def test_saved_model_acts_by_pictures(algorithm: str, env: str, tmp_path: Path) -> None:
     training = Training(settings_for(algorithm, env=env, steps=256), tmp_path)
@@ -53,6 +54,7 @@ def test_saved_model_acts_by_pictures(algorithm: str, env: str, tmp_path: Path) 
     assert picture.shape == (84, 84, 3)
 
 
+@pytest.mark.long
 def test_resumed_run_ends_like_an_undisturbed_one(tmp_path: Path) -> None:
     Training(settings_for("ppo"), tmp_path / "resumed").run()
     resumed = Training(settings_for("ppo", steps=256), tmp_path / "resumed")

@@ -76,6 +76,7 @@ def _objects(path: Path) -> list[str]:
     return text.splitlines() if path.suffix == ".jsonl" else [text]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("algorithm", sorted(ALGORITHMS))
 def test_interrupted_run_ends_as_an_undisturbed_one(
     algorithm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -94,6 +95,7 @@ def test_episodes_of_any_gymnasium_environment_are_resumed(tmp_path: Path, monke
     assert_same_run(tmp_path / "whole", tmp_path / "cut")
 
 
+@pytest.mark.long
 def test_run_with_worker_processes_is_resumed_in_this_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = settings_for("ppo", **POLE)
     Training(settings, tmp_path / "whole").run()

@@ -16,6 +16,7 @@ from dorothie_gym.errors import SettingsError
 KEYS = ("batch", "kernel", "single", "end_to_end", "stock")
 
 
+@pytest.mark.long
 def test_speeds_and_shares_of_a_training_on_a_batch() -> None:
     figures = measure(environments=4, steps=512)
     assert set(figures["shares"]) == set(SHARES)
@@ -42,6 +43,7 @@ def test_unknown_observation_is_refused() -> None:
     assert "observation is 'radar'; it must be one of vector, camera" in " ".join(result.stderr.split())
 
 
+@pytest.mark.long
 def test_other_environments_are_only_trained_on() -> None:
     figures = measure("dorothie_gym/CoWizard-v0", algorithm="a2c", environments=2, workers=0, steps=256)
     assert figures["batch_steps_per_second"] is None and figures["end_to_end_steps_per_second"] > 0.0

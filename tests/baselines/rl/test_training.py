@@ -187,6 +187,7 @@ def test_folder_with_another_run_is_refused(tmp_path: Path) -> None:
         Training(settings_for("ppo", seed=1), tmp_path)
 
 
+@pytest.mark.long
 def test_worker_processes_do_not_change_results() -> None:
     settings = settings_for("maskable_ppo", environments=3)
     here, there = (make_training_env(replace(settings, workers=workers)) for workers in (0, 2))

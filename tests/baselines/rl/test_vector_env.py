@@ -45,6 +45,7 @@ def test_index_out_of_range_is_refused(poles: ProcessVecEnv) -> None:
         poles.get_attr("name", indices=3)
 
 
+@pytest.mark.long
 def test_process_that_fails_to_start_is_reported() -> None:
     with pytest.raises(RuntimeError, match="died with code"):
         ProcessVecEnv(partial(gym.make, "NoSuch-v0"), environments=1, workers=1)

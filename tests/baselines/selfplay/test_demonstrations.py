@@ -49,6 +49,7 @@ def test_decisions_of_all_roles_are_read_from_sessions(corpus: Path) -> None:
     assert sum(count for macro, count in done[AD_WIZARD].items() if macro) >= 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shared", [False, True])
 def test_warm_start_clones_all_roles_and_is_evaluated_first(shared: bool, corpus: Path, tmp_path: Path) -> None:
     settings = SelfPlaySettings(
@@ -65,6 +66,7 @@ def test_warm_start_clones_all_roles_and_is_evaluated_first(shared: bool, corpus
     assert again.rows == run.rows  # a resumed run is not cloned again
 
 
+@pytest.mark.long
 def test_cloned_actor_is_frozen_at_first(corpus: Path, tmp_path: Path) -> None:
     settings = SelfPlaySettings(
         steps=16, environments=2, evaluate_every=16, episodes=1, network=(8,), traffic="none", max_seconds=10.0,

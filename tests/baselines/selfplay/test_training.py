@@ -74,6 +74,7 @@ def test_networks_learn_and_are_saved(shared: bool, tmp_path: Path, monkeypatch:
     assert not list(tmp_path.rglob("*.zip")) and not list(tmp_path.rglob("*.pkl"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shared", [False, True])
 def test_resumed_run_ends_with_the_same_weights(shared: bool, tmp_path: Path) -> None:
     settings = settings_for(shared=shared, max_seconds=5.0)
@@ -118,6 +119,7 @@ def fail_after(written: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dorothie_gym.files.os.replace", failing)
 
 
+@pytest.mark.long
 def test_worker_processes_do_not_change_the_weights(tmp_path: Path) -> None:
     more = {"steps": 64, "environments": 4, "coached_environments": 2}
     SelfPlayTraining(settings_for(**more), tmp_path / "here").run()

@@ -45,6 +45,7 @@ def long_training(tmp_path_factory):
     return run(tmp_path_factory.mktemp("long"), replace(TINY, epochs=40, learning_rate=4e-3, zoom=1.0))
 
 
+@pytest.mark.long
 def test_training_finds_cars(long_training):
     pictures, (trained, epochs) = frame_set(3, 4), long_training
     found, guessed = (

@@ -107,6 +107,7 @@ def test_boxes_in_space_contain_the_pixels_and_project_around_the_boxes(corpus, 
     assert compared > 5
 
 
+@pytest.mark.long
 def test_pictures_are_drawn_once_and_equal_in_other_processes(corpus, tmp_path, monkeypatch):
     here = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path / "here")["train"]
     there = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path / "there", workers=2)["train"]

@@ -41,6 +41,7 @@ def weights(model):
     return torch.cat([value.flatten().float() for value in model.state_dict().values()])
 
 
+@pytest.mark.long
 def test_training_learns_classes_and_depths(tmp_path):
     trained, epochs = run(tmp_path, replace(TINY, epochs=40, coarse=0.25))
     figures = pixel_scores(trained.model, frame_set(3)).figures()

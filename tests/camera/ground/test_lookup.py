@@ -99,6 +99,7 @@ def test_materials_around_a_point_are_those_of_the_corners(seed: int, count: int
     np.testing.assert_array_equal(out[differ], expected[differ])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["brookside", "midtown", "Town01", "Town05"])
 def test_ground_of_a_town_is_what_its_map_shows(name: str) -> None:
     town = load_town(name if name in town_names() else str(shared_map(name)))

@@ -51,6 +51,7 @@ def lane_points(town: Town, count: int) -> tuple[Array, Array]:
     return np.array(places), np.array([lane.heading_at(s) for lane, s in zip(lanes, stations.tolist(), strict=True)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TOWNS)
 def test_ground_has_no_gaps(name: str) -> None:
     rng = np.random.default_rng(2)
@@ -75,6 +76,7 @@ def test_road_is_as_high_as_its_lanes(name: str) -> None:
     assert away.max() < 0.3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [*TOWNS, "northgate"])
 def test_nothing_stands_in_the_way_of_a_car(name: str) -> None:
     places, headings = lane_points(town_of(name), 3000)
@@ -123,6 +125,7 @@ def test_pavements_of_a_sunken_road_are_level() -> None:
     assert level >= 0.97 * sunken  # a pavement may end at the wall beside the mouth of the tunnel
 
 
+@pytest.mark.long
 def test_pavements_continue_through_a_tunnel() -> None:
     ground, town = ground_of("midtown"), town_of("midtown")
     samples = TownSamples.of(town)

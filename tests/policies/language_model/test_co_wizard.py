@@ -34,6 +34,7 @@ def completed(sessions: int, first_seed: int, co_wizard: bool) -> tuple[int, int
     return reached, live, 60.0 * calls / seconds
 
 
+@pytest.mark.long
 def test_prompts_are_enough_to_complete_sessions() -> None:
     reached, live, rate = completed(4, 40, True)
     assert reached >= 0.75 * live

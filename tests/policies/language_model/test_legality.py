@@ -57,6 +57,7 @@ def forbidden(action: dict[str, Any], mask: dict[str, Any]) -> list[str]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("role", AGENT_ROLES)
 @pytest.mark.parametrize("town", ["brookside", "midtown"])
 def test_drawn_answers_are_allowed_and_carried_out(role: Role, town: str) -> None:

@@ -40,6 +40,7 @@ def test_sessions_are_kept_for_replay(folder: Path) -> None:
     assert {path.name for path in folder.iterdir()} == {"settings.json", "rollout.json", "cost.json", "sessions"}
 
 
+@pytest.mark.long
 def test_two_workers_write_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     roll_out(SETTINGS, tmp_path, workers=2)
     assert (tmp_path / "rollout.json").read_bytes() == (folder / "rollout.json").read_bytes()

@@ -328,6 +328,7 @@ print(digest.hexdigest(), hashlib.sha256(env.world(0).tobytes() + env.world(1).t
 """
 
 
+@pytest.mark.long
 def test_the_bytes_are_the_same_in_plain_python() -> None:
     runs = [
         subprocess.run(

@@ -28,6 +28,7 @@ def scan_at_height(network, position, heading, height):
     return found[int(np.argmin(distances))] if found else stock(network, position, heading)
 
 
+@pytest.mark.long
 def test_index_equals_highway_envs_scan(network):
     for position, heading, _ in places(network, 2000, seed=1):
         assert network.get_closest_lane_index(position) == stock(network, position, None)

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 SENSES = """
 import hashlib
 import numpy as np
@@ -39,6 +41,7 @@ def run(disabled: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.long
 def test_senses_are_the_same_bytes_compiled_and_in_plain_python() -> None:
     compiled, plain = run("0"), run("1")
     assert compiled.returncode == plain.returncode == 0, compiled.stderr + plain.stderr
