@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dorothie_gym.dialogue import Predicate
 from dorothie_gym.ontology import DialogueMove, GoalStatus
 from dorothie_gym.policies.participant.goals import announcement, choose_target, note_tasks, route_length
 from dorothie_gym.policies.participant.view import ParticipantView
@@ -23,7 +24,7 @@ def with_tasks(human: Human, **changes) -> ParticipantView:
 
 def keep_live_subgoals(human: Human) -> None:
     live = tuple(task for task in human.state.task.subgoals if task.live)
-    human.state.task = human.state.task.with_subgoals(live)
+    human.state.task = human.state.task.with_subgoals(live, str(human.view.raw["tasks"]))
 
 
 def another_task(human: Human):
@@ -75,7 +76,7 @@ def interrupted(seed: int) -> tuple[Human, object]:
     progress = human.state.route.progress
     progress = replace(progress, goal=(progress.goal[0], 1e5))
     subgoals = (replace(item, live=item.live and item.index != task.index) for item in human.state.task.subgoals)
-    human.state.task = human.state.task.with_subgoals(tuple(subgoals))
+    human.state.task = human.state.task.with_subgoals(tuple(subgoals), str(human.view.raw["tasks"]))
     left = progress.left(human.view.station)
     assert route_length(human.state, human.view, place) < max(left, 1e4)
     human.state.route = human.state.route.with_progress(Far(progress))
@@ -120,9 +121,41 @@ def test_changed_later_task_is_reported_with_both_names():
     remarks = []
     for seed in range(10):
         human.state.speech = human.state.speech.cleared()
-        human.state.task = human.state.task.with_subgoals(human.view.subgoals)
+        human.state.task = human.state.task.with_subgoals(human.view.subgoals, str(human.view.raw["tasks"]))
         keep_live_subgoals(human)
         note_tasks(human.state, view, np.random.default_rng(seed))
         remarks += planned(human)
     assert remarks
     assert all({place.name, other.name, GoalStatus.ABANDONED, GoalStatus.PENDING} == slots for _, slots in remarks)
+
+
+def with_line(human: Human, index: int, line: str) -> ParticipantView:
+    """Returns the view after a change of what a subgoal's line of the list says."""
+    lines = str(human.view.raw["tasks"]).split("\n")
+    live = [task.index for task in human.view.subgoals if task.live]
+    lines[live.index(index)] = line
+    return replace(human.view, raw={**human.view.raw, "tasks": "\n".join(lines)})
+
+
+def test_more_to_do_at_the_place_of_a_later_task_is_told_with_the_place_and_the_thing():
+    human = Human()
+    task, place = another_task(human)
+    view = with_line(human, task.index, "Buy a kite and a lantern there for Sana, because it is her birthday")
+    told = []
+    for seed in range(10):
+        human.state.speech = human.state.speech.cleared()
+        human.state.task = human.state.task.with_subgoals(human.view.subgoals, str(human.view.raw["tasks"]))
+        note_tasks(human.state, view, np.random.default_rng(seed))
+        told += [(item.act.slots, item.meaning) for item in human.state.speech.queue]
+    assert {place.name, GoalStatus.PENDING} <= told[0][0]
+    (more,) = told[1][1]
+    assert more.predicate is Predicate.PURPOSE and more.get("place") is place.name
+    assert "a kite" in str(more.get("item")) and "kite" in str(more.get("purpose"))
+
+
+def test_an_unchanged_list_is_not_told_again():
+    human = Human()
+    keep_live_subgoals(human)
+    human.state.speech = human.state.speech.cleared()
+    note_tasks(human.state, replace(human.view, subgoals=human.state.task.subgoals), human.rng)
+    assert planned(human) == []

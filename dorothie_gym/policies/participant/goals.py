@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -31,9 +32,9 @@ from dorothie_gym.tasks.purposes import Purpose, read_purposes
 
 def note_tasks(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Compares the subgoals with those of the last decision, and reports what has changed."""
-    before = state.task.subgoals
-    state.task = state.task.with_subgoals(view.subgoals)
-    for old, new in zip(before, view.subgoals, strict=False):
+    before, tasks = state.task, str(view.raw["tasks"])
+    state.task = state.task.with_subgoals(view.subgoals, tasks)
+    for old, new in zip(before.subgoals, view.subgoals, strict=False):
         if new.reached and not old.reached:
             state.feel(Happening.DONE, view.time)
             _report_done(state, view, new, rng)
@@ -43,6 +44,12 @@ def note_tasks(state: ParticipantState, view: ParticipantView, rng: np.random.Ge
             _report_dropped(state, view, old, rng)
         elif new.open and new.landmark != old.landmark:
             _report_changed(state, view, old, new, rng)
+        elif (
+            new.open
+            and tasks != before.listed
+            and _line_of(new, view.subgoals, tasks) != _line_of(old, before.subgoals, before.listed)
+        ):
+            _report_more(state, view, new, rng)
         if new.live is not old.live or (new.open and new.landmark != old.landmark):
             state.feel(Happening.CHANGED_TASK, view.time)
 
@@ -195,6 +202,31 @@ def _report_changed(
         state.say(intend(Function.REQUEST, instead, dropped, wording=Wording(dropped=former.name), urgent=True))
 
 
+def _line_of(subgoal: SeenSubgoal, subgoals: Sequence[SeenSubgoal], listed: str) -> str | None:
+    """Returns what the list of errands says of a subgoal; None if it is not on the list."""
+    live = (each.index for each in subgoals if each.live)
+    return dict(zip(live, listed.split("\n"), strict=False)).get(subgoal.index)
+
+
+def _report_more(
+    state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, rng: np.random.Generator
+) -> None:
+    """Tells what else is to be done at the target, or, by chance, at the place of a later errand."""
+    if subgoal.index == state.task.target:
+        state.say(*story_remark(state, view, rng))
+        return
+    landmark, purpose = view.landmark(subgoal.landmark), purpose_of(view, subgoal.index)
+    if landmark is None or purpose is None or purpose.action is None or rng.random() >= state.config.announces_ahead:
+        return
+    more = Proposition.of(
+        Predicate.PURPOSE, place=landmark.name, person=purpose.person, purpose=purpose.action,
+        item=purpose.items[0] if purpose.items else None,
+    )  # fmt: skip
+    state.task = state.task.after_telling(more)
+    later = intend(Function.REQUEST, contents.errand(landmark.name, GoalStatus.PENDING))
+    state.say(later, intend(Function.INFORM, more, elided=("place",), wording=Wording(topic="purpose"), joined=True))
+
+
 def _report_same_place(
     state: ParticipantState, view: ParticipantView, former: SeenLandmark, landmark: SeenLandmark,
     rng: np.random.Generator,
@@ -294,9 +326,13 @@ def _as_afterthought(item: Remark) -> Remark:
 
 def purpose_of_target(state: ParticipantState, view: ParticipantView) -> Purpose | None:
     """Returns the purpose of the target; None without a target, or if the list does not tell."""
+    return None if state.task.target is None else purpose_of(view, state.task.target)
+
+
+def purpose_of(view: ParticipantView, index: int) -> Purpose | None:
+    """Returns the purpose of a subgoal, by its index; None if the list does not tell."""
     live = [subgoal.index for subgoal in view.subgoals if subgoal.live]
-    purposes = read_purposes(str(view.raw["tasks"]))
-    return dict(zip(live, purposes, strict=False)).get(-1 if state.task.target is None else state.task.target)
+    return dict(zip(live, read_purposes(str(view.raw["tasks"])), strict=False)).get(index)
 
 
 def _say_announcement(

@@ -113,6 +113,7 @@ class TaskProgress:
 
     Attributes:
         subgoals: subgoals at the last decision.
+        listed: text of the list of errands at the last decision.
         target: index of the target.
         goal: landmark of the target.
         announced: whether the target has been announced to the car.
@@ -127,6 +128,7 @@ class TaskProgress:
     """
 
     subgoals: tuple[SeenSubgoal, ...] = ()
+    listed: str = ""
     target: int | None = None
     goal: SeenLandmark | None = None
     announced: bool = False
@@ -139,9 +141,9 @@ class TaskProgress:
     told: frozenset[Proposition] = frozenset()
     finished: tuple[LandmarkName | None, float] = (None, -math.inf)
 
-    def with_subgoals(self, subgoals: tuple[SeenSubgoal, ...]) -> TaskProgress:
-        """Sets the subgoals as observed."""
-        return replace(self, subgoals=subgoals)
+    def with_subgoals(self, subgoals: tuple[SeenSubgoal, ...], listed: str) -> TaskProgress:
+        """Sets the subgoals, and the text of their list, as observed."""
+        return replace(self, subgoals=subgoals, listed=listed)
 
     def with_target(self, index: int, goal: SeenLandmark) -> TaskProgress:
         """Sets the target."""
