@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.dialogue import Direction, Wording, understand, word_act
+from dorothie_gym.dialogue import Direction, Predicate, Wording, understand, word_act
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName
 
 MOVES = [DialogueMove(number) for number in range(1, 15) if number != DialogueMove.REPLY_N]
@@ -132,3 +132,14 @@ def test_generated_particulars_are_understood(faster, lights):
 @given(st.text(max_size=160))
 def test_any_text_is_parsed(text):
     assert understand(text).text == text
+
+
+def test_every_way_to_offer_a_detour_asks_for_consent_to_another_way():
+    rng = np.random.default_rng(0)
+    act = DialogueAct.of(DialogueMove.QUERY_YN)
+    texts = {word_act(act, Role.CO_WIZARD, rng, Wording(topic="detour")) for _ in range(80)}
+    assert len(texts) > 6
+    for text in texts:
+        asked = understand(text).asked
+        assert asked is not None and asked.predicate is Predicate.WILL, text
+    assert understand("should I go around the block?").asked is None
