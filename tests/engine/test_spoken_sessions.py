@@ -31,7 +31,7 @@ ALONE = WorldConfig(vehicles=0, pedestrians=0)
 CONFIG = EnvConfig(channel=ChannelKind.SPEECH, max_seconds=45.0, world=ALONE)
 
 
-def played(folder: Path, seed: int = 5) -> Session:
+def played(folder: Path, seed: int = 10) -> Session:
     engine = SessionEngine(TOWN, config=CONFIG)
     policies = {role: player.make(role, engine.limits) for role, player in ALL_SCRIPTED.items()}
     play_session(engine, policies, seed=seed, folder=folder)

@@ -170,8 +170,9 @@ def test_waiting_car_is_sent_on_but_not_from_the_goal() -> None:
     talk = Talk()
     talk.at(*talk.place)
     last = talk.route().legs[-1]
-    said = talk.at(last.lane, max(last.end - 20.0, last.start), waits=True)
-    assert said is not None and said.action is ActionValue.START and said.distance == pytest.approx(20.0)
+    place = max(last.end - 20.0, last.start)
+    said = talk.at(last.lane, place, waits=True)
+    assert said is not None and said.action is ActionValue.START and said.distance == pytest.approx(last.end - place)
     assert talk.at(last.lane, last.end - 1.0, waits=True, wait=60.0) is None
 
 
