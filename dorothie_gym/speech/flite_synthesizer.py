@@ -15,7 +15,7 @@ import numpy as np
 
 from dorothie_gym.errors import SpeechError, one_line
 from dorothie_gym.speech.audio import LONGEST, Samples, checked_samples
-from dorothie_gym.speech.synthesizer import check_request, chosen_voice
+from dorothie_gym.speech.synthesizer import check_request, check_script, chosen_voice
 
 _TIMEOUT: Final = 30.0
 """Time that the program may take [s]; a sentence takes less than 0.1 s."""
@@ -45,6 +45,7 @@ class FliteSynthesizer:
     def synthesize(self, text: str, *, voice: str = "", rate: float = 1.0, seed: int = 0) -> Samples:
         """Returns a spoken text; see `Synthesizer.synthesize`."""
         check_request(text, rate)
+        check_script(text, "flite")
         voice = chosen_voice(voice, self.voices, "flite")
         if not any(letter.isalnum() for letter in text):
             return np.empty(0, dtype=np.float32)

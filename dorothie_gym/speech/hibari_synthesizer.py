@@ -14,7 +14,7 @@ import numpy as np
 from dorothie_gym.errors import SpeechError
 from dorothie_gym.speech.audio import Samples, trimmed
 from dorothie_gym.speech.extras import speech_module
-from dorothie_gym.speech.synthesizer import check_request, chosen_voice
+from dorothie_gym.speech.synthesizer import check_request, check_script, chosen_voice
 
 VOICE: Final = "heart"
 """The voice in the package. Its others would be downloaded and are not offered."""
@@ -50,6 +50,7 @@ class HibariSynthesizer:
     def synthesize(self, text: str, *, voice: str = "", rate: float = 1.0, seed: int = 0) -> Samples:
         """Returns a spoken text; see `Synthesizer.synthesize`."""
         check_request(text, rate)
+        check_script(text, "hibari")
         chosen_voice(voice, self.voices, "hibari")
         if not any(letter.isalnum() for letter in text):
             return np.empty(0, dtype=np.float32)

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from dorothie_gym.errors import SpeechError
 from dorothie_gym.speech.audio import SAMPLE_RATE, Samples, checked_samples, resample, to_pcm
 from dorothie_gym.speech.extras import speech_module
 from dorothie_gym.speech.hibari_synthesizer import hibari
@@ -37,6 +38,8 @@ _SEARCHED: Final = 60
 _SCORE_SCALE: Final = 1000.0
 """Exponent of the decoder's path scores, which it returns compressed: their ratios are close to 1 otherwise."""
 
+_NO_MODEL: Final = "{path}: is missing or damaged; pip install --force-reinstall pocketsphinx"
+
 _HINT_BONUS: Final = 1.5
 """Factor on the weight of a hypothesis for each hinted name in it."""
 
@@ -48,24 +51,30 @@ class SphinxRecognizer:
         language: language model and dictionary; that of the sessions if None, built on the first use and cached.
 
     Raises:
-        SpeechError: the extra `speech` is not installed.
+        SpeechError: the extra `speech` is not installed, or the acoustic model is missing or damaged.
     """
 
     def __init__(self, language: SpokenLanguage | None = None) -> None:
         sphinx = speech_module("pocketsphinx")
         models = Path(str(sphinx.get_model_path())) / "en-us"
+        words = models / "cmudict-en-us.dict"
+        if not words.is_file():
+            raise SpeechError(_NO_MODEL.format(path=words))
         if language is None:
-            language = load_language(models / "cmudict-en-us.dict", _phonemes)
+            language = load_language(words, _phonemes)
         with tempfile.TemporaryDirectory(prefix="dorothie_gym.") as name:
             arpa, dictionary = Path(name) / "language.arpa", Path(name) / "words.dict"
             arpa.write_text(language.arpa, encoding="utf-8")
             dictionary.write_text(language.dictionary, encoding="utf-8")
-            self._decoder: Any = sphinx.Decoder(
-                hmm=str(models / "en-us"), lm=str(arpa), dict=str(dictionary), loglevel="FATAL",
-                # the second pass over the words of the first takes a third of the time and corrects nothing: on 120
-                # spans in the noise of the car, the word error rate is 5.1 % with it and 4.8 % without
-                fwdflat=False,
-            )  # fmt: skip
+            try:
+                self._decoder: Any = sphinx.Decoder(
+                    hmm=str(models / "en-us"), lm=str(arpa), dict=str(dictionary), loglevel="FATAL",
+                    # the second pass over the words of the first takes a third of the time and corrects nothing: on
+                    # 120 spans in the noise of the car, the word error rate is 5.1 % with it and 4.8 % without
+                    fwdflat=False,
+                )  # fmt: skip
+            except RuntimeError as error:  # it does not tell which file
+                raise SpeechError(_NO_MODEL.format(path=models / "en-us")) from error
 
     def recognize(self, samples: Samples, sample_rate: int, *, hints: Sequence[str] = ()) -> Recognition:
         """Returns the words of an audio; see `Recognizer.recognize`."""

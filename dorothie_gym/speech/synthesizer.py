@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -9,7 +10,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from dorothie_gym.copying import shared
-from dorothie_gym.errors import SpeechError, did_you_mean
+from dorothie_gym.errors import SpeechError, did_you_mean, short_repr
 from dorothie_gym.speech.audio import Samples
 
 SLOWEST, FASTEST = 0.5, 2.0
@@ -46,7 +47,8 @@ class Synthesizer(Protocol):
             Samples (n,), float32, full scale is 1; none for a text without words.
 
         Raises:
-            SpeechError: there is no such voice, or a program or server failed.
+            SpeechError: there is no such voice, the text is in a script that no voice reads, or a program or server
+                failed.
             ValueError: text or rate are out of range.
         """
         ...
@@ -83,6 +85,15 @@ def check_request(text: str, rate: float) -> None:
         raise ValueError(f"text has {len(text)} characters; at most {LONGEST_TEXT} are synthesised at once")
     if not SLOWEST <= rate <= FASTEST:
         raise ValueError(f"rate is {rate}; it must be in {SLOWEST}..{FASTEST}")
+
+
+def check_script(text: str, synthesizer: str) -> None:
+    """Raises `SpeechError` if a text has letters that are not Latin: English voices leave them out without a sound."""
+    foreign = next(
+        (c for c in unicodedata.normalize("NFKC", text) if c.isalpha() and "LATIN" not in unicodedata.name(c, "")), None
+    )
+    if foreign is not None:
+        raise SpeechError(f"{synthesizer} speaks English and has no voice for {foreign!r} in {short_repr(text)}")
 
 
 def chosen_voice(voice: str, voices: Sequence[str], synthesizer: str) -> str:
