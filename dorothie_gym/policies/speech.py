@@ -35,6 +35,9 @@ LONGEST_BREATH = 3
 MEMORY = 6
 """Number of the latest remarks that are remembered."""
 
+IN_A_ROW = 15.0
+"""Silence after which asking back no longer counts as asking again [s]."""
+
 _WANTS_ANSWER = frozenset(
     {DialogueMove.INSTRUCT, DialogueMove.ALIGN, DialogueMove.CHECK, DialogueMove.QUERY_YN, DialogueMove.QUERY_W}
 )
@@ -141,6 +144,7 @@ class SpeechState:
         other: last move of the other speaker, None at first.
         delivery: timing of the speech.
         reply_at: time before which no reply begins, unless it is urgent [s].
+        asked_back: number of times that the speaker has said in a row that the other was not understood.
     """
 
     role: Role
@@ -154,6 +158,7 @@ class SpeechState:
     other: DialogueMove | None = None
     delivery: Delivery = field(default_factory=Delivery)
     reply_at: float = -math.inf
+    asked_back: int = 0
 
     @property
     def idle(self) -> bool:
@@ -165,10 +170,9 @@ class SpeechState:
         """Returns whether the last remark said that the other speaker was not understood."""
         return self.last is not None and self.last.act.move is DialogueMove.CONFUSE
 
-    @property
-    def may_ask_back(self) -> bool:
-        """Returns whether the speaker may say that the other was not understood: not for the third time in a row."""
-        return any(item.act.move is not DialogueMove.CONFUSE for item in self.said[-2:]) or len(self.said) < 2
+    def may_ask_back(self, now: float) -> bool:
+        """Returns whether the speaker may say now [s] that the other was not understood: not the third time in a row."""
+        return self.asked_back < 2 or not self.has_just_spoken(now, IN_A_ROW)
 
     def has_just_spoken(self, now: float, within: float) -> bool:
         """Returns whether the last utterance ended no longer than `within` ago [s], or has not ended yet."""
@@ -277,7 +281,13 @@ class SpeechState:
             last=first,
             last_end=end,
             said=(*self.said[1 - MEMORY :], first),
+            asked_back=self._count_asking_back(first, now),
         )
+
+    def _count_asking_back(self, said: Remark, now: float) -> int:
+        if said.act.move is not DialogueMove.CONFUSE:
+            return 0
+        return (self.asked_back if self.has_just_spoken(now, IN_A_ROW) else 0) + 1
 
     def _punctuated(self, queue: Sequence[Remark], continues: bool) -> str:
         """Returns the words of the next remark with the capital and the comma that its neighbours want."""

@@ -10,7 +10,7 @@ from typing import Final
 
 from dorothie_gym.copying import shared
 from dorothie_gym.dialogue import INAUDIBLE, guess_act
-from dorothie_gym.ontology import DialogueAct, DialogueMove
+from dorothie_gym.ontology import DialogueAct, DialogueMove, SlotValue
 from dorothie_gym.speech.language import punctuation_model
 from dorothie_gym.speech.recognizer import Recognition, RecognizedWord
 from dorothie_gym.speech.spoken_form import written_form
@@ -21,6 +21,14 @@ are marked by it, of which 6 are wrong; two lost a value: one is marked, and of 
 
 SHORT: Final = 2
 """Number of words up to which every doubtful one matters; there is no context that would make up for it."""
+
+COMPARED: Final = 3
+"""Number of hypotheses that have to agree about the meaning of longer speech with doubtful words. Of 194 spans of 19
+sessions, most with errors, 9 lost a value; comparing three hypotheses marks 23 spans and finds 7 of the 9; all ten mark
+34 and find the same."""
+
+_UNNAMED: Final = frozenset({"Queried", "Unknown"})
+"""Values that are not lost if a word is: what is asked about follows from the rest of the question."""
 
 _SLIGHT: Final = frozenset(
     {"a", "ah", "an", "and", "er", "hey", "hm", "hmm", "oh", "of", "so", "the", "to", "uh", "um", "well", "yo"}
@@ -56,21 +64,20 @@ def readable(text: str) -> str:
 def audible(recognition: Recognition) -> str:
     """Returns the recognised words with `INAUDIBLE` in place of doubtful ones, where these may change the meaning.
 
-    They may if values of slots rest on them, if other hypotheses have further values, or if the speech is short.
-    Systems of spoken dialogue likewise reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial
-    2005).
+    They may if the best hypotheses name different values, or if the speech is short. Systems of spoken dialogue likewise
+    reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial 2005).
     """
     if not any(map(_is_doubtful, recognition.words)):
         return recognition.text
-    if len(recognition.words) > SHORT:
-        sure = " ".join(word.text for word in recognition.words if not _is_doubtful(word))
-        certain, *others = (
-            guess_act(readable(text)).slots for text in (sure, *(each.text for each in recognition.hypotheses))
-        )
-        if all(values <= certain for values in others):
-            return recognition.text
+    best = recognition.hypotheses[:COMPARED]
+    if len(recognition.words) > SHORT and len({_named_values(each.text) for each in best}) == 1:
+        return recognition.text
     marked = (INAUDIBLE if _is_doubtful(word) else word.text for word in recognition.words)
     return " ".join(word for text, run in groupby(marked) for word in ([text] if text == INAUDIBLE else run))
+
+
+def _named_values(text: str) -> frozenset[SlotValue]:
+    return frozenset(value for value in guess_act(readable(text)).slots if value.label not in _UNNAMED)
 
 
 def _is_doubtful(word: RecognizedWord) -> bool:

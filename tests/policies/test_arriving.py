@@ -183,3 +183,21 @@ def test_route_without_u_turn_has_no_run_up() -> None:
     human = Guide(10.0)
     assert human.state.route.progress is not None and human.state.route.progress.run_up() is None
     assert LaneEntry.U_TURN not in {leg.entry for leg in human.state.route.progress.legs}
+
+
+@pytest.mark.parametrize(("behind", "speed", "said"), [(6.0, 6.0, [ActionValue.STOP]), (6.0, 4.0, []), (18.0, 6.0, [])])
+def test_stop_that_is_not_heeded_is_repeated_shortly_behind_the_place(
+    behind: float, speed: float, said: list[ActionValue]
+) -> None:
+    human = Guide(4.0, 6.0)
+    human.state.style = replace(human.state.style, points_out=0.0)
+    assert human.says() == [ActionValue.STOP]
+    goal, progress = human.state.task.goal, human.state.route.progress
+    assert goal is not None and progress is not None
+    human.put(goal.lane, goal.station + behind, speed)
+    followed = progress.followed(human.env.town, goal.lane, goal.station + behind)
+    human.state.route = human.state.route.with_progress(followed)
+    human.state.motion = human.state.motion.with_speed(6.0)
+    human.state.speech = human.state.speech.cleared()
+    human.observation["time"] = human.observation["time"] + 4.5
+    assert human.says() == said

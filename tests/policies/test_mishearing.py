@@ -19,7 +19,7 @@ from dorothie_gym.ontology import (
 from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, note_contradiction
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.participant.replies import listen
-from dorothie_gym.policies.speech import remark
+from dorothie_gym.policies.speech import IN_A_ROW, remark
 from dorothie_gym.spaces import Speech
 from tests.policies.said import with_words
 from tests.policies.test_co_wizard import Talk
@@ -59,6 +59,17 @@ def test_inaudible_words_are_asked_for_again_twice_and_then_left() -> None:
     for asked in (1, 2, 2):
         says(talk, M.EXPLAIN, "it's better if we ... road", decisions=14)
         assert talk.moves().count(M.CONFUSE) == asked
+
+
+def test_inaudible_words_are_asked_for_again_after_a_silence() -> None:
+    talk = Talk()
+    says(talk, M.INSTRUCT, "to that place", talk.landmarks(hidden=False)[0].name, decisions=6)
+    speech = replace(talk.state.speech, asked_back=2, last_end=40.0)
+    assert not speech.may_ask_back(now=40.0 + IN_A_ROW - 0.1)
+    assert speech.may_ask_back(now=40.0 + IN_A_ROW)
+    talk.state.speech = replace(talk.state.speech, asked_back=2, last_end=-IN_A_ROW)
+    says(talk, M.EXPLAIN, "it's better if we ... road", decisions=14)
+    assert talk.moves().count(M.CONFUSE) == 1 and talk.state.speech.asked_back == 1
 
 
 def test_stop_is_obeyed_although_the_rest_is_inaudible() -> None:

@@ -3,6 +3,7 @@
 import hashlib
 import math
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -127,6 +128,11 @@ def heard(*words: tuple[str, float], others: Sequence[str] = ()) -> Recognition:
             "it's ... here",
         ),
         (heard(("it", 0.9), ("is", 0.1), ("raining", 0.9), others=("it was raining",)), "it is raining"),
+        (
+            heard(("turn", 0.1), ("left", 0.9), ("now", 0.9), others=("then left now", "stop left now")),
+            "... left now",
+        ),
+        (heard(("where", 0.1), ("to", 0.9), ("now", 0.9), others=("we're to now",)), "where to now"),
         (heard(("go", math.nan), ("left", math.nan)), "go left"),
         (Recognition(text=""), ""),
     ],
@@ -207,6 +213,16 @@ def test_unknown_names_and_wrong_requests_are_refused(audio: np.ndarray) -> None
     assert not len(find_synthesizer().synthesize("...", rate=SLOWEST))
 
 
+@pytest.mark.parametrize(
+    ("text", "letter"),
+    [("\u8bf7\u5de6\u8f6c", "\u8bf7"), ("Turn left, \u043d\u0430\u043b\u0435\u0432\u043e!", "\u043d")],
+)
+def test_text_in_another_script_is_refused(text: str, letter: str) -> None:
+    with pytest.raises(SpeechError, match=f"hibari speaks English and has no voice for {letter!r} in"):
+        find_synthesizer().synthesize(text)
+    assert len(find_synthesizer().synthesize("Zum Caf\u00e9 an der Stra\u00dfe, \u00bd mile \u2192")), "read as English"
+
+
 def test_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     from dorothie_gym.speech.sphinx_recognizer import SphinxRecognizer
 
@@ -221,3 +237,19 @@ def test_other_voice_model_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hibari_synthesizer, "MODEL_SHA256", "0" * 64)
     with pytest.raises(SpeechError, match=r"is not the model of hibari-tts 0\.2\.1"):
         hibari_synthesizer.HibariSynthesizer()
+
+
+def test_missing_and_damaged_acoustic_models_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import pocketsphinx
+
+    from dorothie_gym.speech.sphinx_recognizer import SphinxRecognizer
+
+    models = Path(pocketsphinx.get_model_path()) / "en-us"
+    monkeypatch.setattr(pocketsphinx, "get_model_path", lambda *_: str(tmp_path))
+    with pytest.raises(SpeechError, match=r"cmudict-en-us\.dict: is missing or damaged; pip install --force-reinstall"):
+        SphinxRecognizer()
+    (tmp_path / "en-us" / "en-us").mkdir(parents=True)
+    shutil.copy(models / "cmudict-en-us.dict", tmp_path / "en-us")
+    shutil.copy(models / "en-us" / "mdef", tmp_path / "en-us" / "en-us")
+    with pytest.raises(SpeechError, match=r"en-us/en-us: is missing or damaged; pip install --force-reinstall pocket"):
+        SphinxRecognizer()

@@ -21,10 +21,10 @@ def is_garbled(words: ParsedText) -> bool:
     return len(words.text.split()) <= FRAGMENT
 
 
-def is_unclear(state: CoWizardState, heard: HeardUtterance) -> bool:
+def is_unclear(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) -> bool:
     """Returns whether the participant is to say again what was partly inaudible; never a stop, which cannot wait."""
     stops = any(ActionValue.STOP in act.values(Slot.ACTION) for act in heard.acts)
-    return is_partly_inaudible(heard.words.text) and not stops and state.speech.may_ask_back
+    return is_partly_inaudible(heard.words.text) and not stops and state.speech.may_ask_back(view.time)
 
 
 def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:

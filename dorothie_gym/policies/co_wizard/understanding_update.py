@@ -77,7 +77,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
     state.speech = state.speech.without_told(heard.words.told)
     before = () if done else _still_due(state)
     state.speech = state.speech.cleared()
-    unclear = is_unclear(state, heard)
+    unclear = is_unclear(state, view, heard)
     if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
         do_stop(state, view, heard.acts[0], heard.words)
     if unclear or _mishears(state, heard, rng):

@@ -31,6 +31,9 @@ STOP_REPEAT = 5.0
 REACTION = 1.8
 """Time in which a car that has heard an instruction to stop begins to brake [s]."""
 
+PASSED = 15.0
+"""Distance behind the place up to which a stop instruction that is not heeded is repeated [m]."""
+
 BRAKING = 0.2
 """Loss of speed within a decision that shows that the car brakes [m/s]."""
 
@@ -89,7 +92,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
         shortest = min(options, key=state.speech.delivery.seconds)
         state.guidance = state.guidance.with_stop_text(shortest)
     if _is_time_to_stop(state, view, left):
-        if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > 0.0:
+        if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > _last_stop(state, view):
             words, points_out = state.guidance.stop_text, state.guidance.points_out
             state.guidance = state.guidance.after_stopping(view.time)
             stop = _here(state) if points_out else order(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
@@ -124,6 +127,12 @@ def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
     """Returns the time after which the stop instruction is repeated [s]: soon if the car does not brake."""
     heeded = view.speed < state.motion.speed - BRAKING
     return STOP_REPEAT if heeded else state.speech.delivery.seconds(state.guidance.stop_said) + REACTION
+
+
+def _last_stop(state: ParticipantState, view: ParticipantView) -> float:
+    """Returns the distance to the place down to which the car is told to stop [m]; negative behind it."""
+    unheeded = view.time - state.guidance.stopped_at < STOP_REPEAT and view.speed >= state.motion.speed - BRAKING
+    return -PASSED if unheeded else 0.0
 
 
 def _announce_place(

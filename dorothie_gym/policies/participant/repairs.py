@@ -30,7 +30,7 @@ def has_missed(state: ParticipantState, view: ParticipantView, heard: HeardUtter
         heard: utterance of the car.
         rng: random generator of the decision.
     """
-    if is_partly_inaudible(heard.words.text) and state.speech.may_ask_back:
+    if is_partly_inaudible(heard.words.text) and state.speech.may_ask_back(view.time):
         state.say_first(intend(CommunicativeFunction.NEGATIVE_FEEDBACK))
         return True
     if heard.acts[0].move is DialogueMove.CLARIFY:
