@@ -171,7 +171,11 @@ class SpeechState:
         return self.last is not None and self.last.act.move is DialogueMove.CONFUSE
 
     def may_ask_back(self, now: float) -> bool:
-        """Returns whether the speaker may say now [s] that the other was not understood: not the third time in a row."""
+        """Returns whether the speaker may say that the other was not understood: not for the third time in a row.
+
+        Args:
+            now: time [s].
+        """
         return self.asked_back < 2 or not self.has_just_spoken(now, IN_A_ROW)
 
     def has_just_spoken(self, now: float, within: float) -> bool:

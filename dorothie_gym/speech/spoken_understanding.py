@@ -64,8 +64,8 @@ def readable(text: str) -> str:
 def audible(recognition: Recognition) -> str:
     """Returns the recognised words with `INAUDIBLE` in place of doubtful ones, where these may change the meaning.
 
-    They may if the best hypotheses name different values, or if the speech is short. Systems of spoken dialogue likewise
-    reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial 2005).
+    They may if the best hypotheses name different values, or if the speech is short. Systems of spoken dialogue
+    likewise reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial 2005).
     """
     if not any(map(_is_doubtful, recognition.words)):
         return recognition.text

@@ -92,7 +92,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
         shortest = min(options, key=state.speech.delivery.seconds)
         state.guidance = state.guidance.with_stop_text(shortest)
     if _is_time_to_stop(state, view, left):
-        if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > _last_stop(state, view):
+        if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > 0.0:
             words, points_out = state.guidance.stop_text, state.guidance.points_out
             state.guidance = state.guidance.after_stopping(view.time)
             stop = _here(state) if points_out else order(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
@@ -101,6 +101,16 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     if close and not state.guidance.approach_announced and view.speed > config.slow_speed:
         _announce_place(state, view, left, rng)
     return close
+
+
+def repeat_stop(state: ParticipantState, view: ParticipantView) -> None:
+    """Repeats a stop instruction to a car that has not heeded it and drives past the place."""
+    progress, since = state.route.progress, view.time - state.guidance.stopped_at
+    assert progress is not None
+    unheeded = _stop_repeat(state, view) < since < STOP_REPEAT and not view.standing
+    if unheeded and -PASSED < progress.left(view.station) <= 0.0 and state.speech.idle and view.speaking <= 0.0:
+        state.guidance = state.guidance.after_stopping(view.time)
+        state.say(order(DialogueMove.CLARIFY, ActionValue.STOP, urgent=True))
 
 
 def _choose_stop_words(state: ParticipantState, rng: np.random.Generator) -> None:
@@ -127,12 +137,6 @@ def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
     """Returns the time after which the stop instruction is repeated [s]: soon if the car does not brake."""
     heeded = view.speed < state.motion.speed - BRAKING
     return STOP_REPEAT if heeded else state.speech.delivery.seconds(state.guidance.stop_said) + REACTION
-
-
-def _last_stop(state: ParticipantState, view: ParticipantView) -> float:
-    """Returns the distance to the place down to which the car is told to stop [m]; negative behind it."""
-    unheeded = view.time - state.guidance.stopped_at < STOP_REPEAT and view.speed >= state.motion.speed - BRAKING
-    return -PASSED if unheeded else 0.0
 
 
 def _announce_place(

@@ -20,7 +20,7 @@ from dorothie_gym.ontology import ActionValue, DialogueMove, Role, Slot, StreetN
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import street_of
-from dorothie_gym.policies.participant.arriving import about_to_arrive, approach
+from dorothie_gym.policies.participant.arriving import about_to_arrive, approach, repeat_stop
 from dorothie_gym.policies.participant.hints import hint
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import (
@@ -72,7 +72,8 @@ def follow_route(state: ParticipantState, view: ParticipantView) -> None:
             state.route = state.route.after_miss(state.town, view.place, former)
             remark_on_miss(state, view, passed=drove_past)
         state.guidance = state.guidance.for_another_approach()
-        _point_out_wrong_turn(state, view, before)
+        if not drove_past:
+            _point_out_wrong_turn(state, view, before)
         assert state.route.progress is not None
         if drove_past and not state.guidance.guiding:
             # the car has not been told yet that it is there
@@ -130,7 +131,7 @@ def watch(state: ParticipantState, view: ParticipantView) -> None:
 def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Gives the next step if it is due."""
     progress, config = state.route.progress, state.config
-    if progress is None or not state.task.announced or view.turning or progress.astray:
+    if progress is None or not state.task.announced or view.turning or _is_astray(state, view):
         return
     stop_circling(state, view)
     if not _may_speak(state, view) or approach(state, view, rng) or not state.guidance.guiding:
@@ -169,6 +170,14 @@ def guide(state: ParticipantState, view: ParticipantView, rng: np.random.Generat
             words = replace(words, wording=replace(words.wording, topic="indirect"))
         note_step(state, view, key)
         state.say(*_with_addition(state, view, words, again, rng))
+
+
+def _is_astray(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether the car is off the route; where it drives past the place, repeats the stop first."""
+    astray = state.route.progress is not None and state.route.progress.astray > 0
+    if astray:
+        repeat_stop(state, view)
+    return astray
 
 
 def _may_speak(state: ParticipantState, view: ParticipantView) -> bool:
