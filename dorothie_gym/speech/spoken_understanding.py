@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
 
 from dorothie_gym.copying import shared
 from dorothie_gym.dialogue import INAUDIBLE, guess_act
-from dorothie_gym.ontology import DialogueAct, DialogueMove, SlotValue
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, SlotValue
 from dorothie_gym.speech.language import punctuation_model
 from dorothie_gym.speech.recognizer import Recognition, RecognizedWord
 from dorothie_gym.speech.spoken_form import written_form
@@ -64,13 +65,16 @@ def readable(text: str) -> str:
 def audible(recognition: Recognition) -> str:
     """Returns the recognised words with `INAUDIBLE` in place of doubtful ones, where these may change the meaning.
 
-    They may if the best hypotheses name different values, or if the speech is short. Systems of spoken dialogue
-    likewise reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial 2005).
+    They may if the best hypotheses name different values, or if the speech is short. Short speech without a command is
+    inaudible, however sure, if one of the best hypotheses is a stop ("great", "brake"): a stop must not be missed.
+    Systems of spoken dialogue likewise reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial
+    2005).
     """
-    if not any(map(_is_doubtful, recognition.words)):
-        return recognition.text
-    best = recognition.hypotheses[:COMPARED]
-    if len(recognition.words) > SHORT and len({_named_values(each.text) for each in best}) == 1:
+    short = len(recognition.words) <= SHORT
+    meanings = [_named_values(each.text) for each in recognition.hypotheses[:COMPARED]]
+    if short and recognition.words and _may_be_stop(meanings):
+        return INAUDIBLE
+    if not any(map(_is_doubtful, recognition.words)) or (not short and len(set(meanings)) == 1):
         return recognition.text
     marked = (INAUDIBLE if _is_doubtful(word) else word.text for word in recognition.words)
     return " ".join(word for text, run in groupby(marked) for word in ([text] if text == INAUDIBLE else run))
@@ -78,6 +82,12 @@ def audible(recognition: Recognition) -> str:
 
 def _named_values(text: str) -> frozenset[SlotValue]:
     return frozenset(value for value in guess_act(readable(text)).slots if value.label not in _UNNAMED)
+
+
+def _may_be_stop(meanings: Sequence[frozenset[SlotValue]]) -> bool:
+    """Returns whether the first meaning has no action and another one is a stop."""
+    commands = any(isinstance(value, ActionValue) for value in meanings[0])
+    return not commands and any(ActionValue.STOP in values for values in meanings[1:])
 
 
 def _is_doubtful(word: RecognizedWord) -> bool:
