@@ -1,6 +1,7 @@
 """Sessions in which talk is synthesised, mixed with noise and recognised."""
 
 import copy
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,8 +32,8 @@ ALONE = WorldConfig(vehicles=0, pedestrians=0)
 CONFIG = EnvConfig(channel=ChannelKind.SPEECH, max_seconds=45.0, world=ALONE)
 
 
-def played(folder: Path, seed: int = 10) -> Session:
-    engine = SessionEngine(TOWN, config=CONFIG)
+def played(folder: Path, seed: int = 10, seconds: float = 45.0) -> Session:
+    engine = SessionEngine(TOWN, config=replace(CONFIG, max_seconds=seconds))
     policies = {role: player.make(role, engine.limits) for role, player in ALL_SCRIPTED.items()}
     play_session(engine, policies, seed=seed, folder=folder)
     return Session.load(folder)
@@ -41,6 +42,21 @@ def played(folder: Path, seed: int = 10) -> Session:
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
     return played(tmp_path_factory.mktemp("spoken") / "session")
+
+
+def test_session_is_spoken_without_a_socket(tmp_path: Path) -> None:
+    events: list[str] = []
+    watching = True
+
+    def watch(event: str, _: tuple[object, ...]) -> None:  # an audit hook stays until the process ends
+        if watching and event.startswith(("socket.", "open")):
+            events.append(event)
+
+    sys.addaudithook(watch)
+    again = played(tmp_path / "again", seconds=12.0)
+    watching = False
+    assert again.audio and "open" in events, "the hook sees what is opened"
+    assert not [event for event in events if event.startswith("socket.")]
 
 
 def test_every_span_has_its_audio_as_long_as_the_utterance(session: Session) -> None:
