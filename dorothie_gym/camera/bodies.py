@@ -11,9 +11,12 @@ from dorothie_gym.camera.cells import is_hidden, is_in_view
 from dorothie_gym.camera.mesh import PLAIN, Mesh
 from dorothie_gym.camera.models.model_bank import PlacementRecord
 from dorothie_gym.camera.pose import View
+from dorothie_gym.camera.rasterizer import BEHIND
 from dorothie_gym.compilation import concurrent, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.model import Array
+
+_ROUNDED = 0.01  # [m] more than rounding moves the plane of a triangle
 
 
 @concurrent
@@ -21,7 +24,9 @@ def copy_bodies(
     view: View, tiles: NDArray[np.float32], bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32],
     bodies: RecordArray[PlacementRecord], box: Array, target: Mesh,
 ) -> int:  # fmt: skip
-    """Writes the triangles of the bodies that may be seen; returns their number, larger than there is room if need be.
+    """Writes the triangles of bodies that may be seen; returns their number, or one larger than the room if need be.
+
+    Triangles that are seen from behind are left out.
 
     Args:
         view: projection.
@@ -41,8 +46,10 @@ def copy_bodies(
             first, last = ranges[body.model, 0], ranges[body.model, 1]
             if count + last - first <= room:
                 for row in range(first, last):
-                    _copy(bank, row, body, target, count + row - first)
-            count += last - first
+                    if _copy(view, bank, row, body, target, count):
+                        count += 1
+            else:
+                count += last - first
     return count
 
 
@@ -58,8 +65,16 @@ def surround(body: PlacementRecord, model: NDArray[np.float32], box: Array) -> N
 
 
 @inlined
-def _copy(bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) -> None:
+def _copy(view: View, bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) -> bool:
+    """Writes a triangle, unless it is seen from behind; returns whether it is not."""
     c, s = body.cos, body.sin
+    if body.rise == 0.0:  # a quick look in the frame of the model
+        x, y = view.origin[0] - body.x, view.origin[1] - body.y
+        offset = bank.normals[row, 0] * (bank.corners[row, 0, 0] - x * c - y * s)
+        offset += bank.normals[row, 1] * (bank.corners[row, 0, 1] + x * s - y * c)
+        offset += bank.normals[row, 2] * (bank.corners[row, 0, 2] + body.z - view.origin[2])
+        if offset > _ROUNDED:
+            return False
     for j in range(3):
         x, y = bank.corners[row, j, 0], bank.corners[row, j, 1]
         target.corners[at, j, 0] = body.x + x * c - y * s
@@ -68,6 +83,11 @@ def _copy(bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) ->
     _turn(bank.normals[row], c, s, body.rise, target.normals[at])
     if body.rise != 0.0:
         _shorten(target.normals[at])
+    offset = 0.0
+    for j in range(3):
+        offset += float(target.normals[at, j]) * (float(target.corners[at, 0, j]) - view.origin[j])
+    if offset >= BEHIND:
+        return False
     for j in range(3):
         for k in range(3):
             target.components[3 * j + k, at] = target.corners[at, j, k]
@@ -80,6 +100,7 @@ def _copy(bank: Mesh, row: int, body: PlacementRecord, target: Mesh, at: int) ->
         target.colours[at, j] = bank.colours[row, j]
     target.textures[at], target.surfaces[at] = bank.textures[row], bank.surfaces[row]
     target.classes[at], target.instances[at] = bank.classes[row], body.key
+    return True
 
 
 @inlined

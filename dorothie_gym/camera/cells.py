@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.pose import View
-from dorothie_gym.camera.rasterizer import NEAR, VisibilityBuffer, draw_triangles
+from dorothie_gym.camera.rasterizer import NEAR, VisibilityBuffer, collect_triangles, draw_collected
 from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
@@ -133,13 +133,14 @@ def _draw_ring(
     tiles: NDArray[np.float32], ring: int, number: int,
 ) -> int:  # fmt: skip
     """Draws the cells of one distance."""
-    drawn = 0
+    drawn, found = 0, 0
     for k in range(scratch.rings[ring], scratch.rings[ring + 1]):
         cell = scratch.order[k]
         if not is_hidden(view, tiles, cells.low[cell], cells.high[cell]):
             first, last = cells.ranges[cell, 0], cells.ranges[cell, 1]
-            draw_triangles(view, buffer, mesh, first, last, number + first)
+            found = collect_triangles(view, buffer, mesh, first, last, found, number)
             drawn += last - first
+    draw_collected(view, buffer, mesh, found, number)
     return drawn
 
 

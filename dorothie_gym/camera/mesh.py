@@ -22,6 +22,9 @@ from dorothie_gym.ontology import ObjectClass
 PLAIN = 0
 """Index of the texture without a pattern."""
 
+PADDING = 8
+"""Columns of `Mesh.components` behind the last triangle, so that vectors of the processor may end there."""
+
 TOWN = 0
 """Instance of triangles that belong to no body."""
 
@@ -57,8 +60,8 @@ class Mesh(NamedTuple):
         surfaces: (n,) uint8 `Surface`.
         classes: (n,) uint8 semantic class, `ObjectClass`.
         instances: (n,) int32 key of the body, `TOWN` for none.
-        components: (12, n) float32 corners and normals again, one row for each component, which the projection reads:
-            neighbours in memory become vectors of the processor.
+        components: (12, n + PADDING) float32 corners and normals again, one row for each component, which the
+            projection reads: neighbours in memory become vectors of the processor.
     """
 
     corners: NDArray[np.float32]
@@ -86,8 +89,9 @@ def new_mesh(*columns: NDArray[Any]) -> Mesh:
     """Returns a mesh of all columns of `Mesh` but its components."""
     corners, normals, *others = columns
     count = len(corners)
-    components = np.concatenate((corners.reshape(count, 9), normals), axis=1).T
-    return Mesh._make((corners, normals, *others, np.ascontiguousarray(components)))
+    components = np.zeros((12, count + PADDING), np.float32)
+    components[:9, :count], components[9:, :count] = corners.reshape(count, 9).T, normals.T
+    return Mesh._make((corners, normals, *others, components))
 
 
 def empty_mesh(count: int = 0) -> Mesh:
