@@ -42,6 +42,7 @@ _TILES = 8  # tiles along each side of the map; a power of two
 _SIDE = _TILE * _TILES
 _WRAP = _SIDE - 1
 _BODIES = 512  # width of the map of bodies [squares]
+_PARTS = 64  # parts of the map of bodies that are emptied one by one; with more of them, all of it is
 _NOTHING = -32768
 _LINE_BELOW = 10.0  # [1/50 m] by which the line of a narrow triangle lies below it: it lights the triangle itself
 _BESIDE = 3.0 * TEXEL  # [m] around a shadow that squares of the map and their mixture darken at most
@@ -56,6 +57,8 @@ class ShadowMaps(NamedTuple):
         town: (n, n) int16 heights [1/50 m], tiles side by side, each at its place modulo their number.
         held: (t, t, 2) int32 place of the tile that is held.
         bodies: (m, m) int16 heights.
+        drawn: (k, 4) int64 parts of the map of bodies that were drawn to: columns and rows, first and behind the last.
+        parts: (1,) int64 number of those parts.
         slope: (2,) shift towards the sun per metre of height [1].
         window: (4,) int64: first square in x and y of the map of the town, and of that of bodies.
         strength: (1,) 1 with shadows, 0 without.
@@ -65,6 +68,8 @@ class ShadowMaps(NamedTuple):
     town: NDArray[np.int16]
     held: NDArray[np.int32]
     bodies: NDArray[np.int16]
+    drawn: NDArray[np.int64]
+    parts: NDArray[np.int64]
     slope: Array
     window: NDArray[np.int64]
     strength: Array
@@ -76,8 +81,8 @@ def new_shadow_maps(*, enabled: bool = True) -> ShadowMaps:
     side, bodies = (_SIDE, _BODIES) if enabled else (1, 1)
     return ShadowMaps(
         np.full((side, side), _NOTHING, np.int16), np.full((_TILES, _TILES, 2), np.iinfo(np.int32).min, np.int32),
-        np.full((bodies, bodies), _NOTHING, np.int16), np.zeros(2), np.zeros(4, np.int64), np.zeros(1),
-        np.zeros((3, 3)),
+        np.full((bodies, bodies), _NOTHING, np.int16), np.zeros((_PARTS, 4), np.int64), np.zeros(1, np.int64),
+        np.zeros(2), np.zeros(4, np.int64), np.zeros(1), np.zeros((3, 3)),
     )  # fmt: skip
 
 
@@ -187,16 +192,44 @@ def _draw_bodies(
 ) -> None:  # fmt: skip
     """Draws the map of bodies, those near its middle whose shadows may be seen on surfaces from a height on [m]."""
     squares = maps.bodies[0:_BODIES, 0:_BODIES]  # a part, as tiles are: `_cast` is compiled once
-    first, reach = maps.window, 0.5 * _BODIES * TEXEL
-    for y in range(_BODIES):
-        _empty(maps.bodies[y])
+    first, reach, box = maps.window, 0.5 * _BODIES * TEXEL, maps.corners
+    _empty_bodies(maps)
     for k in range(len(bodies)):
         body = bodies[k]
         across = abs(body.x - maps.slope[0] * body.z - first[2] * TEXEL - reach)
         down = abs(body.y - maps.slope[1] * body.z - first[3] * TEXEL - reach)
         if max(across, down) < reach and _is_shadow_in_view(view, maps, body, boxes[body.model], lowest):
+            surround(body, boxes[body.model], box)
+            _note_part(maps, box)
             for j in range(ranges[body.model, 0], ranges[body.model, 1]):
                 _cast(maps, squares, bank, j, first[2], first[3], body.x, body.y, body.z, body.cos, body.sin)
+
+
+@inlined
+def _empty_bodies(maps: ShadowMaps) -> None:
+    """Empties the map of bodies: most of it is empty anyway."""
+    if maps.parts[0] > _PARTS:
+        for y in range(_BODIES):
+            _empty(maps.bodies[y])
+    else:
+        for k in range(maps.parts[0]):
+            left, right, top, bottom = maps.drawn[k, 0], maps.drawn[k, 1], maps.drawn[k, 2], maps.drawn[k, 3]
+            for y in range(top, bottom):
+                _empty(maps.bodies[y, left:right])
+    maps.parts[0] = 0
+
+
+@inlined
+def _note_part(maps: ShadowMaps, box: Array) -> None:
+    """Notes the part of the map of bodies where the shadow of a box (2, 3) [m] falls, and a little more."""
+    if maps.parts[0] < _PARTS:
+        for axis in range(2):
+            low, high = maps.slope[axis] * box[0, 2], maps.slope[axis] * box[1, 2]
+            first = (box[0, axis] - max(low, high)) / TEXEL - maps.window[2 + axis] - 2.0
+            last = (box[1, axis] - min(low, high)) / TEXEL - maps.window[2 + axis] + 2.0
+            maps.drawn[maps.parts[0], 2 * axis] = int(min(max(first, 0.0), float(_BODIES)))
+            maps.drawn[maps.parts[0], 2 * axis + 1] = int(min(max(last, 0.0), float(_BODIES)))
+    maps.parts[0] += 1
 
 
 @inlined
