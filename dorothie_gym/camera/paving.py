@@ -15,11 +15,20 @@ from dorothie_gym.camera.ground.colours import (
     SHARP,
     colour_at,
     grain_weight,
+    mean_look,
     noise_at,
     noise_place,
     patch_weight,
 )  # fmt: skip
-from dorothie_gym.camera.ground.lookup import PARTS, SEVERAL, GroundArrays, material_of_square, part_at, part_of
+from dorothie_gym.camera.ground.lookup import (
+    PARTS,
+    SEVERAL,
+    GroundArrays,
+    material_of_square,
+    materials_between,
+    part_at,
+    part_of,
+)  # fmt: skip
 from dorothie_gym.camera.mesh import Surface
 from dorothie_gym.camera.optics import Optics
 from dorothie_gym.camera.samples import (
@@ -50,11 +59,12 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 
 _GROUND = int(Surface.GROUND)
+_DONE = -1  # instead of a material: the colour has been written
 
 
 @compiled
 def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Face, first: int, count: int) -> None:
-    """Writes colours and surfaces of samples from `first` on that see the present triangle, which is ground."""
+    """Writes colours and surfaces of samples from `first` on that see a triangle of the ground."""
     values, places, sheet = samples.values[first:], samples.indices[first:], face.kind[1]
     _place_ground(optics, ground, values, places, face, count)
     samples.surfaces[first : first + count] = _GROUND
@@ -69,11 +79,11 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
                 if width <= SHARP:
                     material = material_of_square(ground, sheet, place)
                 elif width <= BLENDED:
-                    material = _common_material(ground, sheet, values[X + k], values[Y + k], width / 4.0)
+                    material = _add_mixed(ground, sheet, values, places, k, width / 4.0)
+        if material == _DONE:
+            continue
         if material != SEVERAL and width <= BLENDED:
-            fine, coarse = places[SECOND + k], places[THIRD + k]
-            grain = noise_at(noise, fine) * values[TWO + k] + noise_at(noise, coarse) * values[THREE + k]
-            factor = 1.0 + float(ground.grains[material]) * grain
+            factor = 1.0 + float(ground.grains[material]) * _noise(noise, values, places, k)
             values[RED + k] = float(ground.colours[material, 0]) * factor
             values[GREEN + k] = float(ground.colours[material, 1]) * factor
             values[BLUE + k] = float(ground.colours[material, 2]) * factor
@@ -84,13 +94,31 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
 
 
 @inlined
-def _common_material(ground: GroundArrays, sheet: int, x: float, y: float, step: float) -> int:
-    """Returns the material of both samples that `colour_at` takes first, `SEVERAL` if they may differ."""
-    part, other = part_at(ground, sheet, x - step, y - step), part_at(ground, sheet, x + step, y + step)
+def _noise(noise: NDArray[np.uint8], values: Array, places: NDArray[np.int64], k: int) -> float:
+    """Returns the noise of a sample."""
+    return (
+        noise_at(noise, places[SECOND + k]) * values[TWO + k] + noise_at(noise, places[THIRD + k]) * values[THREE + k]
+    )
+
+
+@inlined
+def _add_mixed(
+    ground: GroundArrays, sheet: int, values: Array, places: NDArray[np.int64], k: int, step: float
+) -> int:  # fmt: skip
+    """Writes the colour of a sample with several materials around, as `colour_at` does, and returns `_DONE`.
+
+    If both samples that count first show one material, it is returned instead.
+    """
+    x0, y0, x1, y1 = values[X + k] - step, values[Y + k] - step, values[X + k] + step, values[Y + k] + step
+    part, other = part_at(ground, sheet, x0, y0), part_at(ground, sheet, x1, y1)
     material = material_of_square(ground, sheet, part)
-    if other != part and material != SEVERAL and material_of_square(ground, sheet, other) != material:
-        return SEVERAL
-    return material
+    if material != SEVERAL and (other == part or material_of_square(ground, sheet, other) == material):
+        return material
+    first, second, third, fourth = materials_between(ground, sheet, part, other, x0, y0, x1, y1)
+    red, green, blue, grain = mean_look(ground, first, second, third, fourth)
+    factor = 1.0 + grain * _noise(ground.noise, values, places, k)
+    values[RED + k], values[GREEN + k], values[BLUE + k] = red * factor, green * factor, blue * factor
+    return _DONE
 
 
 @inlined

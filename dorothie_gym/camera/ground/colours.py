@@ -62,16 +62,8 @@ def _sampled(
     if footprint <= SHARP or not is_mixed(ground, sheet, middle):
         red, green, blue, grain = _look(ground, material_of_part(ground, sheet, middle, x, y))
     else:
-        share, (first, second, third, fourth) = 0.5, materials_around(ground, sheet, x, y, footprint / 4.0)
-        red, green, blue, grain = _look(ground, first)
-        r, g, b, n = _look(ground, fourth)
-        red, green, blue, grain = red + r, green + g, blue + b, grain + n
-        if first != fourth:
-            for k in range(2):
-                r, g, b, n = _look(ground, second if k == 0 else third)
-                red, green, blue, grain = red + r, green + g, blue + b, grain + n
-            share = 0.25
-        red, green, blue, grain = red * share, green * share, blue * share, grain * share
+        first, second, third, fourth = materials_around(ground, sheet, x, y, footprint / 4.0)
+        red, green, blue, grain = mean_look(ground, first, second, third, fourth)
     noise = noise_at(ground.noise, noise_place(x, y, GRAINS)) * grain_weight(footprint)
     noise += noise_at(ground.noise, noise_place(x, y, PATCHES)) * patch_weight(footprint)
     factor = 1.0 + grain * noise
@@ -86,6 +78,22 @@ def _look(ground: GroundArrays, material: int) -> tuple[float, float, float, flo
         float(colours[material, 0]), float(colours[material, 1]), float(colours[material, 2]),
         float(ground.grains[material]),
     )  # fmt: skip
+
+
+@inlined
+def mean_look(
+    ground: GroundArrays, first: int, second: int, third: int, fourth: int
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Returns the mean red, green, blue and strength of the noise of `materials_around` a place."""
+    red, green, blue, grain = _look(ground, first)
+    r, g, b, n = _look(ground, fourth)
+    red, green, blue, grain, share = red + r, green + g, blue + b, grain + n, 0.5
+    if first != fourth:
+        for k in range(2):
+            r, g, b, n = _look(ground, second if k == 0 else third)
+            red, green, blue, grain = red + r, green + g, blue + b, grain + n
+        share = 0.25
+    return red * share, green * share, blue * share, grain * share
 
 
 @inlined

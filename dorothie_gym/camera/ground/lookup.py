@@ -21,7 +21,7 @@ from dorothie_gym.maps.model import Array
 GROUND_SHEET = 0
 """Sheet of the ground; others are bridges and tunnels."""
 
-SQUARES = 8
+SQUARES = 16
 """Squares along each side of a mixed cell."""
 
 PARTS = SQUARES * SQUARES
@@ -194,6 +194,25 @@ def materials_around(
     """
     x0, y0, x1, y1 = x - step, y - step, x + step, y + step
     part, other = part_at(ground, sheet, x0, y0), part_at(ground, sheet, x1, y1)
+    return materials_between(ground, sheet, part, other, x0, y0, x1, y1)
+
+
+@compiled
+def materials_between(
+    ground: GroundArrays, sheet: int, part: int, other: int, x0: float, y0: float, x1: float, y1: float
+) -> tuple[int, int, int, int]:  # fmt: skip
+    """Returns the materials at the corners of a box [m], as `materials_around` does.
+
+    Args:
+        ground: materials.
+        sheet: of the ground.
+        part: square of the corner at (x0, y0), see `part_of`.
+        other: square of the corner at (x1, y1).
+        x0: smallest x.
+        y0: smallest y.
+        x1: largest x.
+        y1: largest y.
+    """
     first, last = material_of_square(ground, sheet, part), material_of_square(ground, sheet, other)
     if first == last and first != SEVERAL:
         return first, first, first, first
