@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,11 @@ from dorothie_gym.camera.samples import (
 from dorothie_gym.camera.shadows import TEXEL
 from dorothie_gym.camera.texturing import Textures, sample_texture
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.by_reference import by_reference
+from dorothie_gym.compilation.by_reference import by_reference, gives_row
 from dorothie_gym.maps.model import Array
+
+FACES: Final = 64
+"""Number of triangles whose faces are kept; a power of two."""
 
 _EMISSIVE, _GROUND, _LEAF = int(Surface.EMISSIVE), int(Surface.GROUND), int(Surface.LEAF)
 _BIAS = 0.05  # height by which something must be higher to cast a shadow on the ground [m]
@@ -46,7 +49,7 @@ _BIAS = 0.05  # height by which something must be higher to cast a shadow on the
 
 @by_reference
 class Face(NamedTuple):
-    """The present triangle relative to the camera, scratch space of the shading.
+    """A triangle relative to the camera, scratch space of the shading; or several, with one more axis in front.
 
     Attributes:
         plane: (4,) see `plane_of`.
@@ -68,9 +71,18 @@ class Face(NamedTuple):
     kind: NDArray[np.int64]
 
 
-def new_face() -> Face:
-    """Returns scratch space."""
-    return Face(np.zeros(4), np.zeros(3), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(3, np.int64))
+def new_faces() -> Face:
+    """Returns scratch space for the triangles that were seen last, each at its number modulo `FACES`."""
+    return Face(
+        np.zeros((FACES, 4)), np.zeros((FACES, 3)), np.zeros((FACES, 4)), np.zeros((FACES, 4)), np.zeros((FACES, 4)),
+        np.zeros((FACES, 4)), np.zeros((FACES, 3), np.int64),
+    )  # fmt: skip
+
+
+@gives_row
+def face_of(faces: Face, number: int) -> Face:
+    """Returns one of several faces."""
+    return Face(*(array[number] for array in faces))
 
 
 @compiled
@@ -134,7 +146,7 @@ def _read_footprint(view: View, mesh: Mesh, row: int, textures: Textures, face: 
 
 @compiled
 def add_face(optics: Optics, textures: Textures, samples: Samples, face: Face, first: int, count: int) -> None:
-    """Writes colours and surfaces of samples from `first` on that see the present triangle."""
+    """Writes colours and surfaces of samples from `first` on that see a triangle."""
     values, plane = samples.values[first:], face.plane
     offset, across, upward, inward = plane[0], plane[1], plane[2], plane[3]
     red, green, blue = face.colour[0], face.colour[1], face.colour[2]

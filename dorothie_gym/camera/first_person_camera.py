@@ -12,14 +12,14 @@ from dorothie_gym.camera.atlas import AtlasArrays
 from dorothie_gym.camera.cells import CellOrder, CellTable, new_order, sorted_by_cell
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.daylight import Daylight, daylight_of
-from dorothie_gym.camera.faces import new_face
+from dorothie_gym.camera.faces import new_faces
 from dorothie_gym.camera.ground.lookup import GroundArrays
 from dorothie_gym.camera.head_lights import draw_head_lights, new_head_lights
 from dorothie_gym.camera.labels import find_boxes, new_labels, write_labels
 from dorothie_gym.camera.lighting import LampMap, add_rain
 from dorothie_gym.camera.mesh import TOWN, Mesh, empty_mesh
 from dorothie_gym.camera.models.model_bank import ModelBank, PlacementRecord
-from dorothie_gym.camera.optics import optics_of
+from dorothie_gym.camera.optics import light_numbers, optics_of
 from dorothie_gym.camera.pose import CameraPose, View, view_from
 from dorothie_gym.camera.rasterizer import VisibilityBuffer, new_buffer
 from dorothie_gym.camera.samples import new_samples
@@ -28,7 +28,7 @@ from dorothie_gym.camera.sensor_faults import apply_faults
 from dorothie_gym.camera.shading import shade
 from dorothie_gym.camera.shadows import draw_shadows, new_shadow_maps, turn_sun
 from dorothie_gym.camera.texturing import textures_of
-from dorothie_gym.compilation import direct
+from dorothie_gym.compilation import direct, fixed
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records, plain
 from dorothie_gym.copying import shared
 from dorothie_gym.ontology import Sensor
@@ -37,8 +37,13 @@ from dorothie_gym.sim.weather import Weather
 _ROOM = 4096  # triangles of bodies, at first
 _NO_BODIES = empty_records(PlacementRecord, 0)
 
-_draw_scene, _draw_shadows, _draw_head_lights = direct(draw_scene), direct(draw_shadows), direct(draw_head_lights)
-_shade, _write_labels = direct(shade), direct(write_labels)
+_draw_scene, _draw_shadows, _shade, _write_labels = (
+    fixed(draw_scene),
+    fixed(draw_shadows),
+    fixed(shade),
+    fixed(write_labels),
+)
+_draw_head_lights = direct(draw_head_lights)
 
 
 @shared
@@ -124,12 +129,13 @@ class FirstPersonCamera:
         self._bodies = empty_mesh(_ROOM)
         self._box = np.zeros((2, 3))
         self._samples = new_samples()
+        self._pose: CameraPose | None = None
         self._keys = np.unique(self._overlay.instances[self._overlay.instances != TOWN])
         if self._draws_rgb:
             self._buffer = new_buffer(width * samples, height * samples)
             self._orders = self._new_orders(width * samples, height * samples)
             self._textures = textures_of(scene.atlas)
-            self._face = new_face()
+            self._faces = new_faces()
             self._shadows = new_shadow_maps(enabled=config.shadows)
             self._beams = new_head_lights()
             self._scratch = np.zeros(max(width, height), np.uint8)
@@ -152,6 +158,13 @@ class FirstPersonCamera:
         """
         self._overlay.colours[self._rows[rows]] = colours
 
+    def view_of(self, pose: CameraPose) -> View:
+        """Returns the projection of a picture from a pose; that of the last pose is kept."""
+        if pose is not self._pose:
+            self._view = view_from(pose, self.config.width, self.config.height, self.config.field_of_view)
+            self._pose = pose
+        return self._view
+
     def render(
         self,
         pose: CameraPose,
@@ -173,7 +186,7 @@ class FirstPersonCamera:
             faults: faulty sensors, which act on RGB.
         """
         config = self.config
-        view = view_from(pose, config.width, config.height, config.field_of_view)
+        view = self.view_of(pose)
         bodies = argument(bodies)
         frame: dict[str, NDArray[np.generic] | Boxes] = {}
         placed = -1
@@ -189,9 +202,10 @@ class FirstPersonCamera:
                 _draw_head_lights(self._beams, pose.x, pose.y, pose.heading, bodies)
             picture = np.empty((config.height, config.width, 3), np.uint8)
             _shade(
-                view, optics_of(view, light, self._shadows, pose.tilt), self._buffer, config.samples, self.scene.town,
-                self._overlay, self._bodies, self.scene.ground, self._textures, light, self.scene.noise,
-                self.scene.lamps, self._beams, self._shadows, self._samples, self._face, picture.reshape(-1, 3),
+                view, optics_of(view, self._light_numbers, self._shadows, pose.tilt), self._buffer, config.samples,
+                self.scene.town, self._overlay, self._bodies, self.scene.ground, self._textures, light,
+                self.scene.noise, self.scene.lamps, self._beams, self._shadows, self._samples, self._faces,
+                picture.reshape(-1, 3),
             )  # fmt: skip
             if light.rainfall > 0.02:
                 add_rain(picture, light.rainfall, round(time * 30.0))
@@ -207,6 +221,7 @@ class FirstPersonCamera:
         key = *weather.values.values(), head_lights
         if key != self._light_key:
             self._light_key, self._light = key, daylight_of(weather, head_lights=head_lights)
+            self._light_numbers = light_numbers(self._light)
             self._casts_shadows = turn_sun(self._shadows, self._light.sun, float(self._light.sunshine.max()))
         return self._light
 

@@ -79,14 +79,26 @@ class Optics(NamedTuple):
     bodies_y: int
 
 
-def optics_of(view: View, light: Daylight, maps: ShadowMaps, tilt: float = 0.0) -> Optics:
-    """Returns the numbers of a picture whose shadows have been drawn; `tilt` of the car upwards [rad]."""
+def light_numbers(light: Daylight) -> tuple[float, ...]:
+    """Returns the numbers of `Optics` that do not change as long as the light does not, from `sun_x` to `beams`."""
     colours = (light.sun, light.sunshine, light.ambient, light.horizon, light.air)
-    return Optics(  # type: ignore[call-arg]  # unpacked arrays, in the order of the fields
-        *view.origin.tolist(), *view.axes.ravel().tolist(), 1.0 / view.focal,
+    return (
         *(value for colour in colours for value in colour.tolist()),
-        light.fog, light.fog_start, light.rain, light.wetness, light.lamps, light.head_lights,
-        light.beams, math.tan(tilt),
+        light.fog, light.fog_start, light.rain, light.wetness, light.lamps, light.head_lights, light.beams,
+    )  # fmt: skip
+
+
+def optics_of(view: View, light: tuple[float, ...], maps: ShadowMaps, tilt: float = 0.0) -> Optics:
+    """Returns the numbers of a picture whose shadows have been drawn.
+
+    Args:
+        view: projection.
+        light: see `light_numbers`.
+        maps: of shadows.
+        tilt: of the car upwards [rad].
+    """
+    return Optics(  # type: ignore[call-arg]  # unpacked arrays, in the order of the fields
+        *view.origin.tolist(), *view.axes.ravel().tolist(), 1.0 / view.focal, *light, math.tan(tilt),
         bool(maps.strength[0] > 0.0), *maps.slope.tolist(), *maps.window.tolist(),
     )  # fmt: skip
 

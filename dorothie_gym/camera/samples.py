@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
 
-ROOM: Final = 512
-"""Largest number of samples that are shaded together."""
+ROOM: Final = 192
+"""Largest number of samples that are shaded together: their quantities fit into the processor's nearest cache."""
 
 # entries of a quantity; were it a multiple of 512, quantities would compete for the same lines of the processor's cache
 _STRETCH = ROOM + 24

@@ -9,17 +9,19 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.camera.cells import is_in_view
 from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.first_person_camera import CameraFrame, FirstPersonCamera
 from dorothie_gym.camera.ground.lookup import GROUND_SHEET, GroundArrays, material_at
 from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material, Relief
 from dorothie_gym.camera.models.model_bank import FIRST_PERSON, FIRST_PROP, PlacementRecord, place_bodies
-from dorothie_gym.camera.pose import CameraPose
+from dorothie_gym.camera.pose import CameraPose, View
 from dorothie_gym.camera.road_slopes import RoadSlopes, rise_at
 from dorothie_gym.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows
 from dorothie_gym.camera.town_scene import SessionScene
-from dorothie_gym.compilation import concurrent, direct
+from dorothie_gym.compilation import concurrent, fixed, inlined
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records
+from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.traffic_lights import LightColour, LightPhase
 from dorothie_gym.ontology import Sensor, WeatherParameter
 from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
@@ -31,12 +33,16 @@ from dorothie_gym.sim.world import World
 REACH = 250.0
 """Distance up to which bodies are drawn [m]: a car is then two pixels high in a picture of 480 x 320."""
 
+SHADED = 120.0
+"""Distance up to which bodies out of view are listed, for their shadows [m]."""
+
 LIGHTS_BELOW = 6.0
 """Altitude of the sun below which cars drive with their lights on [degrees]; in rain and fog they do so, too."""
 
 _LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # precipitation and density of fog from which on [%]
 _COLOURS = {LightColour.GREEN: Colour.GREEN, LightColour.YELLOW: Colour.YELLOW, LightColour.RED: Colour.RED}
 _RAISED = np.array([LOOKS[material].relief in (Relief.RAISED, Relief.SLOPE) for material in Material])
+_AROUND, _HIGH = 12.0, 6.0  # [m] sizes that no body has, beside and above its place
 _BELOW = -1.0  # [m] height of the people in tunnels
 _FIRST_LIFTED, _FIRST_LEFT, _NOTHING = FIRST_PERSON, FIRST_PROP, int(Material.NOTHING)
 
@@ -75,6 +81,8 @@ class SessionCamera:
         self._placed = empty_records(PlacementRecord, 256)
         self._shown: NDArray[np.int64] | None = None
         self._phases: list[LightPhase] | None = None  # that the lenses show, if those of the programmes
+        self._steady = 0.0, 0.0  # [s] from when until when they stay
+        self._box = np.zeros((2, 3))
 
     def pose_on(self, x: float, y: float, z: float, heading: float) -> CameraPose:
         """Returns the pose of the camera on a car, which stands tilted on slopes.
@@ -133,7 +141,10 @@ class SessionCamera:
     def placed(
         self, pose: CameraPose, bodies: Bodies, weather: Weather, *, own: int = CAR_KEY
     ) -> RecordArray[PlacementRecord]:
-        """Returns the models of the bodies near a pose, overwritten by the next call; arguments as of `render_from`."""
+        """Returns the models of the bodies that may be seen from a pose, or whose shadows may be.
+
+        They are overwritten by the next call. Arguments are those of `render_from`.
+        """
         room = len(bodies.vehicles) + len(bodies.pedestrians) + len(bodies.props)
         if room > len(self._placed):
             self._placed = empty_records(PlacementRecord, room)
@@ -142,11 +153,13 @@ class SessionCamera:
             argument(bodies.vehicles), argument(bodies.pedestrians), argument(bodies.props),
             np.array([pose.x, pose.y]), REACH, own, drives_with_lights(weather), placed,
         )  # fmt: skip
-        _lift_bodies(self.scene.town.ground.arrays, self.scene.town.slopes, placed, count)
-        return placed[:count]
+        town, view = self.scene.town, self.camera.view_of(pose)
+        return placed[: _lift_bodies(town.ground.arrays, town.slopes, view, placed, count, self._box)]
 
     def _show_programmes(self, time: float) -> None:
         """Paints the lenses in the colours that the programmes of the lights have at a time."""
+        if self._phases is not None and self._steady[0] <= time < self._steady[1]:
+            return
         phases = [programme.phase_at(time) for programme in self.scene.town.programmes]
         if phases != self._phases:
             self._show_lights(
@@ -157,6 +170,10 @@ class SessionCamera:
                 }
             )
             self._phases = phases
+        self._steady = (
+            time,
+            min((programme.change_after(time) for programme in self.scene.town.programmes), default=math.inf),
+        )
 
     def _show_lights(self, states: Mapping[int, LightColour]) -> None:
         """Paints the lenses in the colours of the traffic lights, if one has changed."""
@@ -185,13 +202,22 @@ def drives_with_lights(weather: Weather) -> bool:
 
 
 @concurrent
-def _lift(ground: GroundArrays, slopes: RoadSlopes, placed: RecordArray[PlacementRecord], count: int) -> None:
+def _lift(
+    ground: GroundArrays, slopes: RoadSlopes, view: View, placed: RecordArray[PlacementRecord], count: int, box: Array
+) -> int:
     """Puts people on pavements and lawns on top of the kerb, and vehicles with all wheels on the road.
 
-    The simulation has the height of the road for people.
+    The simulation has the height of the road for people. Distant bodies out of view are taken from the list, whose new
+    length is returned.
     """
+    kept = 0
     for k in range(count):
-        body = placed[k]
+        if not _is_near_or_in_view(view, placed[k], box):
+            continue
+        if kept < k:
+            _copy_placement(placed[k], placed[kept])
+        body = placed[kept]
+        kept += 1
         if body.model < _FIRST_LIFTED:
             body.rise = rise_at(slopes, body.x, body.y, body.z, body.cos, body.sin)
         if _FIRST_LIFTED <= body.model < _FIRST_LEFT:
@@ -204,6 +230,23 @@ def _lift(ground: GroundArrays, slopes: RoadSlopes, placed: RecordArray[Placemen
                     raised |= _RAISED[material] and body.z < _BELOW
             if raised:
                 body.z += KERB_HEIGHT
+    return kept
 
 
-_lift_bodies = direct(_lift)
+@inlined
+def _is_near_or_in_view(view: View, body: PlacementRecord, box: Array) -> bool:
+    x, y = body.x - view.origin[0], body.y - view.origin[1]
+    if x * x + y * y <= SHADED * SHADED:
+        return True
+    box[0, 0], box[0, 1], box[0, 2] = body.x - _AROUND, body.y - _AROUND, body.z - _HIGH
+    box[1, 0], box[1, 1], box[1, 2] = body.x + _AROUND, body.y + _AROUND, body.z + _HIGH
+    return is_in_view(view, box[0], box[1])
+
+
+@inlined
+def _copy_placement(body: PlacementRecord, target: PlacementRecord) -> None:
+    target.x, target.y, target.z, target.cos, target.sin = body.x, body.y, body.z, body.cos, body.sin
+    target.model, target.key, target.rise = body.model, body.key, body.rise
+
+
+_lift_bodies = fixed(_lift)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.camera.daylight import Daylight
-from dorothie_gym.camera.faces import Face, add_face, read_face
+from dorothie_gym.camera.faces import FACES, Face, add_face, face_of, read_face
 from dorothie_gym.camera.ground.lookup import GroundArrays
 from dorothie_gym.camera.head_lights import HeadLights
 from dorothie_gym.camera.illumination import light_samples
@@ -34,7 +34,7 @@ _GROUND = int(Surface.GROUND)
 def shade(
     view: View, optics: Optics, buffer: VisibilityBuffer, side: int, town: Mesh, overlay: Mesh, bodies: Mesh,
     ground: GroundArrays, textures: Textures, light: Daylight, noise: NDArray[np.float32], lamps: LampMap,
-    beams: HeadLights, shadows: ShadowMaps, samples: Samples, face: Face, picture: NDArray[np.uint8],
+    beams: HeadLights, shadows: ShadowMaps, samples: Samples, faces: Face, picture: NDArray[np.uint8],
 ) -> None:  # fmt: skip
     """Writes the colours of a picture.
 
@@ -54,11 +54,12 @@ def shade(
         beams: light of the head lights of other vehicles, that was drawn for the picture.
         shadows: maps that were drawn for the picture.
         samples: scratch space.
-        face: scratch space.
+        faces: scratch space, see `new_faces`.
         picture: (h * w, 3) to be written.
     """
     pixel, count = 0, 0
-    face.kind[0] = SKY
+    for k in range(FACES):
+        faces.kind[k, 0] = SKY
     for y in range(view.height):
         upper, lower = buffer.triangles[y * side], buffer.triangles[y * side + side - 1]
         x = 0
@@ -73,7 +74,7 @@ def shade(
                 end = _end_of_run(upper, lower, side, number, end, min(view.width, x + ROOM - count))
                 _place(view, optics, samples, count, end - x, x + 0.5, y + 0.5, 1.0)
                 _add_run(
-                    view, optics, town, overlay, bodies, ground, textures, light, noise, samples, face, number, count,
+                    view, optics, town, overlay, bodies, ground, textures, light, noise, samples, faces, number, count,
                     end - x,
                 )  # fmt: skip
                 samples.parts[count : count + end - x] = 1
@@ -86,7 +87,7 @@ def shade(
                     if share > 0.0:
                         _place(view, optics, samples, count, 1, x + across, y + down, share)
                         _add_run(
-                            view, optics, town, overlay, bodies, ground, textures, light, noise, samples, face, number,
+                            view, optics, town, overlay, bodies, ground, textures, light, noise, samples, faces, number,
                             count, 1,
                         )  # fmt: skip
                         count += 1
@@ -200,12 +201,13 @@ def _place(
 @compiled
 def _add_run(
     view: View, optics: Optics, town: Mesh, overlay: Mesh, bodies: Mesh, ground: GroundArrays, textures: Textures,
-    light: Daylight, noise: NDArray[np.float32], samples: Samples, face: Face, number: int, first: int, count: int,
+    light: Daylight, noise: NDArray[np.float32], samples: Samples, faces: Face, number: int, first: int, count: int,
 ) -> None:  # fmt: skip
     """Writes colours and surfaces of samples that see a triangle."""
     if number == SKY:
         add_sky(optics, light, noise, samples, first, count)
         return
+    face = face_of(faces, number % FACES)
     if number != face.kind[0]:
         mesh, row = mesh_of(town, overlay, bodies, number), row_in(town, overlay, number)
         read_face(view, optics, mesh, row, textures, face)

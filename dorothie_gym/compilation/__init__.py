@@ -27,6 +27,7 @@ __all__ = [
     "compiled_folder",
     "concurrent",
     "direct",
+    "fixed",
     "inlined",
 ]
 
@@ -80,6 +81,24 @@ def direct(function: F) -> F:
         entry = entries.get(kinds)
         if entry is None:
             entry = entries[kinds] = function.entry_for(*arguments)
+        return entry(*arguments)
+
+    return cast(F, update_wrapper(call, function.py_func))
+
+
+def fixed(function: F) -> F:
+    """As `direct`, without a look at the types of the arguments: all calls have those of the first call.
+
+    Arrays that differ only in whether they may be written to count as one type.
+    """
+    if not isinstance(function, CompiledFunction):
+        return function
+    entry: Callable[..., object] | None = None
+
+    def call(*arguments: object) -> object:
+        nonlocal entry
+        if entry is None:
+            entry = function.entry_for(*arguments)
         return entry(*arguments)
 
     return cast(F, update_wrapper(call, function.py_func))

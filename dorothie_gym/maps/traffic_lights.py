@@ -10,6 +10,8 @@ from itertools import accumulate
 
 from dorothie_gym.copying import shared
 
+_SHORTLY = 1e-6  # [s] more than rounding moves the end of a phase
+
 
 class LightColour(enum.StrEnum):
     """Colour of a traffic light."""
@@ -75,6 +77,12 @@ class LightProgramme:
         """Returns the phase at a simulated time [s]."""
         ends = self._ends
         return self.phases[bisect_right(ends, (time - self.offset) % ends[-1]) % len(ends)]
+
+    def change_after(self, time: float) -> float:
+        """Returns a simulated time up to which the phase stays that of `time`: shortly before its end [s]."""
+        ends = self._ends
+        passed = (time - self.offset) % ends[-1]
+        return time + ends[bisect_right(ends, passed) % len(ends)] - passed - _SHORTLY
 
     def colour(self, signal: int, time: float) -> LightColour:
         """Returns the colour of a signal at a simulated time [s]."""
