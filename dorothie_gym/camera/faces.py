@@ -33,6 +33,7 @@ from dorothie_gym.camera.samples import (
     TWO,
     UP,
     Samples,
+    whole_vectors,
 )  # fmt: skip
 from dorothie_gym.camera.shadows import TEXEL
 from dorothie_gym.camera.texturing import Textures, sample_texture
@@ -154,7 +155,7 @@ def add_face(optics: Optics, textures: Textures, samples: Samples, face: Face, f
     bright, lamp = 0.0, 0.6
     if face.kind[2] & _EMISSIVE:
         sun, ambient, bright, lamp = 0.0, 0.0, 1.0, 0.0
-    for k in range(count):
+    for k in range(whole_vectors(count)):
         toward = min(across * values[RIGHT + k] + upward * values[UP + k] + inward, -1e-9)
         values[DEPTH + k], values[SLANT + k] = offset / toward, -toward
         values[RED + k], values[GREEN + k], values[BLUE + k] = red, green, blue
@@ -182,7 +183,7 @@ def _place_texture(optics: Optics, values: Array, face: Face, count: int) -> Non
     u, v, along, pixel = face.u, face.v, face.along, optics.pixel
     u0, u1, u2, u3, v0, v1, v2, v3 = u[0], u[1], u[2], u[3], v[0], v[1], v[2], v[3]
     du, dv, long, short = along[0], along[1], along[2], along[3]
-    for k in range(count):
+    for k in range(whole_vectors(count)):
         right, up, depth = values[RIGHT + k], values[UP + k], values[DEPTH + k]
         width = pixel * depth
         length = width / max(values[SLANT + k], 0.02)

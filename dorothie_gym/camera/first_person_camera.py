@@ -26,7 +26,7 @@ from dorothie_gym.camera.samples import new_samples
 from dorothie_gym.camera.scene_drawing import draw_scene
 from dorothie_gym.camera.sensor_faults import apply_faults
 from dorothie_gym.camera.shading import shade
-from dorothie_gym.camera.shadows import draw_shadows, new_shadow_maps, turn_sun
+from dorothie_gym.camera.shadows import new_shadow_maps, turn_sun
 from dorothie_gym.camera.texturing import textures_of
 from dorothie_gym.compilation import direct, fixed
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records, plain
@@ -37,12 +37,7 @@ from dorothie_gym.sim.weather import Weather
 _ROOM = 4096  # triangles of bodies, at first
 _NO_BODIES = empty_records(PlacementRecord, 0)
 
-_draw_scene, _draw_shadows, _shade, _write_labels = (
-    fixed(draw_scene),
-    fixed(draw_shadows),
-    fixed(shade),
-    fixed(write_labels),
-)
+_draw_scene, _shade, _write_labels = fixed(draw_scene), fixed(shade), fixed(write_labels)
 _draw_head_lights = direct(draw_head_lights)
 
 
@@ -129,6 +124,7 @@ class FirstPersonCamera:
         self._bodies = empty_mesh(_ROOM)
         self._box = np.zeros((2, 3))
         self._samples = new_samples()
+        self._shadows = new_shadow_maps(enabled=config.shadows and self._draws_rgb)
         self._pose: CameraPose | None = None
         self._keys = np.unique(self._overlay.instances[self._overlay.instances != TOWN])
         if self._draws_rgb:
@@ -136,7 +132,6 @@ class FirstPersonCamera:
             self._orders = self._new_orders(width * samples, height * samples)
             self._textures = textures_of(scene.atlas)
             self._faces = new_faces()
-            self._shadows = new_shadow_maps(enabled=config.shadows)
             self._beams = new_head_lights()
             self._scratch = np.zeros(max(width, height), np.uint8)
             self._light_key: tuple[float, ...] = ()
@@ -192,12 +187,9 @@ class FirstPersonCamera:
         placed = -1
         if self._draws_rgb:
             light = self._daylight(weather, head_lights)
-            placed = self._draw(view.scaled(config.samples), self._buffer, self._orders, bodies, placed)
-            if self._casts_shadows:
-                _draw_shadows(
-                    view, self._shadows, self.scene.town, self.scene.cells, self._overlay, self._overlay_cells,
-                    self.scene.bank.mesh, self.scene.bank.ranges, self.scene.bank.boxes, bodies,
-                )  # fmt: skip
+            placed = self._draw(
+                view.scaled(config.samples), self._buffer, self._orders, bodies, placed, self._casts_shadows
+            )
             if light.beams > 0.0:
                 _draw_head_lights(self._beams, pose.x, pose.y, pose.heading, bodies)
             picture = np.empty((config.height, config.width, 3), np.uint8)
@@ -232,13 +224,18 @@ class FirstPersonCamera:
         orders: tuple[CellOrder, CellOrder],
         bodies: RecordArray[PlacementRecord],
         placed: int,
+        casts_shadows: bool = False,
     ) -> int:
-        """Draws all triangles; copies those of bodies first if `placed` is negative, and returns their number."""
+        """Draws all triangles, and shadows if they are wanted; returns the number of triangles of bodies.
+
+        These are copied first if `placed`, which is their number otherwise, is negative.
+        """
         scene, bank = self.scene, self.scene.bank
         while True:
             count = _draw_scene(
                 view, buffer, scene.town, scene.cells, orders[0], self._overlay, self._overlay_cells, orders[1],
                 bank.mesh, bank.ranges, bank.boxes, bodies, self._box, self._bodies, placed,
+                self._shadows, casts_shadows,
             )  # fmt: skip
             if count <= self._bodies.size:
                 return count

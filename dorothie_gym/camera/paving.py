@@ -26,7 +26,6 @@ from dorothie_gym.camera.ground.lookup import (
     GroundArrays,
     material_of_square,
     materials_between,
-    part_at,
     part_of,
 )  # fmt: skip
 from dorothie_gym.camera.mesh import Surface
@@ -54,6 +53,7 @@ from dorothie_gym.camera.samples import (
     Samples,
     X,
     Y,
+    whole_vectors,
 )  # fmt: skip
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
@@ -69,7 +69,7 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
     _place_ground(optics, ground, values, places, face, count)
     samples.surfaces[first : first + count] = _GROUND
     cells, noise = ground.cells[ground.firsts[sheet] :], ground.noise
-    outside = int(ground.outside[sheet])
+    outside, inverse = int(ground.outside[sheet]), 1.0 / ground.size[0]
     for k in range(count):
         width, place, material = values[ONE + k], places[FIRST + k], outside
         if place >= 0:
@@ -79,7 +79,7 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
                 if width <= SHARP:
                     material = material_of_square(ground, sheet, place)
                 elif width <= BLENDED:
-                    material = _add_mixed(ground, sheet, values, places, k, width / 4.0)
+                    material = _add_mixed(ground, sheet, inverse, values, places, k, width / 4.0)
         if material == _DONE:
             continue
         if material != SEVERAL and width <= BLENDED:
@@ -103,14 +103,16 @@ def _noise(noise: NDArray[np.uint8], values: Array, places: NDArray[np.int64], k
 
 @inlined
 def _add_mixed(
-    ground: GroundArrays, sheet: int, values: Array, places: NDArray[np.int64], k: int, step: float
+    ground: GroundArrays, sheet: int, inverse: float, values: Array, places: NDArray[np.int64], k: int, step: float
 ) -> int:  # fmt: skip
     """Writes the colour of a sample with several materials around, as `colour_at` does, and returns `_DONE`.
 
     If both samples that count first show one material, it is returned instead.
     """
     x0, y0, x1, y1 = values[X + k] - step, values[Y + k] - step, values[X + k] + step, values[Y + k] + step
-    part, other = part_at(ground, sheet, x0, y0), part_at(ground, sheet, x1, y1)
+    left, top = ground.origins[sheet, 0], ground.origins[sheet, 1]
+    columns, rows = ground.shapes[sheet, 0], ground.shapes[sheet, 1]
+    part, other = part_of(left, top, inverse, columns, rows, x0, y0), part_of(left, top, inverse, columns, rows, x1, y1)
     material = material_of_square(ground, sheet, part)
     if material != SEVERAL and (other == part or material_of_square(ground, sheet, other) == material):
         return material
@@ -131,7 +133,7 @@ def _place_ground(
     sun, bias, ambient = face.light[0], face.light[1], face.light[2]
     left, top = ground.origins[sheet, 0], ground.origins[sheet, 1]
     columns, rows = ground.shapes[sheet, 0], ground.shapes[sheet, 1]
-    for k in range(count):
+    for k in range(whole_vectors(count)):
         right, up = values[RIGHT + k], values[UP + k]
         toward = min(rightward * right + upward * up + inward, -1e-6)
         depth = offset / toward

@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.compilation import inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
 
@@ -53,6 +54,8 @@ SECOND: Final = 1 * _STRETCH
 THIRD: Final = 2 * _STRETCH
 _INDICES = 3
 
+_FEW = 3  # samples that are computed one by one
+
 
 @by_reference
 class Samples(NamedTuple):
@@ -81,6 +84,15 @@ class Samples(NamedTuple):
     indices: NDArray[np.int64]
     surfaces: NDArray[np.uint8]
     parts: NDArray[np.uint8]
+
+
+@inlined
+def whole_vectors(count: int) -> int:
+    """Returns the number of samples of whole vectors of the processor.
+
+    What is written of those behind the last sample is overwritten by the next samples, or not read.
+    """
+    return count if count < _FEW else (count + 3) // 4 * 4
 
 
 def new_samples() -> Samples:

@@ -11,6 +11,7 @@ from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.models.model_bank import PlacementRecord
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.rasterizer import VisibilityBuffer, clear, draw_triangles
+from dorothie_gym.camera.shadows import ShadowMaps, draw_shadows
 from dorothie_gym.compilation import concurrent
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.model import Array
@@ -21,8 +22,9 @@ def draw_scene(
     view: View, buffer: VisibilityBuffer, town: Mesh, cells: CellTable, order: CellOrder, overlay: Mesh,
     overlay_cells: CellTable, overlay_order: CellOrder, bank: Mesh, ranges: NDArray[np.int32],
     boxes: NDArray[np.float32], bodies: RecordArray[PlacementRecord], box: Array, placed: Mesh, count: int,
+    shadows: ShadowMaps, casts_shadows: bool,
 ) -> int:  # fmt: skip
-    """Draws all triangles to an emptied buffer; returns the number of those of bodies.
+    """Draws all triangles to an emptied buffer, and shadows if need be; returns the number of those of bodies.
 
     Args:
         view: projection.
@@ -40,6 +42,8 @@ def draw_scene(
         box: (2, 3) scratch space.
         placed: triangles of bodies. If it has too little room, they are not drawn.
         count: of the triangles in `placed`, negative if they are to be written first.
+        shadows: maps of shadows.
+        casts_shadows: whether they are to be drawn for the picture, too.
     """
     clear(buffer)
     draw_cells(view, buffer, town, cells, order, 0)
@@ -49,4 +53,6 @@ def draw_scene(
         count = copy_bodies(view, order.tiles, bank, ranges, boxes, bodies, box, placed)
     if count <= placed.corners.shape[0]:
         draw_triangles(view, buffer, placed, 0, count, first + overlay.corners.shape[0])
+        if casts_shadows:
+            draw_shadows(view, shadows, town, cells, overlay, overlay_cells, bank, ranges, boxes, bodies)
     return count

@@ -149,12 +149,12 @@ class SessionCamera:
         if room > len(self._placed):
             self._placed = empty_records(PlacementRecord, room)
         placed = argument(self._placed)
-        count = place_bodies(
-            argument(bodies.vehicles), argument(bodies.pedestrians), argument(bodies.props),
-            np.array([pose.x, pose.y]), REACH, own, drives_with_lights(weather), placed,
+        town = self.scene.town
+        count = _place_and_lift(
+            argument(bodies.vehicles), argument(bodies.pedestrians), argument(bodies.props), self.camera.view_of(pose),
+            own, drives_with_lights(weather), town.ground.arrays, town.slopes, placed, self._box,
         )  # fmt: skip
-        town, view = self.scene.town, self.camera.view_of(pose)
-        return placed[: _lift_bodies(town.ground.arrays, town.slopes, view, placed, count, self._box)]
+        return placed[:count]
 
     def _show_programmes(self, time: float) -> None:
         """Paints the lenses in the colours that the programmes of the lights have at a time."""
@@ -202,14 +202,17 @@ def drives_with_lights(weather: Weather) -> bool:
 
 
 @concurrent
-def _lift(
-    ground: GroundArrays, slopes: RoadSlopes, view: View, placed: RecordArray[PlacementRecord], count: int, box: Array
-) -> int:
-    """Puts people on pavements and lawns on top of the kerb, and vehicles with all wheels on the road.
+def _place(
+    vehicles: RecordArray[VehicleRecord], pedestrians: RecordArray[PedestrianRecord], props: RecordArray[PropRecord],
+    view: View, own: int, lights: bool, ground: GroundArrays, slopes: RoadSlopes, placed: RecordArray[PlacementRecord],
+    box: Array,
+) -> int:  # fmt: skip
+    """Lists bodies as `place_bodies` does, with people on top of kerbs, and vehicles with all wheels on the road.
 
-    The simulation has the height of the road for people. Distant bodies out of view are taken from the list, whose new
-    length is returned.
+    The simulation has the height of the road for people. Distant bodies out of view are left out. Returns the number
+    of bodies.
     """
+    count = place_bodies(vehicles, pedestrians, props, view.origin, REACH, own, lights, placed)
     kept = 0
     for k in range(count):
         if not _is_near_or_in_view(view, placed[k], box):
@@ -249,4 +252,4 @@ def _copy_placement(body: PlacementRecord, target: PlacementRecord) -> None:
     target.model, target.key, target.rise = body.model, body.key, body.rise
 
 
-_lift_bodies = fixed(_lift)
+_place_and_lift = fixed(_place)

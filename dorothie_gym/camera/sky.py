@@ -30,6 +30,7 @@ from dorothie_gym.camera.samples import (
     Samples,
     X,
     Y,
+    whole_vectors,
 )  # fmt: skip
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
@@ -76,7 +77,7 @@ def _place_sky(optics: Optics, light: Daylight, values: Array, count: int) -> No
     """Writes directions, coordinates of clouds, cosines to the sun, and the gradient of the sky."""
     low_r, low_g, low_b = light.horizon[0], light.horizon[1], light.horizon[2]
     high_r, high_g, high_b = light.zenith[0], light.zenith[1], light.zenith[2]
-    for k in range(count):
+    for k in range(whole_vectors(count)):
         right, up = values[RIGHT + k], values[UP + k]
         x, y, z = ray(optics, right, up)
         scale = 1.0 / math.sqrt(1.0 + right * right + up * up)
