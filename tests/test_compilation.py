@@ -11,7 +11,7 @@ import pytest
 from numba.core import event
 from numba.core.compiler import Flags
 
-from dorothie_gym.compilation import allocating, cache, compiled, direct, inlined
+from dorothie_gym.compilation import allocating, cache, compiled, direct, fixed, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.cache import compiled_folder
 from dorothie_gym.compilation.dispatcher import OwnFlags
@@ -223,6 +223,15 @@ def test_function_called_directly_distinguishes_arrays_by_their_types():
     constant.flags.writeable = False
     for array in (numbers, numbers.astype(np.float64), numbers[::2], numbers.reshape(3, 4)[:, 1], constant):
         assert fast(array) == (np.arange(len(array)) * array).sum()
+
+
+def test_function_of_fixed_types_looks_at_them_once():
+    fast = fixed(scaled_sum)
+    for count in (3, 0, 5):
+        numbers = Numbers(np.arange(count, dtype=np.float64), 2.0)
+        numbers.values.flags.writeable = count == 0
+        for more in (1.5, 1):  # a whole number where a number was
+            assert fast(numbers, more, 4.0) == 4.0 + more + count * (count - 1)
 
 
 @compiled

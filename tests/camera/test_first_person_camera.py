@@ -223,7 +223,10 @@ def test_pictures_do_not_depend_on_earlier_ones() -> None:
     travelled, fresh = FirstPersonCamera(town, CONFIG), FirstPersonCamera(town, CONFIG)
     for k in range(6):
         noon = weather(sun_azimuth_angle=30.0 * k)
+        crowd = placed(*((x, y, 0.3) for x in range(5, 45, 4) for y in range(-12, 13, 3)))  # 90 bodies
+        travelled.render(EYE, sky, bodies=crowd)
         travelled.render(CameraPose(40.0 * k, -15.0 * k, 1.5, float(k)), noon, bodies=placed((k, 5.0, 0.0)))
+    travelled.render(EYE, sky, bodies=crowd)
     one = travelled.render(EYE, sky, bodies=bodies, time=4.0)
     two = fresh.render(EYE, sky, bodies=bodies, time=4.0)
     for name in ("rgb", "depth", "semantic", "instance"):

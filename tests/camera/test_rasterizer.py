@@ -19,7 +19,16 @@ from dorothie_gym.camera.ground.sheets import Sheet
 from dorothie_gym.camera.labels import find_boxes, new_labels, write_labels
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, empty_mesh
 from dorothie_gym.camera.pose import CameraPose, View, view_from
-from dorothie_gym.camera.rasterizer import NEAR, SKY, VisibilityBuffer, clear, draw_triangles, new_buffer
+from dorothie_gym.camera.rasterizer import (
+    NEAR,
+    SKY,
+    VisibilityBuffer,
+    clear,
+    collect_triangles,
+    draw_collected,
+    draw_triangles,
+    new_buffer,
+)  # fmt: skip
 from dorothie_gym.camera.samples import new_samples
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass
@@ -112,6 +121,33 @@ def test_what_the_near_plane_cuts_is_seen_as_rays_see_it(scale: float) -> None:
     hit = rays_hit(view, mesh)[1]
     assert (hit >= 0).mean() > 0.5
     assert (numbers_of(view, mesh) == hit).mean() >= 0.998
+
+
+@pytest.mark.parametrize("far", [0.0, 900.0, 4000.0])
+def test_sifting_leaves_out_no_triangle_that_covers_a_sample(far: float) -> None:
+    rng = np.random.default_rng(11)
+    away = rng.uniform(0.2, 60.0, (20_000, 1, 1))
+    sizes = away * rng.choice([0.001, 0.01, 0.03, 0.1], (20_000, 1, 1))
+    corners = away * rng.normal(size=(20_000, 1, 3)) + sizes * rng.normal(size=(20_000, 3, 3)) + [far, -far, 0.0]
+    builder = MeshBuilder()
+    builder.triangles(corners, colour=GREY, kind=ObjectClass.OTHER)
+    mesh = builder.build()
+    view = view_from(CameraPose(far, -far, 0.0, 0.7), 84, 84, 90.0)
+    whole = seen(view, mesh)
+    buffer = new_buffer(84, 84)
+    clear(buffer)
+    step = buffer.kept.size // 2
+    for first in range(0, mesh.size, step):  # all of them, none sifted
+        count = min(step, mesh.size - first)
+        buffer.kept[:count] = np.arange(first, first + count)
+        draw_collected(view, buffer, mesh, count, 0)
+    np.testing.assert_array_equal(buffer.triangles, whole.triangles)
+    assert len(np.unique(whole.triangles)) > 100
+    sifted = sum(
+        collect_triangles(view, buffer, mesh, first, min(first + step, mesh.size), 0, 0)
+        for first in range(0, mesh.size, step)
+    )
+    assert sifted < 0.25 * mesh.size
 
 
 @pytest.mark.parametrize(("width", "height"), [(192, 128), (171, 101)])

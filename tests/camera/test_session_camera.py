@@ -14,8 +14,9 @@ from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.camera.scene_building import build_town_scene
 from dorothie_gym.camera.scenery.landmarks import landmark_key
-from dorothie_gym.camera.session_camera import SessionCamera
+from dorothie_gym.camera.session_camera import REACH, SHADED, SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene, TownScene
+from dorothie_gym.compilation.records import plain
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import Town, load_town
@@ -126,6 +127,27 @@ def test_blades_without_a_name_are_empty(engine: SessionEngine, town_scene: Town
     named, few, none = pictures
     np.testing.assert_array_equal(few, none)
     assert np.abs(named - none).max() > 60  # letters
+
+
+def test_bodies_are_listed_that_may_be_seen_or_cast_shadows(engine: SessionEngine, town_scene: TownScene) -> None:
+    world = engine.session.world
+    camera = SessionCamera(scene_of(engine, town_scene), SMALL)
+    bodies = [*world.actors.vehicles, *world.actors.pedestrians]
+    left_out = 0
+    for lane in range(0, len(world.town.lanes), 6):
+        x, y = world.town.lanes[lane].position(0.0).tolist()
+        pose = camera.config.pose_on(x, y, 0.0, world.town.lanes[lane].heading_at(0.0))
+        view = camera.camera.view_of(pose)
+        listed = set(plain(camera.placed(pose, world.actors.arrays, world.weather))["key"].tolist())
+        for body in bodies:
+            away = math.dist(body.position, (x, y))
+            (column, _), depth = (part[0] for part in view.project(np.array([[*body.position, 1.0]])))
+            if away <= SHADED or (depth > 0.0 and away < REACH and 0.0 <= column <= SMALL.width):
+                assert body.key in listed
+            elif depth < -20.0:
+                assert body.key not in listed
+                left_out += 1
+    assert left_out > 20
 
 
 def test_bodies_have_their_keys_as_instances(engine: SessionEngine, town_scene: TownScene) -> None:

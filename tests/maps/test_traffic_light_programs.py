@@ -345,3 +345,15 @@ def test_yellow_is_longer_where_cars_are_faster(kmh: float, seconds: float) -> N
     assert yellow_time(kmh / 3.6) == seconds
     # who is too near to stop at 3 m/s2 after a second is over the line before red
     assert seconds == 6.0 or 1.0 + kmh / 3.6 / 6.0 <= seconds
+
+
+@pytest.mark.parametrize("offset", [0.0, 7.3, -41.9])
+def test_phase_stays_until_its_change(offset: float) -> None:
+    phases = tuple(LightPhase(duration=duration, green=(k,)) for k, duration in enumerate((0.1, 12.0, 3.3, 8.7)))
+    programme = LightProgramme(junction_id=1, signals=(0, 1, 2, 3), phases=phases, offset=offset)
+    for time in np.linspace(0.0, 97.0, 991).tolist():
+        change = programme.change_after(time)
+        assert change < time + 12.0
+        if change > time:
+            assert programme.phase_at(change) == programme.phase_at(0.5 * (time + change)) == programme.phase_at(time)
+            assert programme.phase_at(change + 1e-5) != programme.phase_at(time)
