@@ -96,9 +96,8 @@ def add_ground(optics: Optics, ground: GroundArrays, samples: Samples, face: Fac
 @inlined
 def _noise(noise: NDArray[np.uint8], values: Array, places: NDArray[np.int64], k: int) -> float:
     """Returns the noise of a sample."""
-    return (
-        noise_at(noise, places[SECOND + k]) * values[TWO + k] + noise_at(noise, places[THIRD + k]) * values[THREE + k]
-    )
+    fine, coarse = places[SECOND + k], places[THIRD + k]
+    return float(noise_at(noise, fine) * values[TWO + k] + noise_at(noise, coarse) * values[THREE + k])
 
 
 @inlined

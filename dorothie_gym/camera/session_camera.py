@@ -41,6 +41,9 @@ LIGHTS_BELOW = 6.0
 
 _LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # precipitation and density of fog from which on [%]
 _COLOURS = {LightColour.GREEN: Colour.GREEN, LightColour.YELLOW: Colour.YELLOW, LightColour.RED: Colour.RED}
+_PAINTS = np.zeros((2, max(Colour) + 1, 3), np.uint8)  # of lenses that are off and on, by `Colour`
+for _colour in Colour:
+    _PAINTS[0, _colour], _PAINTS[1, _colour] = LENS_OFF[_colour], LENS_ON[_colour]
 _RAISED = np.array([LOOKS[material].relief in (Relief.RAISED, Relief.SLOPE) for material in Material])
 _AROUND, _HIGH = 12.0, 6.0  # [m] sizes that no body has, beside and above its place
 _BELOW = -1.0  # [m] height of the people in tunnels
@@ -184,11 +187,12 @@ class SessionCamera:
         shown = np.array([colours.get(signal, -1) for signal in lenses.signals.tolist()], dtype=np.int64)
         if self._shown is not None and np.array_equal(shown, self._shown):
             return
-        self._shown = shown
-        for colour in Colour:
-            for lit, paint in ((True, LENS_ON[colour]), (False, LENS_OFF[colour])):
-                rows = lens_rows(lenses, (lenses.colours == int(colour)) & ((shown == int(colour)) == lit))
-                self.camera.paint(rows, np.tile(np.array(paint, dtype=np.uint8), (len(rows), 1)))
+        before, self._shown = self._shown, shown
+        lit = shown == lenses.colours
+        changed = np.full(len(lit), True) if before is None else lit != (before == lenses.colours)
+        rows = lens_rows(lenses, changed)
+        counts = np.diff(lenses.ranges[changed], axis=1)[:, 0]
+        self.camera.paint(rows, np.repeat(_PAINTS[lit[changed].astype(int), lenses.colours[changed]], counts, axis=0))
 
 
 def drives_with_lights(weather: Weather) -> bool:

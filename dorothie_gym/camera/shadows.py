@@ -2,9 +2,9 @@
 
 Points are moved along the sun's rays to height 0. A map holds, for each square of that plane, how high the highest
 surface is whose light falls there; a point lies in shadow if a surface with the same place on the plane is higher. The
-map of the town consists of tiles around the camera that are kept as long as the sun stands still; the map of bodies is
-drawn for every picture, without those whose shadows are out of view. Both depend on the picture alone, not on earlier
-ones.
+map of the town consists of tiles around the camera, which are drawn when they are in view and kept as long as the sun
+stands still; the map of bodies is drawn for every picture, without those whose shadows are out of view. Both depend on
+the picture alone, not on earlier ones.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def draw_shadows(
     view: View, maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable,
     bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32], bodies: RecordArray[PlacementRecord],
 ) -> None:  # fmt: skip
-    """Draws the tiles around the camera that the map does not hold, and the map of bodies whose shadows may be seen.
+    """Draws the tiles in view that the map does not hold, and the map of bodies whose shadows may be seen.
 
     Args:
         view: projection of the picture.
@@ -117,10 +117,12 @@ def draw_shadows(
         boxes: of `ModelBank`.
         bodies: models and places.
     """
-    _draw_tiles(maps, town, town_cells, overlay, overlay_cells, view.origin[0], view.origin[1], view.origin[2])
     lowest = min(_lowest(town_cells), _lowest(overlay_cells))
+    highest = max(_highest(town_cells), _highest(overlay_cells))
     for k in range(len(bodies)):
-        lowest = min(lowest, bodies[k].z)
+        surround(bodies[k], boxes[bodies[k].model], maps.corners)
+        lowest, highest = min(lowest, maps.corners[0, 2]), max(highest, maps.corners[1, 2])
+    _draw_tiles(view, maps, town, town_cells, overlay, overlay_cells, lowest, highest)
     _draw_bodies(view, maps, bank, ranges, boxes, bodies, lowest)
 
 
@@ -133,20 +135,30 @@ def _lowest(cells: CellTable) -> float:
     return lowest
 
 
+@inlined
+def _highest(cells: CellTable) -> float:
+    """Returns the largest height in any cell [m]."""
+    highest = -np.inf
+    for cell in range(len(cells.ranges)):
+        highest = max(highest, cells.high[cell, 2])
+    return highest
+
+
 @compiled
 def _draw_tiles(
-    maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable, x: float, y: float,
-    z: float,
+    view: View, maps: ShadowMaps, town: Mesh, town_cells: CellTable, overlay: Mesh, overlay_cells: CellTable,
+    lowest: float, highest: float,
 ) -> None:  # fmt: skip
+    """Draws the tiles around the camera where surfaces between two heights [m] may be seen, if they are not held."""
     width = _TILE * TEXEL
     for axis in range(2):
-        centre = (x if axis == 0 else y) - maps.slope[axis] * z
+        centre = view.origin[axis] - maps.slope[axis] * view.origin[2]
         maps.window[axis] = (math.floor(centre / width + 0.5) - _TILES // 2) * _TILE
         maps.window[2 + axis] = math.floor(centre / TEXEL) - _BODIES // 2
     for row in range(maps.window[1] // _TILE, maps.window[1] // _TILE + _TILES):
         for column in range(maps.window[0] // _TILE, maps.window[0] // _TILE + _TILES):
             held = maps.held[row % _TILES, column % _TILES]
-            if held[0] != column or held[1] != row:
+            if (held[0] != column or held[1] != row) and _is_tile_in_view(view, maps, column, row, lowest, highest):
                 held[0], held[1] = column, row
                 left, top = (column % _TILES) * _TILE, (row % _TILES) * _TILE
                 for j in range(top, top + _TILE):
@@ -154,6 +166,25 @@ def _draw_tiles(
                 tile = maps.town[top : top + _TILE, left : left + _TILE]
                 _draw_tile(maps, tile, town, town_cells, column, row)
                 _draw_tile(maps, tile, overlay, overlay_cells, column, row)
+
+
+@inlined
+def _is_tile_in_view(
+    view: View, maps: ShadowMaps, column: int, row: int, lowest: float, highest: float
+) -> bool:  # fmt: skip
+    """Returns whether the picture may show surfaces between two heights [m] whose light crosses a tile."""
+    box = maps.corners
+    for axis in range(2):
+        first = (column if axis == 0 else row) * _TILE * TEXEL
+        low, high = maps.slope[axis] * lowest, maps.slope[axis] * highest
+        box[0, axis] = first + min(low, high) - _BESIDE
+        box[1, axis] = first + _TILE * TEXEL + max(low, high) + _BESIDE
+    box[0, 2], box[1, 2] = lowest - _BESIDE, highest + _BESIDE
+    depth = 0.0
+    for k in range(3):
+        ahead = view.axes[2, k]
+        depth += ahead * ((box[0, k] if ahead > 0.0 else box[1, k]) - view.origin[k])
+    return depth < REACH and is_in_view(view, box[0], box[1])
 
 
 @inlined
@@ -270,10 +301,14 @@ def _cast(
 @inlined
 def _fill_heights(target: NDArray[np.int16], corners: Array, right: float, down: float) -> None:
     """Raises the squares whose centres lie in a triangle to its height there, which is affine."""
-    _fill_line(target, corners)
     size = float(target.shape[0])
     low = min(corners[0, 1], corners[1, 1], corners[2, 1])
     high = max(corners[0, 1], corners[1, 1], corners[2, 1])
+    if high < 0.0 or low >= size or max(corners[0, 0], corners[1, 0], corners[2, 0]) < 0.0:
+        return  # beside the map, as most triangles of a cell are
+    if min(corners[0, 0], corners[1, 0], corners[2, 0]) >= size:
+        return
+    _fill_line(target, corners)
     base = corners[0, 2] - right * corners[0, 0] - down * corners[0, 1]
     for y in range(math.ceil(min(max(low - 0.5, 0.0), size)), math.ceil(min(max(high - 0.5, 0.0), size))):
         middle, left, end = y + 0.5, np.inf, -np.inf
