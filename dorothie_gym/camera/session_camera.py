@@ -34,7 +34,7 @@ REACH = 250.0
 """Distance up to which bodies are drawn [m]: a car is then two pixels high in a picture of 480 x 320."""
 
 SHADED = 120.0
-"""Distance up to which bodies out of view are listed, for their shadows [m]."""
+"""Distance up to which bodies out of view are listed, for their shadows and head lights [m]."""
 
 LIGHTS_BELOW = 6.0
 """Altitude of the sun below which cars drive with their lights on [degrees]; in rain and fog they do so, too."""
@@ -173,10 +173,8 @@ class SessionCamera:
                 }
             )
             self._phases = phases
-        self._steady = (
-            time,
-            min((programme.change_after(time) for programme in self.scene.town.programmes), default=math.inf),
-        )
+        changes = [programme.change_after(time) for programme in self.scene.town.programmes]
+        self._steady = time, min(changes, default=math.inf)
 
     def _show_lights(self, states: Mapping[int, LightColour]) -> None:
         """Paints the lenses in the colours of the traffic lights, if one has changed."""
