@@ -48,7 +48,7 @@ def test_noise_has_classes_by_the_ratio_of_speech_to_noise() -> None:
 def test_classes_of_words_are_misheard_as_often_as_measured() -> None:
     rng, errors, words = np.random.default_rng(3), Counter[WordClass](), Counter[WordClass]()
     channel = AsrChannel(rate=0.05, substitutions=1.0, deletions=0.0)
-    for text in SAID * 5:
+    for text in SAID * 40:
         heard = channel.transcribe(text, rng).split()
         for said, got in zip(text.split(), heard, strict=True):
             words[word_class(said)] += 1
