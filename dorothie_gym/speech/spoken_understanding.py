@@ -64,17 +64,17 @@ def readable(text: str) -> str:
 def audible(recognition: Recognition) -> str:
     """Returns the recognised words with `INAUDIBLE` in place of doubtful ones, where these may change the meaning.
 
-    They may if the best hypotheses name different values, or if the speech is short. Short speech without a command is
-    inaudible, however sure, if another hypothesis is a stop ("great", "brake"), which must not be missed; of 110 short
-    spans that were no stop, none was taken for one.
-    Systems of spoken dialogue likewise reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial
-    2005).
+    They may if the best hypotheses name different values, if most words are doubtful, or if the speech is short. Short
+    speech without a command is inaudible, however sure, if another hypothesis is a stop ("great", "brake"), which must
+    not be missed; of 110 short spans that were no stop, none was taken for one. Systems of spoken dialogue likewise
+    reject what they are not sure of, and ask again (Bohus and Rudnicky, SIGdial 2005).
     """
     short = len(recognition.words) <= SHORT
     if short and _may_be_stop(recognition):
         return INAUDIBLE
     meanings = {_named_values(each.text) for each in recognition.hypotheses[:COMPARED]}
-    if not any(map(_is_doubtful, recognition.words)) or (not short and len(meanings) == 1):
+    doubtful = sum(map(_is_doubtful, recognition.words))
+    if not doubtful or (not short and len(meanings) == 1 and 2 * doubtful <= len(recognition.words)):
         return recognition.text
     marked = (INAUDIBLE if _is_doubtful(word) else word.text for word in recognition.words)
     return " ".join(word for text, run in groupby(marked) for word in ([text] if text == INAUDIBLE else run))

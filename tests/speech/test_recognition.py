@@ -138,6 +138,7 @@ def heard(*words: tuple[str, float], others: Sequence[str] = ()) -> Recognition:
         (heard(("great", 0.9), others=("overrated", "rate")), "great"),
         (heard(("drive", 0.9), others=("brake",)), "drive"),
         (heard(("stop", 0.9), others=("that's done",)), "stop"),
+        (heard(("i", 0.1), ("said", 0.1), ("more", 0.9)), "... more"),
         (heard(("where", 0.1), ("to", 0.9), ("now", 0.9), others=("we're to now",)), "where to now"),
         (heard(("go", math.nan), ("left", math.nan)), "go left"),
         (Recognition(text=""), ""),
