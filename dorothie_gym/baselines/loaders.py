@@ -14,6 +14,7 @@ from dorothie_gym.spaces import SpaceLimits
 if TYPE_CHECKING:
     from dorothie_gym.baselines.acting.policy import BenchmarkCoWizard
     from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
+    from dorothie_gym.baselines.participant.policy import LearnedParticipant
     from dorothie_gym.baselines.selfplay.policy import LearnedPolicy
     from dorothie_gym.policies.navigation import NavigationPolicy
 
@@ -77,6 +78,29 @@ def load_co_wizard(path: Path, role: Role, limits: SpaceLimits) -> LearnedCoWiza
     torch.set_num_threads(1)  # a small network: more threads only wait for each other
     network, page = load_network(path)
     return LearnedCoWizard(network, page.vocabulary, limits)
+
+
+def load_participant(path: Path, role: Role, limits: SpaceLimits) -> LearnedParticipant:
+    """Returns a learned participant (`dorothie-gym train participant`).
+
+    Args:
+        path: folder of the model, or `model.json` in it.
+        role: the role to play.
+        limits: sizes of the spaces.
+
+    Raises:
+        ValueError: the role is not the participant, or the files are missing or damaged.
+    """
+    if role is not Role.PARTICIPANT:
+        raise ValueError(f"{path}: plays the participant, not the {role}")
+    import torch
+
+    from dorothie_gym.baselines.participant.files import load_network
+    from dorothie_gym.baselines.participant.policy import LearnedParticipant
+
+    torch.set_num_threads(1)  # a small network: more threads only wait for each other
+    network, page = load_network(path)
+    return LearnedParticipant(network, page.vocabulary, limits)
 
 
 def load_selfplay_model(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:

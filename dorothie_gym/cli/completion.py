@@ -50,10 +50,10 @@ def complete_model(incomplete: str) -> list[str]:
         from dorothie_gym.baselines.model_zoo import CAMERA_ROWS, ROWS
     except ImportError:
         return []
-    from dorothie_gym.cli.train_co_wizard import CO_WIZARD
+    from dorothie_gym.cli.train_roles import ROLES
     from dorothie_gym.cli.train_vision import VISION_MODELS
 
-    return _names(incomplete, (*(row.command for row in (*ROWS, *CAMERA_ROWS)), *VISION_MODELS, CO_WIZARD))
+    return _names(incomplete, (*(row.command for row in (*ROWS, *CAMERA_ROWS)), *VISION_MODELS, *ROLES))
 
 
 def complete_algorithm(incomplete: str) -> list[str]:

@@ -23,7 +23,7 @@ from dorothie_gym.cli.output import (
     stdout,
     wide_stdout,
 )
-from dorothie_gym.cli.train_co_wizard import CO_WIZARD, train_co_wizard
+from dorothie_gym.cli.train_roles import ROLES, train_role
 from dorothie_gym.cli.train_vision import VISION_MODELS, train_vision
 
 if TYPE_CHECKING:
@@ -49,7 +49,9 @@ Size = Annotated[str, typer.Option("--config", "--size", help="small (two cores)
 Seeds = Annotated[int, typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...")]
 SomeSeeds = Annotated[
     int | None,
-    typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...; default 5, of segformer, detr and co-wizard 1."),
+    typer.Option(
+        min=1, max=99, help="Number of seeds: 0, 1, ...; default 5, of segformer, detr, co-wizard and participant 1."
+    ),
 ]
 Device = Annotated[
     str | None, typer.Option(help="segformer and detr: cpu, cuda, ...; default the GPU where there is one.")
@@ -91,7 +93,7 @@ def train(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="toto, toto-belief, bert, ... (see `table`); segformer, detr; co-wizard.",
+            help="toto, toto-belief, bert, ... (see `table`); segformer, detr; co-wizard, participant.",
             autocompletion=complete_model,
         ),
     ],
@@ -112,7 +114,7 @@ def train(
     """Train a model with several seeds, test it, and print its scores.
 
     An interrupted run is resumed by the same command. The vision models, segformer and detr, learn from pictures of the
-    recorded sessions; co-wizard learns to talk and drive by imitation and practice.
+    recorded sessions; co-wizard learns to talk and drive, and participant to guide, by imitation and practice.
     """
     if model in VISION_MODELS:
         if detector is not None:
@@ -127,11 +129,11 @@ def train(
     for option, given in (("--device", device), ("--inputs", inputs), ("--epochs", epochs)):
         if given is not None:
             fail(f"{option} is for {' and '.join(VISION_MODELS)} only")
-    if model == CO_WIZARD:
+    if model in ROLES:
         if detector is not None or hubert is not None or strict or size != SMALL or encoder != AUTO:
-            fail(f"--detector, --hubert, --strict, --config and --encoder are not for {CO_WIZARD}")
+            fail(f"--detector, --hubert, --strict, --config and --encoder are not for {model}")
         with _reporting_errors():
-            train_co_wizard(*_places(corpus, out), seeds=seeds or 1, workers=workers, as_json=as_json)
+            train_role(model, *_places(corpus, out), seeds=seeds or 1, workers=workers, as_json=as_json)
         return
     _train_benchmark_model(
         model, corpus, out, size=size, seeds=seeds or 5, encoder=encoder, workers=workers, strict=strict,

@@ -83,14 +83,7 @@ def approach(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     close = left < config.stop_distance
     if not state.guidance.guiding or view.time - state.guidance.nudged_at < config.nudge_time:
         return close  # a car that was sent on a little stops by itself
-    if not state.guidance.stop_text:
-        _choose_stop_words(state, rng)
-    if _room_to_stop(state, view, left)[0] < -config.late_stop:
-        # there is only time for a shout
-        shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(SHOUTS)]
-        options = [text for text in (*shouts, state.guidance.stop_text) if text != state.guidance.stop_said] or shouts
-        shortest = min(options, key=state.speech.delivery.seconds)
-        state.guidance = state.guidance.with_stop_text(shortest)
+    prepare_stop(state, view, left, rng)
     if _is_time_to_stop(state, view, left):
         if view.time - state.guidance.stopped_at > _stop_repeat(state, view) and left > 0.0:
             words, points_out = state.guidance.stop_text, state.guidance.points_out
@@ -111,6 +104,20 @@ def repeat_stop(state: ParticipantState, view: ParticipantView) -> None:
     if unheeded and -PASSED < progress.left(view.station) <= 0.0 and state.speech.idle and view.speaking <= 0.0:
         state.guidance = state.guidance.after_stopping(view.time)
         state.say(order(DialogueMove.CLARIFY, ActionValue.STOP, urgent=True))
+
+
+def prepare_stop(
+    state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator
+) -> None:  # fmt: skip
+    """Chooses the words to stop the car with ahead, because their duration decides when they have to be said."""
+    if not state.guidance.stop_text:
+        _choose_stop_words(state, rng)
+    if room_to_stop(state, view, left)[0] < -state.config.late_stop:
+        # there is only time for a shout
+        shouts = [word_act(_STOP, Role.PARTICIPANT, rng, Wording(), style=_SHOUTING) for _ in range(SHOUTS)]
+        options = [text for text in (*shouts, state.guidance.stop_text) if text != state.guidance.stop_said] or shouts
+        shortest = min(options, key=state.speech.delivery.seconds)
+        state.guidance = state.guidance.with_stop_text(shortest)
 
 
 def _choose_stop_words(state: ParticipantState, rng: np.random.Generator) -> None:
@@ -175,7 +182,7 @@ def _is_time_to_stop(state: ParticipantState, view: ParticipantView, left: float
     slow = view.speed < max(state.motion.speed, state.config.slow_speed)
     if state.guidance.approach_announced and left > state.config.slow_distance and slow:
         return False  # the car is slowing down
-    room, after = _room_to_stop(state, view, left)
+    room, after = room_to_stop(state, view, left)
     return room <= (state.config.short_stop if state.route.misses else 0.0) or room < -after
 
 
@@ -187,7 +194,7 @@ def _is_about_to_speed_up(state: ParticipantState, view: ParticipantView, delay:
     return out and not warned and view.speed < state.config.soon_speed
 
 
-def _room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> tuple[float, float]:
+def room_to_stop(state: ParticipantState, view: ParticipantView, left: float) -> tuple[float, float]:
     """Returns the distance before the place at which the car stops [m]: instructed now, and at the next decision.
 
     Negative distances lie behind the place. The words take effect when they end; until then the present

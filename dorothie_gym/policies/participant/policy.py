@@ -91,7 +91,7 @@ class ScriptedParticipant(Policy[ParticipantState]):
         if view.turning and updated.motion.standstill(view.time) > TURN_TIME:
             view = replace(view, turning=False)
         updated.motion = updated.motion.observed(view.time, standing=view.standing)
-        _excuse_at_light(updated, view)
+        excuse_at_light(updated, view)
         note_tasks(updated, view, rng)
         choose_target(updated, view, rng)
         follow_route(updated, view)
@@ -109,7 +109,7 @@ class ScriptedParticipant(Policy[ParticipantState]):
         return ParticipantAction(speech=speech).encode(self.limits), updated
 
 
-def _excuse_at_light(state: ParticipantState, view: ParticipantView) -> None:
+def excuse_at_light(state: ParticipantState, view: ParticipantView) -> None:
     """Excuses a standstill before a red light and right after it has turned green."""
     progress, config = state.route.progress, state.config
     last_stretch = (

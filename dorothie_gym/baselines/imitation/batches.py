@@ -1,0 +1,93 @@
+"""Examples as tensors, and the files that hold those of a session."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, ClassVar, Final, Self
+
+import torch
+from safetensors import safe_open
+from safetensors.torch import load_file
+
+from dorothie_gym.baselines.tensor_files import save_tensors
+from dorothie_gym.files import replacing
+
+UNKNOWN: Final = -1
+"""Target of what is not learnt from an example."""
+
+_FORMS: Final = "forms"
+
+
+@dataclass(frozen=True, eq=False)
+class TensorBatch:
+    """Examples as tensors; the first axis of each is that of the examples.
+
+    Attributes:
+        REMARKS: names of the tensors that number remarks; 0 is silence.
+    """
+
+    REMARKS: ClassVar[tuple[str, ...]] = ()
+
+    def __len__(self) -> int:
+        """Returns the number of examples."""
+        first: torch.Tensor = getattr(self, fields(self)[0].name)
+        return len(first)
+
+    def rows(self, index: torch.Tensor) -> Self:
+        """Returns some examples."""
+        return type(self)(**{one.name: getattr(self, one.name)[index] for one in fields(self)})
+
+    @classmethod
+    def joined(cls, batches: Sequence[Self]) -> Self:
+        """Returns all examples of some batches."""
+        found: dict[str, Any] = {}
+        for one in fields(cls):
+            found[one.name] = torch.cat([getattr(batch, one.name) for batch in batches])
+        return cls(**found)
+
+    def write(self, path: Path, forms: Sequence[str]) -> None:
+        """Writes the examples with the forms of their remarks."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as part:
+            tensors = {one.name: getattr(self, one.name).contiguous() for one in fields(self)}
+            save_tensors(tensors, part, {_FORMS: json.dumps(list(forms))})
+
+    @classmethod
+    def read(cls, paths: Sequence[Path], vocabulary: Sequence[str]) -> Self:
+        """Returns the examples of some files, with their remarks numbered by a vocabulary; others are not learnt."""
+        numbers = {form: k for k, form in enumerate(vocabulary)}
+        batches = []
+        for path in paths:
+            tensors = load_file(path)
+            known = torch.tensor([numbers.get(form, UNKNOWN) for form in forms_of(path)] + [UNKNOWN], dtype=torch.int16)
+            for name in cls.REMARKS:
+                tensors[name] = known[tensors[name].long()]  # -1, the last one, stays unknown
+            batches.append(cls(**tensors))
+        return cls.joined(batches)
+
+    @classmethod
+    def vocabulary_of(cls, paths: Sequence[Path], least: int) -> tuple[str, ...]:
+        """Returns the forms that occur at least some number of times in files, the most frequent first, after silence.
+
+        Args:
+            paths: files.
+            least: the number of times.
+        """
+        counts: Counter[str] = Counter()
+        for path in paths:
+            forms, tensors = forms_of(path), load_file(path)
+            for name in cls.REMARKS:
+                counts.update(forms[number] for number in tensors[name].flatten().tolist() if number > 0)
+        order = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
+        return ("", *(form for form, count in order if count >= least))
+
+
+def forms_of(path: Path) -> list[str]:
+    """Returns the forms of the remarks in a file."""
+    with safe_open(path, framework="pt") as file:
+        found: list[str] = json.loads(file.metadata()[_FORMS])
+    return found
