@@ -49,7 +49,8 @@ from dorothie_gym.rendering import town_picture
 from dorothie_gym.rendering.playback import Playback
 from dorothie_gym.rendering.session_views import SessionRenderer
 from dorothie_gym.rollout import play_session
-from dorothie_gym.rollout.closed_loop.leaderboard import CHART_METRICS, PART_TITLES, ChartRow, draw_rows
+from dorothie_gym.rollout.closed_loop.leaderboard import PART_TITLES
+from dorothie_gym.rollout.closed_loop.leaderboard_chart import CHART_METRICS, ChartRow, draw_rows
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.weather import Weather
 

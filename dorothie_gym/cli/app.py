@@ -18,13 +18,15 @@ from dorothie_gym.cli.annotations import agreement, annotations_app
 from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.console import console
 from dorothie_gym.cli.convert import convert
+from dorothie_gym.cli.cross_play import cross_play
 from dorothie_gym.cli.evaluate import evaluate
 from dorothie_gym.cli.frames import frames
 from dorothie_gym.cli.generate import generate
+from dorothie_gym.cli.leaderboard import leaderboard
 from dorothie_gym.cli.listings import envs, policies, storyboards, towns
 from dorothie_gym.cli.options import PictureCommand
 from dorothie_gym.cli.output import exit_interrupted, fail
-from dorothie_gym.cli.rollout import leaderboard, rollout
+from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.sessions import compare, film, replay
 from dorothie_gym.cli.show import show
@@ -94,6 +96,7 @@ app.command()(convert)
 app.command(cls=PictureCommand)(stats)
 app.command()(generate)
 app.command()(rollout)
+app.command("cross-play")(cross_play)
 app.command()(leaderboard)
 app.command()(submit)
 app.command()(replay)

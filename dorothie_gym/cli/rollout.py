@@ -1,4 +1,4 @@
-"""`dorothie-gym rollout` and `leaderboard`: closed-loop evaluation of policies, and their ranking as a page."""
+"""`dorothie-gym rollout`: closed-loop evaluation of policies."""
 
 from __future__ import annotations
 
@@ -39,13 +39,11 @@ from dorothie_gym.cli.options import (
 )
 from dorothie_gym.cli.output import (
     FAILED,
-    check_file,
     exit_interrupted,
     fail,
     print_json,
     reporting_errors,
     session_progress,
-    stdout,
     wide_stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
@@ -153,54 +151,3 @@ def _exit_interrupted(folder: Path, settings: RolloutSettings) -> None:
         f"Interrupted with {done} of {settings.sessions} sessions finished; their results are in "
         f"{folder / RESULT_FILE}; resume with: {command_of(settings.to_json())} --out {shlex.quote(str(folder))}"
     )
-
-
-# --- Leaderboard ------------------------------------------------------------------------------------------------------
-
-PAGE = Path("leaderboard.md")
-"""Default page of the leaderboard, in the present folder."""
-
-DEFINITIONS = "closed-loop.md"
-"""Page with the definitions of the metrics; linked where it lies beside the leaderboard, as in docs."""
-
-
-def leaderboard(
-    folders: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Folders of rollouts, or folders that contain them.")
-    ],
-    out: Annotated[
-        Path,
-        typer.Option(metavar="FILE.md", help="Page to write; its picture is written beside it as .png."),
-    ] = PAGE,
-    as_json: AsJson = False,
-) -> None:
-    """Rank policies by their rollouts, on a page with intervals, cost and commands, and in a picture."""
-    with reporting_errors():
-        from dorothie_gym.errors import RolloutError
-        from dorothie_gym.rollout.closed_loop.leaderboard import (
-            draw_leaderboard,
-            labels_of,
-            leaderboard_page,
-            read_entries,
-        )
-
-        if out.suffix != ".md":
-            fail(f"{out}: the page is Markdown; give a name that ends in .md")
-        check_file(out)
-        try:
-            entries = read_entries(folders)
-        except RolloutError as error:
-            fail(str(error))
-        picture = draw_leaderboard(entries, out.with_suffix(".png"))
-        definitions = DEFINITIONS if (out.parent / DEFINITIONS).is_file() else None
-        out.write_text(leaderboard_page(entries, picture.name, definitions), encoding="utf-8")
-    if as_json:
-        rows = [{"policy": entry.policy, "towns": entry.part, **entry.table.to_json()} for entry in entries]
-        print_json({"page": str(out), "picture": str(picture), "rows": rows})
-        return
-    console, labels = stdout(), labels_of(entries)
-    for entry in entries:
-        success = entry.table.figures["success"]["mean"]
-        share = "-" if success is None else f"{100 * success:.1f} %"
-        console.print(f"{entry.part:7} {labels[entry.policy]}: success {share}", markup=False, soft_wrap=True)
-    console.print(f"Written: {out}, {picture}", style="dim", markup=False, soft_wrap=True)

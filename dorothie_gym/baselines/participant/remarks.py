@@ -197,7 +197,7 @@ def _example(source: str) -> object:
         return "text"
     if source in _PLACES:
         return LandmarkName.KFC
-    return StreetName.BEAL if source in _STREETS else 30
+    return StreetName.BEAL if source in _STREETS else 1
 
 
 # --- Stop at the target -----------------------------------------------------------------------------------------------

@@ -34,7 +34,6 @@ from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import Corpus
 
-
 _PRACTICE: Final = 31
 """Branch of the seed of the sessions of the practice."""
 

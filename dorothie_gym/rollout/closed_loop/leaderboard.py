@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 from collections.abc import Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import RolloutError
-from dorothie_gym.files import replacing
 from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
-from dorothie_gym.ontology import Role
-from dorothie_gym.rendering.charts import INK, dress_percent_axes, empty_figure
+from dorothie_gym.ontology import ExceptionKind, Role
 from dorothie_gym.rollout.closed_loop.metrics import ClosedLoopMetric, RecoverySeconds
 from dorothie_gym.rollout.closed_loop.results import (
     ALL_METRICS,
+    NO_EXCEPTION,
     RESULT_FILE,
     RolloutResult,
     RolloutTable,
@@ -28,15 +28,21 @@ from dorothie_gym.rollout.closed_loop.running import command_of, fold_of_towns
 from dorothie_gym.rollout.closed_loop.session_record import Amount
 from dorothie_gym.rollout.runner import COST_FILE
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+IMPORTED: Final = "imported"
+"""Part of the leaderboard for rollouts in towns from OpenDRIVE files."""
 
 OTHER: Final = "other"
-"""Part of the leaderboard for rollouts in towns of both folds, or of neither."""
+"""Part of the leaderboard for rollouts in towns of several parts, or of none."""
 
-PART_TITLES: Final[Mapping[str, str]] = {"seen": "Seen towns", "unseen": "Unseen towns", OTHER: "Other towns"}
+PART_TITLES: Final[Mapping[str, str]] = {
+    "seen": "Seen towns", "unseen": "Unseen towns", IMPORTED: "Imported towns", OTHER: "Other towns",
+}  # fmt: skip
 """Parts of the page and their titles."""
+
+ENOUGH: Final = 100
+"""Number of sessions of a row from which on it is compared; as `submission.Protocol`."""
+
+_KINDS: Final = (*(kind.name.lower() for kind in ExceptionKind), NO_EXCEPTION)
 
 PAGE_METRICS: Final = (
     "success", "goal_condition_success", "spl", "route_completion", "infraction_score", "driving_score", "seconds",
@@ -100,7 +106,9 @@ class LeaderboardEntry:
     @property
     def part(self) -> str:
         """Part of the page, a key of `PART_TITLES`."""
-        return fold_of_towns(self.result.settings["towns"]) or OTHER
+        towns = self.result.settings["towns"]
+        imported = all(str(town).lower().endswith(".xodr") for town in towns)
+        return fold_of_towns(towns) or (IMPORTED if imported else OTHER)
 
     @property
     def rank(self) -> tuple[bool, float, float, str]:
@@ -178,6 +186,8 @@ def leaderboard_page(
             f"Rollouts with sessions shorter than {usual} are marked and ranked after the others:",
             "a session that is cut off can reach fewer subgoals, and meets fewer difficulties.",
         ]
+    if any(len(entry.result.rows) < ENOUGH for entry in entries):
+        lines += ["", f"Rows of fewer than {ENOUGH} sessions have wide intervals; they are no basis for a ranking."]
     labels = labels_of(entries)
     if picture is not None:
         lines += ["", f"![Success and driving score of each policy, with intervals]({picture})"]
@@ -185,6 +195,7 @@ def leaderboard_page(
         chosen = [entry for entry in entries if entry.part == part]
         if chosen:
             lines += ["", f"## {title}", "", *_figures(chosen, labels)]
+    lines += _by_exception(entries, labels)
     lines += [
         "",
         "## Cost",
@@ -194,7 +205,10 @@ def leaderboard_page(
         *_language_models(entries, labels),
         "## Commands",
         "",
-        "These commands reproduce the tables:",
+        "These commands reproduce the tables but for times, which depend on the machine. The SHA-256 of all figures",
+        "and of the sessions that they come from is equal on any machine:",
+        "",
+        f"`{figures_sha256(entries)}`",
         "",
     ]
     lines += ["```bash", *(command_of(entry.result.settings) for entry in entries), "```", ""]
@@ -211,6 +225,53 @@ def _figures(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> 
         part = "" if entry.result.complete else f" of {entry.result.settings['sessions_planned']}"
         rows.append([labels[entry.policy], f"{entry.table.sessions}{part}", str(entry.table.errored), *cells])
     return _table(rows)
+
+
+def _by_exception(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> list[str]:
+    """Returns the section on success in the sessions with each kind of exception; empty for no sessions."""
+    success = next(metric for metric in ALL_METRICS if metric.key == "success")
+    lines = [
+        "",
+        "## Success by exception",
+        "",
+        "Success in the sessions in which an exception of a kind occurred, and their number; a session with several",
+        f"kinds counts for each. `{NO_EXCEPTION}`: sessions without exceptions.",
+    ]
+    for part, title in PART_TITLES.items():
+        tables = {entry.policy: entry.result.per_exception() for entry in entries if entry.part == part}
+        kinds = [kind for kind in _KINDS if any(kind in table for table in tables.values())]
+        if not kinds:
+            continue
+        rows = [["Co-Wizard", *(kind.replace("_", " ") for kind in kinds)]]
+        for policy, found in tables.items():
+            cells = [
+                f"{figure_text(success, found[kind].figures['success'])} of {found[kind].sessions}"
+                if kind in found else "-"
+                for kind in kinds
+            ]  # fmt: skip
+            rows.append([labels[policy], *cells])
+        lines += ["", f"### {title}, by exception", "", *_table(rows)]
+    return lines if len(lines) > 5 else []
+
+
+def figures_sha256(entries: Sequence[LeaderboardEntry]) -> str:
+    """Returns the hash of what the rows of a leaderboard say: policies, weights, sessions and measures, not times."""
+    pages = []
+    for entry in entries:
+        settings = entry.result.settings
+        towns = [PurePath(str(town).replace("\\", "/")).stem for town in settings["towns"]]
+        rows = [{**row.to_json(), "town": PurePath(row.town.replace("\\", "/")).stem} for row in entry.result.rows]
+        pages.append(
+            {
+                "policy": entry.label,
+                "sha256": settings.get("sha256", {}),
+                "towns": towns,
+                "seed": settings["seed"],
+                "config": settings["config"],
+                "rows": [{**row, "usage": None} for row in rows],
+            }
+        )
+    return hashlib.sha256(json.dumps(pages, sort_keys=True).encode()).hexdigest()
 
 
 def _costs(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> list[str]:
@@ -281,104 +342,3 @@ def _read(folder: Path) -> LeaderboardEntry:
         page = read_json(file, MAX_SMALL_JSON) if file.exists() else {}
         cost = checked(page, dict[str, Amount], file)
     return LeaderboardEntry(folder=folder, result=result, table=result.table(), cost=cost)
-
-
-# --- picture ----------------------------------------------------------------------------------------------------------
-
-CHART_METRICS: Final = ("success", "goal_condition_success", "driving_score", "spl")
-"""Metrics of the panels of the picture."""
-
-_ROW, _TOP, _BOTTOM = 0.5, 1.2, 0.6
-_COLOURS: Final = {"seen": "#2f62c4", "unseen": "#cf7f1d", OTHER: "#5f8a3a"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class ChartRow:
-    """Rollout in the picture.
-
-    Attributes:
-        label: name of the policy.
-        part: key of `PART_TITLES`.
-        figures: `mean`, `low` and `high` of each of `CHART_METRICS`.
-    """
-
-    label: str
-    part: str
-    figures: Mapping[str, Mapping[str, float | None]]
-
-
-def draw_leaderboard(entries: Sequence[LeaderboardEntry], path: Path | str) -> Path:
-    """Draws the leaderboard.
-
-    Args:
-        entries: the rollouts, in order.
-        path: PNG file to write.
-
-    Returns:
-        The path.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
-    labels = labels_of(entries)
-    rows = [
-        ChartRow(
-            label=labels[entry.policy],
-            part=entry.part,
-            figures={key: entry.table.figures[key] for key in CHART_METRICS},
-        )
-        for entry in sorted(entries, key=lambda entry: entry.rank)
-    ]
-    return draw_rows(rows, path)
-
-
-def draw_rows(rows: Sequence[ChartRow], path: Path | str) -> Path:
-    """Draws the rows of a leaderboard, policies from best to worst; see `draw_leaderboard`."""
-    names = list(dict.fromkeys(row.label for row in rows))
-    height = _TOP + _BOTTOM + _ROW * max(len(names), 1)
-    with empty_figure(12.0, height) as figure:
-        axes = figure.subplots(1, len(CHART_METRICS), sharey=True, squeeze=False)[0]
-        figure.subplots_adjust(left=0.2, right=0.98, top=1 - _TOP / height, bottom=_BOTTOM / height, wspace=0.09)
-        for key, panel in zip(CHART_METRICS, axes, strict=True):
-            _panel(panel, rows, names, key)
-        axes[0].set_yticks(range(len(names)), [_folded(name) for name in names], fontsize=9, color=INK)
-        axes[0].set_ylim(len(names) - 0.5, -0.5)
-        figure.text(0.012, 1 - 0.38 / height, "Co-Wizards in the loop", fontsize=14, weight="bold")
-        _legend(figure, {row.part for row in rows}, height)
-        with replacing(Path(path)) as part:
-            figure.savefig(part, format="png")
-    return Path(path)
-
-
-def _folded(label: str) -> str:
-    """Returns a label with its remarks, which are in brackets, on a line of their own."""
-    return label.replace(" (", "\n(", 1)
-
-
-def _panel(axes: Axes, rows: Sequence[ChartRow], names: Sequence[str], key: str) -> None:
-    parts = [part for part in PART_TITLES if any(row.part == part for row in rows)]
-    for row in rows:
-        figure = row.figures[key]
-        mean, low, high = figure["mean"], figure["low"], figure["high"]
-        if mean is None:
-            continue
-        at = names.index(row.label) + (parts.index(row.part) - (len(parts) - 1) / 2) * 0.3
-        colour = _COLOURS[row.part]
-        if low is not None and high is not None:
-            axes.plot([100 * low, 100 * high], [at, at], color=colour, linewidth=1.4, zorder=2)
-        axes.plot([100 * mean], [at], "o", markersize=5.5, color=colour, zorder=3)
-    title = next(metric.title for metric in ALL_METRICS if metric.key == key)
-    dress_percent_axes(axes, title, len(names), margin=3)
-
-
-def _legend(figure: Figure, parts: AbstractSet[str], height: float) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], color=_COLOURS[part], marker="o", label=title.lower())
-        for part, title in PART_TITLES.items()
-        if part in parts
-    ]
-    figure.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(0.006, 1 - 0.5 / height), ncols=3, frameon=False, fontsize=9
-    )

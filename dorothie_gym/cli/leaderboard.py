@@ -1,0 +1,161 @@
+"""`dorothie-gym leaderboard`: ranking of policies by their rollouts, which it plays on request, as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dorothie_gym.cli.completion import complete_policy
+from dorothie_gym.cli.options import AsJson, MaxSeconds, Players, Ray
+from dorothie_gym.cli.output import (
+    FAILED,
+    check_file,
+    exit_interrupted,
+    fail,
+    print_json,
+    reporting_errors,
+    session_progress,
+    stdout,
+)
+
+if TYPE_CHECKING:
+    from dorothie_gym.rollout.closed_loop.leaderboard import LeaderboardEntry
+    from dorothie_gym.rollout.closed_loop.leaderboard_rows import LeaderboardPlan
+
+PAGE = Path("leaderboard.md")
+"""Default page of the leaderboard, in the present folder."""
+
+DEFINITIONS = "closed-loop.md"
+"""Page with the definitions of the metrics; linked where it lies beside the leaderboard, as in docs."""
+
+_PANEL = "Playing (--play)"
+
+
+def leaderboard(
+    folders: Annotated[
+        list[Path],
+        typer.Argument(metavar="DIR...", help="Folders of rollouts, or folders that contain them; one with --play."),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(metavar="FILE.md", help="Page to write; its picture is written beside it as .png."),
+    ] = PAGE,
+    play: Annotated[
+        bool,
+        typer.Option(
+            "--play", help="First play what is missing, into DIR; a started run is resumed.", rich_help_panel=_PANEL
+        ),
+    ] = False,
+    row: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--row", metavar="NAME|FILE", rich_help_panel=_PANEL, autocompletion=complete_policy("co_wizard"),
+            help="A Co-Wizard, as in `rollout`; repeat it. Default: scripted, lane-follow, random, all shipped models.",
+        ),
+    ] = None,
+    parts: Annotated[
+        str, typer.Option(metavar="seen,unseen", help="Parts to play.", rich_help_panel=_PANEL)
+    ] = "seen,unseen",
+    imported: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE.xodr", help="An OpenDRIVE file for the part of imported towns; repeat it.",
+            rich_help_panel=_PANEL,
+        ),
+    ] = None,
+    sessions: Annotated[
+        int, typer.Option(min=1, help="Number of sessions of each row.", rich_help_panel=_PANEL)
+    ] = 100,
+    max_seconds: MaxSeconds = None,
+    workers: Players = None,
+    ray: Ray = None,
+    as_json: AsJson = False,
+) -> None:  # fmt: skip
+    """Rank policies by their rollouts, on a page with intervals, cost and commands, and in a picture.
+
+    With --play, one command makes the whole page again: it plays all rows with seed 0, then writes the page.
+    """
+    with reporting_errors():
+        from dorothie_gym.errors import RolloutError
+        from dorothie_gym.rollout.closed_loop.leaderboard import figures_sha256, leaderboard_page, read_entries
+        from dorothie_gym.rollout.closed_loop.leaderboard_chart import draw_leaderboard
+
+        if out.suffix != ".md":
+            fail(f"{out}: the page is Markdown; give a name that ends in .md")
+        check_file(out)
+        if play:
+            if len(folders) != 1:
+                fail("--play takes one folder, for all rollouts")
+            plan = _plan(row, parts, imported or [], sessions, max_seconds)
+            _play(plan, folders[0], workers, ray, quiet=as_json)
+        try:
+            entries = read_entries(folders)
+        except RolloutError as error:
+            fail(str(error))
+        picture = draw_leaderboard(entries, out.with_suffix(".png"))
+        definitions = DEFINITIONS if (out.parent / DEFINITIONS).is_file() else None
+        out.write_text(leaderboard_page(entries, picture.name, definitions), encoding="utf-8")
+    if as_json:
+        rows = [{"policy": entry.policy, "towns": entry.part, **entry.table.to_json()} for entry in entries]
+        print_json({"page": str(out), "picture": str(picture), "sha256": figures_sha256(entries), "rows": rows})
+        return
+    _print(entries, out, picture)
+
+
+def _print(entries: Sequence[LeaderboardEntry], out: Path, picture: Path) -> None:
+    from dorothie_gym.rollout.closed_loop.leaderboard import labels_of
+
+    console, labels = stdout(), labels_of(entries)
+    for entry in entries:
+        success = entry.table.figures["success"]["mean"]
+        share = "-" if success is None else f"{100 * success:.1f} %"
+        console.print(f"{entry.part:8} {labels[entry.policy]}: success {share}", markup=False, soft_wrap=True)
+    console.print(f"Written: {out}, {picture}", style="dim", markup=False, soft_wrap=True)
+
+
+def _plan(
+    row: list[str] | None, parts: str, imported: list[str], sessions: int, max_seconds: float | None
+) -> LeaderboardPlan:  # fmt: skip
+    """Returns the rollouts to be played; exits if a name or file is unknown."""
+    from dorothie_gym.cli.language_model import AnswerTime, LanguageModelOptions
+    from dorothie_gym.cli.options import env_config, find_cast
+    from dorothie_gym.maps import load_town
+    from dorothie_gym.ontology import Role
+    from dorothie_gym.rollout.closed_loop.leaderboard_rows import LeaderboardPlan, usual_rows
+
+    for file in imported:
+        load_town(file)
+    asked = LanguageModelOptions(
+        url=None, timeout=30.0, tokens=300, time=AnswerTime.WAITS, pictures=False, cassette=None, replay=False,
+        prices=None,
+    )  # fmt: skip
+    names = row or list(usual_rows())
+    players = [find_cast("scripted", name, "scripted", asked)[Role.CO_WIZARD] for name in names]
+    try:
+        return LeaderboardPlan(
+            co_wizards=players, parts=tuple(part.strip() for part in parts.split(",") if part.strip()),
+            imported=tuple(imported), sessions=sessions, config=env_config(max_seconds, None),
+        )  # fmt: skip
+    except ValueError as error:
+        fail(str(error))
+
+
+def _play(plan: LeaderboardPlan, folder: Path, workers: int | None, ray: str | None, *, quiet: bool) -> None:
+    from dorothie_gym.cli.warm_up import compile_first
+    from dorothie_gym.errors import ProcessError
+    from dorothie_gym.processors import available_processors
+    from dorothie_gym.rollout.closed_loop.many_rollouts import roll_out_all
+
+    try:
+        compile_first(pictures=False)
+        with session_progress(quiet=quiet) as on_session:
+            roll_out_all(
+                plan.rollouts(), folder, workers=workers or available_processors(), ray=ray, on_session=on_session
+            )
+    except KeyboardInterrupt:
+        exit_interrupted(f"Interrupted; the finished sessions are in {folder}; resume with the same command.")
+    except ProcessError as error:
+        fail(f"{error}; the finished sessions are kept in {folder}", FAILED)
