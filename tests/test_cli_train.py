@@ -31,6 +31,7 @@ runner = CliRunner()
         (["table", "--models", "toto,et-detections"], "run first: dorothie-gym train detr"),
         (["train", "co-wizard", "--config", "paper"], "--config and --encoder are not for co-wizard"),
         (["train", "co-wizard", "--encoder", "minilm"], "--config and --encoder are not for co-wizard"),
+        (["train", "participant", "--strict"], "--config and --encoder are not for participant"),
         (["train", "detr"], "run first: dorothie-gym train segformer"),
     ],
 )

@@ -8,13 +8,15 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from dorothie_gym.baselines import checkpoints, loaders
-from dorothie_gym.baselines.co_wizard import files
+from dorothie_gym.baselines.co_wizard import files as co_wizard_files
+from dorothie_gym.baselines.participant import files as participant_files
 from dorothie_gym.baselines.rl import checkpoint, settings
 from dorothie_gym.policies.policy_loader import MODEL_LOADERS
 
 
 def test_each_kind_of_model_has_a_loader() -> None:
-    assert set(MODEL_LOADERS) == {checkpoints.KIND, checkpoint.KIND, settings.SELFPLAY, files.KIND}
+    roles = {co_wizard_files.KIND, participant_files.KIND}
+    assert set(MODEL_LOADERS) == {checkpoints.KIND, checkpoint.KIND, settings.SELFPLAY, *roles}
     for entry in MODEL_LOADERS.values():
         module, name = entry.split(":")
         assert module == loaders.__name__ and callable(getattr(loaders, name))

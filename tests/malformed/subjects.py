@@ -326,6 +326,22 @@ def _co_wizard_model(folder: Path) -> None:
     save_network(CoWizardNetwork(layout), page, folder / "co-wizard")
 
 
+def _participant_model(folder: Path) -> None:
+    from dorothie_gym.baselines.participant.files import KIND, MODEL_FORMAT, ModelPage, save_network
+    from dorothie_gym.baselines.participant.network import Layout, ParticipantNetwork
+
+    form = (
+        '{"content":null,"meaning":[["goal",0,[["place",["from","goal"]]]]],"move":"Instruct",'
+        '"slots":[["from","goal"]],"wording":{"topic":["text","goal"]}}'
+    )
+    vocabulary = ("", "stop", form)
+    layout = Layout.of(len(vocabulary))
+    page = ModelPage(
+        format=MODEL_FORMAT, kind=KIND, layout=layout, vocabulary=vocabulary, steps=3, seconds=1.0, settings={"seed": 0}
+    )
+    save_network(ParticipantNetwork(layout), page, folder / "participant")
+
+
 def _benchmark_model(folder: Path) -> None:
     import torch
 
@@ -349,6 +365,15 @@ def _read_model(folder: Path) -> None:
 
     for path in sorted(folder.iterdir()):
         find_player(str(path), Role.CO_WIZARD).make(Role.CO_WIZARD, SpaceLimits())
+
+
+def _read_participant(folder: Path) -> None:
+    from dorothie_gym.ontology import Role
+    from dorothie_gym.policies import find_player
+    from dorothie_gym.spaces import SpaceLimits
+
+    for path in sorted(folder.iterdir()):
+        find_player(str(path), Role.PARTICIPANT).make(Role.PARTICIPANT, SpaceLimits())
 
 
 # --- Caches, with correct checksums ----------------------------------------------------------------------------------
@@ -456,6 +481,7 @@ SUBJECTS: Final = MappingProxyType(
         "rl": Subject(_rl_model, _read_model, slow=True),
         "selfplay": Subject(_selfplay_model, _read_model, slow=True),
         "co-wizard": Subject(_co_wizard_model, _read_model, slow=True),
+        "participant": Subject(_participant_model, _read_participant, slow=True),
         "run": Subject(_unfinished_run, _resume_run, slow=True),
         "benchmark": Subject(_benchmark_model, _read_model),
     }

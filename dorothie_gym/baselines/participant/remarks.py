@@ -1,7 +1,8 @@
 """Remarks of the learned participant: forms of the corpus without their names, and where it takes the names from.
 
-The forms are those of the learned Co-Wizard (`co_wizard.remarks`). Texts of the story, such as the purpose of an
-errand, are sources as well, and a form keeps whether it is urgent.
+The forms are those of the learned Co-Wizard (`co_wizard.remarks`). Further sources are action and direction of the next
+step on the route, those of the question that is answered, and texts of the story, such as the purpose of an errand; a
+form keeps whether it is urgent.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from typing import Any, Final
 from dorothie_gym.baselines.co_wizard import remarks as forms
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.participant.memory import Event, Memory, RouteStep, is_last_stretch, next_step
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
+from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Proposition, Wording
 from dorothie_gym.input_files import parse_json
 from dorothie_gym.maps.whereabouts import corner_of
-from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, StreetName
+from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.hints import famous_nearby
@@ -56,6 +57,7 @@ def sources(memory: Memory, view: ParticipantView, utterances: Sequence[Utteranc
     step = next_step(records, view)
     if step is not None and step.junction is not None:
         found["onto"] = street_of(view.raw, town, step.junction.exit.lane)
+    found |= _pointers(step, latest)
     found["here"] = street_of(view.raw, town, view.lane)
     found["new_street"] = first_new_street(view.raw, town, view.lane, records.route.progress)
     if goal is not None:
@@ -72,10 +74,24 @@ def sources(memory: Memory, view: ParticipantView, utterances: Sequence[Utteranc
     return {name: value for name, value in found.items() if value not in unnamed}
 
 
+def _pointers(step: RouteStep | None, latest: Utterance | None) -> dict[str, object]:
+    """Returns action and direction of the next step, and what the car has named in its utterance."""
+    found: dict[str, object] = {} if step is None else {"manoeuvre": step.action, "turn": step.direction}
+    if latest is None:
+        return found
+    values = [value for act in latest.heard.acts for value in act.ordered]
+    asked = latest.asked
+    for name, kind, argument in (("said_action", ActionValue, "action"), ("said_object", ObjectClass, "object")):
+        named = [value for value in values if isinstance(value, kind) and value.label not in ("Unknown", "Queried")]
+        told = None if asked is None else asked.get(argument)
+        found[name] = told if isinstance(told, kind) else next(iter(named), None)
+    return {**found, "said_turn": latest.heard.words.direction}
+
+
 def _numbers(memory: Memory, view: ParticipantView, step: RouteStep | None) -> dict[str, object]:
     """Returns distances and speeds; whole numbers are of contents, others of their words."""
     records, progress = memory.records, memory.records.route.progress
-    found: dict[str, object] = {"one": 1}
+    found: dict[str, object] = {}
     if progress is not None and step is not None:
         left = progress.left(view.station)
         if is_last_stretch(records, view) and 0.0 < left < 200.0:
@@ -105,6 +121,12 @@ def _texts(memory: Memory, view: ParticipantView) -> dict[str, object]:
 # --- Forms ------------------------------------------------------------------------------------------------------------
 
 
+_ORDERS: Final = frozenset({DialogueMove.INSTRUCT, DialogueMove.REPLY_W, DialogueMove.CLARIFY})
+_ANSWERS: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM})
+_POINTERS: Final = ((_ORDERS, ("manoeuvre", "turn")), (_ANSWERS, ("said_action", "said_turn", "said_object")))
+"""Sources of actions, directions and objects, by the moves that take them from there."""
+
+
 def form_of(remark: Remark, available: Mapping[str, object]) -> str | None:
     """Returns the form of a remark; None if it has a name, number or text without a source."""
     if any(said.predicate is Predicate.NEAR and said.get("object") is not None for said in remark.meaning):
@@ -120,9 +142,27 @@ def form_of(remark: Remark, available: Mapping[str, object]) -> str | None:
     except LookupError:
         return None
     form = forms.form_of(coded, plain)
-    if form is None or not remark.urgent:
-        return form
-    return json.dumps({**json.loads(form), "urgent": True}, separators=(",", ":"), sort_keys=True)
+    if form is None:
+        return None
+    names = next((names for moves, names in _POINTERS if remark.act.move in moves), ())
+    constants = {(type(value).__name__, getattr(value, "name", "")): name for name in names
+                 if (value := available.get(name)) is not None}  # fmt: skip
+    page = _pointing(json.loads(form), constants)
+    page["slots"] = sorted(page["slots"])
+    if remark.urgent:
+        page["urgent"] = True
+    return json.dumps(page, separators=(",", ":"), sort_keys=True)
+
+
+def _pointing(page: Any, constants: Mapping[tuple[str, str], str]) -> Any:
+    """Returns a form in which constants are replaced by the sources that they can be taken from."""
+    if isinstance(page, dict):
+        return {name: _pointing(item, constants) for name, item in page.items()}
+    if not isinstance(page, list):
+        return page
+    if len(page) == 2 and all(isinstance(item, str) for item in page) and (page[0], page[1]) in constants:
+        return ["from", constants[page[0], page[1]]]
+    return [_pointing(item, constants) for item in page]
 
 
 def _coded(said: Proposition, texts: Mapping[object, str]) -> Proposition:
@@ -132,7 +172,8 @@ def _coded(said: Proposition, texts: Mapping[object, str]) -> Proposition:
 
 
 def _reworded(wording: Wording, content: Proposition | None) -> Wording:
-    names = ("direction", "ordinal", "faster", "speed", "lights", "distance", "dropped", "topic")
+    """Returns the particulars of words with another content, without the number of a junction."""
+    names = ("direction", "faster", "speed", "lights", "distance", "dropped", "topic")
     return Wording(**{name: getattr(wording, name) for name in names}, content=content)
 
 
@@ -182,12 +223,21 @@ def check_form(form: str) -> None:
         return
     if not isinstance(parse_json(form, "form"), dict):
         raise ValueError(form[:80])
-    filled(form, {name: _example(name) for name in sources_of(form)})
+    try:
+        found = filled(form, {name: _example(name) for name in sources_of(form)})
+    except StopIteration:  # there is no such move
+        found = None
+    if found is None:
+        raise ValueError(form[:80])
 
 
 _PLACES: Final = (
     "goal", "done", "added", "dropped", "moved", "former", "place0", "place1", "later0", "later1", "near", "beside",
 )  # fmt: skip
+_VALUES: Final[Mapping[str, object]] = {
+    "manoeuvre": ActionValue.J_TURN, "turn": Direction.LEFT, "said_action": ActionValue.J_TURN,
+    "said_turn": Direction.LEFT, "said_object": ObjectClass.VEHICLES,
+}  # fmt: skip
 _STREETS: Final = ("goal_street", "street0", "street1", "onto", "here", "new_street", "cross")
 
 
@@ -195,6 +245,8 @@ def _example(source: str) -> object:
     """Returns what a source can be."""
     if source.startswith(_MARK):
         return "text"
+    if source in _VALUES:
+        return _VALUES[source]
     if source in _PLACES:
         return LandmarkName.KFC
     return StreetName.BEAL if source in _STREETS else 1

@@ -37,6 +37,14 @@ def test_policies_are_ranked_within_each_fold_of_towns(tmp_path: Path) -> None:
     assert ranked == [("seen", "random"), ("unseen", "scripted"), ("unseen", "ppo"), ("unseen", "random")]
 
 
+def test_towns_from_files_have_a_part_of_their_own(tmp_path: Path) -> None:
+    write(tmp_path / "files", "scripted", 4, towns=("maps/Town01.xodr", "maps/Town02.xodr"))
+    write(tmp_path / "mixed", "scripted", 4, towns=("maps/Town01.xodr", "brookside"))
+    entries = read_entries([tmp_path])
+    assert [entry.part for entry in entries] == ["imported", "other"]
+    assert "## Imported towns" in leaderboard_page(entries)
+
+
 def test_page_has_figures_cost_and_the_command_of_each_row(tmp_path: Path) -> None:
     folder = write(tmp_path / "one", "ppo", 3)
     (folder / "cost.json").write_text('{"wall_seconds": 100.0, "cpu_seconds": 180.0, "workers": 2}')

@@ -1,0 +1,136 @@
+"""What the learned participant keeps and reads while it plays, whatever its weights are."""
+
+import numpy as np
+import torch
+
+from dorothie_gym.baselines.co_wizard.hearing import KEPT, UTTERANCE_SIZE
+from dorothie_gym.baselines.participant.decision import Attention, choosing_inputs, perceive
+from dorothie_gym.baselines.participant.demonstrations import Pupil
+from dorothie_gym.baselines.participant.features import ERRAND_SIZE, STATE_SIZE
+from dorothie_gym.baselines.participant.memory import AVERAGE, Event
+from dorothie_gym.baselines.participant.network import Layout, ParticipantNetwork
+from dorothie_gym.baselines.participant.policy import LearnedParticipant
+from dorothie_gym.baselines.participant.remarks import STOP_FORM, form_of
+from dorothie_gym.baselines.participant.teacher import Teacher
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Direction, Wording
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, Role
+from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, contents
+from dorothie_gym.policies.participant.orders import order
+from dorothie_gym.policies.policy import policy_inputs, policy_seed
+from dorothie_gym.policies.speech import intend
+from dorothie_gym.spaces import CoWizardAction, SpaceLimits, observation_space
+
+GUIDE, DRIVER, ADVERSARY = Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD
+SEED = 21
+
+
+def vocabulary():
+    goal = intend(Function.REQUEST, contents.destination(LandmarkName.KFC))
+    turn = order(DialogueMove.INSTRUCT, ActionValue.J_TURN, Wording(direction=Direction.LEFT))
+    step = {"manoeuvre": ActionValue.J_TURN, "turn": Direction.LEFT}
+    return ("", STOP_FORM, form_of(goal, {"goal": LandmarkName.KFC}), form_of(turn, step))
+
+
+def player(limits):
+    torch.manual_seed(1)
+    words = vocabulary()
+    return LearnedParticipant(ParticipantNetwork(Layout.of(len(words))), words, limits)
+
+
+class Recorded(dict):
+    """Observation that notes which fields are read."""
+
+    def __init__(self, content, read):
+        super().__init__(content)
+        self.read = read
+
+    def __getitem__(self, name):
+        self.read.add(name)
+        return super().__getitem__(name)
+
+    def get(self, name, default=None):
+        self.read |= {name} & self.keys()  # fields of other settings may be asked for
+        return super().get(name, default)
+
+
+def play(guide, *, hides_mind, read=None, decisions=160):
+    """Plays a session; returns what the participant does at each decision.
+
+    Args:
+        guide: the participant.
+        hides_mind: whether the Co-Wizard's goals, plans and knowledge updates are left out.
+        read: receives the names of the fields that the participant reads.
+        decisions: number of decisions.
+    """
+    engine = SessionEngine("brookside", config=EnvConfig(max_seconds=120.0))
+    engine.reset(seed=SEED)
+    policies = {
+        GUIDE: guide, DRIVER: ScriptedCoWizard(engine.limits), ADVERSARY: ScriptedAdWizard(engine.limits)
+    }  # fmt: skip
+    states = {role: one.initial_state(policy_seed(SEED, role), engine.town) for role, one in policies.items()}
+    found = []
+    for _ in range(decisions):
+        inputs, actions = policy_inputs(engine, policies), {}
+        if read is not None:
+            inputs[GUIDE] = Recorded(inputs[GUIDE], read)
+        for role, one in policies.items():
+            actions[str(role)], states[role] = one.step(inputs[role], states[role])
+        found.append(actions[str(GUIDE)])
+        if hides_mind:
+            driven = CoWizardAction.decode(actions[str(DRIVER)], engine.limits)
+            kept = CoWizardAction(speech=driven.speech, physical=driven.physical)
+            actions[str(DRIVER)] = kept.encode(engine.limits)
+        engine.step(actions)
+    return found
+
+
+def test_participant_does_the_same_whatever_the_car_thinks():
+    limits = SpaceLimits()
+    shown, hidden = (play(player(limits), hides_mind=hides) for hides in (False, True))
+    assert any(one["move"] for one in shown)
+    for one, other in zip(shown, hidden, strict=True):
+        assert one.keys() == other.keys()
+        assert all(np.array_equal(one[name], other[name]) for name in one)
+
+
+def test_participant_reads_only_fields_of_its_own_observation():
+    read = set()
+    play(player(SpaceLimits()), hides_mind=False, read=read, decisions=40)
+    assert {"subgoals", "landmarks", "co_wizard_text"} <= read
+    assert read <= set(observation_space(GUIDE, SpaceLimits()).spaces)
+
+
+def test_state_and_errands_have_the_lengths_that_the_network_takes():
+    engine = SessionEngine("midtown", config=EnvConfig(max_seconds=60.0))
+    engine.reset(seed=3)
+    observation = engine.observations.of([GUIDE])[str(GUIDE)]
+    inputs = choosing_inputs(perceive(observation, Attention.begin(engine.town, 3)))
+    assert inputs.state.shape == (STATE_SIZE + KEPT * UTTERANCE_SIZE,)
+    assert inputs.errands.shape[1] == ERRAND_SIZE and inputs.numbers
+    assert np.isfinite(inputs.state).all()
+
+
+def test_memory_beside_the_teacher_has_its_target_and_notes_what_is_done():
+    engine = SessionEngine("brookside", config=EnvConfig(max_seconds=300.0))
+    engine.reset(seed=4)
+    town, limits = engine.town, engine.limits
+    others = {DRIVER: ScriptedCoWizard(limits), ADVERSARY: ScriptedAdWizard(limits)}
+    states = {role: one.initial_state(policy_seed(4, role), town) for role, one in others.items()}
+    teacher = Teacher(town, limits, policy_seed(4, GUIDE), AVERAGE)
+    pupil, examples, reached = Pupil(town, 4, teacher), [], 0
+    while not engine.over and not reached:
+        inputs, actions = policy_inputs(engine, others), {}
+        for role, one in others.items():
+            actions[str(role)], states[role] = one.step(inputs[role], states[role])
+        scene, memory, lesson = pupil.decide(engine.observations.of([GUIDE])[str(GUIDE)], examples.append)
+        assert memory.records.task.target == lesson.target
+        pupil.follow(scene, memory, lesson)
+        actions[str(GUIDE)] = lesson.action
+        reached = scene.memory.event(Event.DONE) is not None
+        engine.step(actions)
+    assert reached
+    assert any(one.target > 0 for one in examples)
+    assert {one.guides for one in examples} <= {False, True}
