@@ -40,11 +40,12 @@ def _train_co_wizard(corpus: Path, folder: Path, seed: int, workers: int, on_sta
 
 
 def _train_participant(corpus: Path, folder: Path, seed: int, workers: int, on_stage: OnStage) -> Sequence[Fit]:
-    from dorothie_gym.baselines.imitation.rounds import RoundSettings
+    from dorothie_gym.baselines.imitation.rounds import LESSONS, RoundSettings
     from dorothie_gym.baselines.participant.training import train_participant
 
     settings = RoundSettings(corpus=corpus, seed=seed)
-    return train_participant(settings, folder, workers=workers, on_stage=on_stage)
+    lessons = folder.parent / LESSONS
+    return train_participant(settings, folder, workers=workers, on_stage=on_stage, lessons=lessons)
 
 
 ROLES: Final[Mapping[str, Callable[[Path, Path, int, int, OnStage], Sequence[Fit]]]] = MappingProxyType(

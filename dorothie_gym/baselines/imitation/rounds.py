@@ -139,7 +139,8 @@ class Learner(Protocol):
 
 
 def train_in_rounds(
-    learner: Learner, settings: RoundSettings, out: Path, *, workers: int, on_stage: OnStage
+    learner: Learner, settings: RoundSettings, out: Path, *, workers: int, on_stage: OnStage,
+    lessons: Path | None = None,
 ) -> tuple[Stage, ...]:  # fmt: skip
     """Trains a model; a started training is resumed.
 
@@ -149,6 +150,7 @@ def train_in_rounds(
         out: folder; it receives `model.json` and `model.safetensors`, the lessons, and the model of each round.
         workers: number of processes that play sessions; the result does not depend on it.
         on_stage: callback for the progress.
+        lessons: folder of the lessons of the corpus, which trainings with other seeds may share; None for one in `out`.
 
     Returns:
         The fits that were done now.
@@ -162,7 +164,8 @@ def train_in_rounds(
     if not entries:
         raise SessionError(f"{settings.corpus}: there is no session in the fold 'train' to learn from")
     with locked_folder(out, SETTINGS_FILE, settings.as_json()):
-        paths = [out / LESSONS / "corpus" / f"{entry.path.name}.safetensors" for entry in entries]
+        shared = lessons or out / LESSONS / "corpus"
+        paths = [shared / f"{entry.path.name}.safetensors" for entry in entries]
         plans = [CorpusPlan(number=k, file=path) for k, path in enumerate(paths)]
         _gather(learner.follower, plans, workers, partial(on_stage, "Sessions of the corpus"))
         corpus_files = [path for path in paths if path.is_file()]

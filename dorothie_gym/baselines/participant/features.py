@@ -18,7 +18,8 @@ from dorothie_gym.policies.participant.arriving import about_to_arrive, room_to_
 from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.hints import famous_nearby
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.route_progress import light_ahead, next_choice
+from dorothie_gym.policies.participant.yes_no_answers import JUST_DONE
+from dorothie_gym.policies.route_progress import first_new_street, light_ahead, next_choice
 from dorothie_gym.policies.sight import camera_fault, sight, suitable_speed
 from dorothie_gym.policies.turn_lanes import turn_lanes
 
@@ -225,7 +226,7 @@ def _question(memory: Memory, view: ParticipantView, utterances: Sequence[Uttera
     goal = memory.records.task.goal
     if latest is None:
         return [0.0] * QUESTION_SIZE
-    true = None if latest.asked is None else evidence(memory, view, latest.asked)
+    true = answer_to(memory, view, latest)
     told = latest.heard.words.told
     holds = None if told is None else evidence(memory, view, told)
     places = latest.places
@@ -264,6 +265,18 @@ def _said_other_side(memory: Memory, direction: Direction) -> bool:
     return bool(said) and said[-1] is not direction
 
 
+def answer_to(memory: Memory, view: ParticipantView, utterance: Utterance) -> bool | None:
+    """Returns whether the answer to a question is yes; None if it is no such question, or nothing tells."""
+    asked, direction = utterance.asked, utterance.heard.words.direction
+    if asked is None:
+        return None
+    plans = asked.predicate in (Predicate.WILL, Predicate.DOES)
+    if plans and asked.get("direction") is None and direction is not None:
+        action = asked.get("action")
+        asked = Proposition.of(asked.predicate, negated=asked.negated, action=action, direction=direction)
+    return evidence(memory, view, asked)
+
+
 def evidence(memory: Memory, view: ParticipantView, said: Proposition) -> bool | None:
     """Returns whether a proposition is true by what the participant knows and sees; None where nothing tells."""
     found = _holds(memory, view, said)
@@ -283,6 +296,9 @@ def _holds(memory: Memory, view: ParticipantView, said: Proposition) -> bool | N
         case Predicate.ON_STREET:
             return street_of(view.raw, records.town, view.lane) is street
         case Predicate.ARRIVED:
+            done, at = records.task.finished
+            if done is not None and place in (None, done) and view.standing and view.time - at <= JUST_DONE:
+                return True
             return about_goal and view.standing and about_to_arrive(records, view) and abs(left) < 2.0
         case Predicate.CLOSE:
             return about_goal and left < 120.0
@@ -296,15 +312,21 @@ def _holds(memory: Memory, view: ParticipantView, said: Proposition) -> bool | N
             return None
 
 
+_LEFT_TO_THE_CAR: Final = (ActionValue.LIGHT_CHANGE, ActionValue.SPEED_CHANGE, ActionValue.START)
+"""Actions that the participant leaves to the car."""
+
+
 def _is_wanted(memory: Memory, view: ParticipantView, said: Proposition) -> bool | None:
     """Returns whether an action that the car plans or proposes is the next step; None without a route."""
     step = next_step(memory.records, view)
     if step is None:
         return None
-    direction, action = said.get("direction"), said.get("action")
-    street = said.get("street")
-    if street is not None and step.junction is not None:
-        return street_of(view.raw, memory.records.town, step.junction.exit.lane) is street
+    direction, action, street = said.get("direction"), said.get("action"), said.get("street")
+    if action in _LEFT_TO_THE_CAR:
+        return True
+    if street is not None and action is None:
+        own = first_new_street(view.raw, memory.records.town, view.lane, memory.records.route.progress)
+        return own is None or own is street
     if step.direction is Direction.STRAIGHT or step.key[0] == "on":
         return action in (ActionValue.LANE_FOLLOW, ActionValue.J_TURN, None) and direction in (
             None, Direction.STRAIGHT

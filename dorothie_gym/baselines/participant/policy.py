@@ -18,9 +18,18 @@ from dorothie_gym.baselines.participant.decision import (
     speaking_inputs,
 )
 from dorothie_gym.baselines.participant.examples import MOST_REMARKS
+from dorothie_gym.baselines.participant.features import answer_to
 from dorothie_gym.baselines.participant.memory import KEEP_TARGET, Choice, Memory
 from dorothie_gym.baselines.participant.network import ParticipantNetwork
-from dorothie_gym.baselines.participant.remarks import STOP_FORM, filled, sources, sources_of, stop_remark
+from dorothie_gym.baselines.participant.remarks import (
+    STOP_FORM,
+    filled,
+    is_no,
+    is_yes,
+    sources,
+    sources_of,
+    stop_remark,
+)
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.participant.reactions import scene_of
@@ -42,8 +51,8 @@ class LearnedState:
 class LearnedParticipant(Policy[LearnedState]):
     """Participant whose network chooses the next errand, and what to say to the car and when.
 
-    Target and guidance are the likeliest ones; remarks are drawn. Names, numbers and words of a remark are filled in
-    (see `remarks`).
+    Target and guidance are the likeliest ones; remarks are drawn, yes only where it is true, and no where it is not.
+    Names, numbers and words of a remark are filled in (see `remarks`).
     """
 
     def __init__(
@@ -58,6 +67,8 @@ class LearnedParticipant(Policy[LearnedState]):
         """
         super().__init__(Role.PARTICIPANT, limits)
         self._network, self._vocabulary = network.eval(), tuple(vocabulary)
+        self._yes = np.array([is_yes(form) for form in self._vocabulary])
+        self._no = np.array([is_no(form) for form in self._vocabulary])
         self._needs = [frozenset() if not form else sources_of(form) for form in self._vocabulary]
 
     def initial_state(self, seed: int, town: Town) -> LearnedState:
@@ -95,6 +106,8 @@ class LearnedParticipant(Policy[LearnedState]):
             allowed = np.array([needs <= available.keys() for needs in self._needs])
             if STOP_FORM in self._vocabulary:
                 allowed[self._vocabulary.index(STOP_FORM)] = stop_remark(memory) is not None
+            if scene.heard and (true := answer_to(memory, scene.view, scene.utterances[0])) is not None:
+                allowed &= ~(self._no if true else self._yes)
             allowed[0] = False
             remarks: list[Remark] = []
             chosen = _drawn(shares * allowed, scene.rng)

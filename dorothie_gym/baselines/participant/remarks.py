@@ -217,6 +217,20 @@ def sources_of(form: str) -> frozenset[str]:
     return forms.sources_of(form) | texts
 
 
+def is_yes(form: str) -> bool:
+    """Returns whether a form says yes to a question."""
+    return _move_of(form) in (DialogueMove.REPLY_Y.label, DialogueMove.CONFIRM.label)
+
+
+def is_no(form: str) -> bool:
+    """Returns whether a form says no to a question."""
+    return _move_of(form) == DialogueMove.REPLY_N.label
+
+
+def _move_of(form: str) -> str | None:
+    return None if form in ("", STOP_FORM) else str(json.loads(form)["move"])
+
+
 def check_form(form: str) -> None:
     """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
     if form == STOP_FORM:

@@ -39,12 +39,12 @@ _PRACTICE: Final = 31
 
 
 def train_participant(
-    settings: RoundSettings, out: Path, *, workers: int, on_stage: OnStage
+    settings: RoundSettings, out: Path, *, workers: int, on_stage: OnStage, lessons: Path | None = None
 ) -> tuple[Stage, ...]:  # fmt: skip
     """Trains a participant; a started training is resumed. See `train_in_rounds`."""
     torch.set_num_threads(1)  # small layers: more threads only wait for each other, and change the last bits
     learner = ParticipantLearner(settings=settings)
-    return train_in_rounds(learner, settings, out, workers=workers, on_stage=on_stage)
+    return train_in_rounds(learner, settings, out, workers=workers, on_stage=on_stage, lessons=lessons)
 
 
 @dataclass(frozen=True, kw_only=True)
