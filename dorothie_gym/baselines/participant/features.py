@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
-from dorothie_gym.baselines.participant.memory import Event, Memory, is_last_stretch, next_step
+from dorothie_gym.baselines.participant.memory import Event, Memory
+from dorothie_gym.baselines.participant.records import is_last_stretch, next_step
 from dorothie_gym.dialogue import Direction, Predicate, Proposition
 from dorothie_gym.maps.routing import router
 from dorothie_gym.maps.traffic_lights import LightColour

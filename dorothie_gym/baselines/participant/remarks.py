@@ -13,7 +13,8 @@ from typing import Any, Final
 
 from dorothie_gym.baselines.co_wizard import remarks as forms
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
-from dorothie_gym.baselines.participant.memory import Event, Memory, RouteStep, is_last_stretch, next_step
+from dorothie_gym.baselines.participant.memory import Event, Memory
+from dorothie_gym.baselines.participant.records import RouteStep, is_last_stretch, next_step
 from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Proposition, Wording
 from dorothie_gym.input_files import parse_json
 from dorothie_gym.maps.whereabouts import corner_of
