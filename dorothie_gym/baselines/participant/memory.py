@@ -194,7 +194,7 @@ class Memory:
         """Notes which tasks are done, new, dropped or changed; a target that is no longer open is given up."""
         memory, records, now = self, self._copied(), view.time
         before = records.task.subgoals
-        records.task = records.task.with_subgoals(view.subgoals)
+        records.task = records.task.with_subgoals(view.subgoals, str(view.raw["tasks"]))
         for old, new in zip(before, view.subgoals, strict=False):
             place, former = _name(view, new), _name(view, old)
             moved = new.open and old.open and new.landmark != old.landmark
