@@ -16,7 +16,7 @@ from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, Wording
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, Role
+from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, MentalAction, Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, contents
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.policy import policy_inputs, policy_seed
@@ -25,6 +25,8 @@ from dorothie_gym.spaces import CoWizardAction, SpaceLimits, observation_space
 
 GUIDE, DRIVER, ADVERSARY = Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD
 SEED = 21
+UPDATES = ("mental", "plan", "goals", "landmark", "status", "lane", "metres")
+"""Fields of the Co-Wizard's action with which it updates its beliefs."""
 
 
 def vocabulary():
@@ -56,49 +58,63 @@ class Recorded(dict):
         return super().get(name, default)
 
 
-def play(guide, *, hides_mind, read=None, decisions=160):
-    """Plays a session; returns what the participant does at each decision.
+def play(guide, *, others=(), read=None, decisions=160):
+    """Plays a session; returns the actions of all roles at each decision.
 
     Args:
         guide: the participant.
-        hides_mind: whether the Co-Wizard's goals, plans and knowledge updates are left out.
+        others: actions of the other roles at each decision; empty for the scripted ones.
         read: receives the names of the fields that the participant reads.
         decisions: number of decisions.
     """
     engine = SessionEngine("brookside", config=EnvConfig(max_seconds=120.0))
     engine.reset(seed=SEED)
-    policies = {
-        GUIDE: guide, DRIVER: ScriptedCoWizard(engine.limits), ADVERSARY: ScriptedAdWizard(engine.limits)
-    }  # fmt: skip
+    policies = {GUIDE: guide}
+    if not others:
+        policies |= {DRIVER: ScriptedCoWizard(engine.limits), ADVERSARY: ScriptedAdWizard(engine.limits)}
     states = {role: one.initial_state(policy_seed(SEED, role), engine.town) for role, one in policies.items()}
     found = []
-    for _ in range(decisions):
-        inputs, actions = policy_inputs(engine, policies), {}
+    for k in range(decisions):
+        inputs, actions = policy_inputs(engine, policies), dict(others[k]) if others else {}
         if read is not None:
             inputs[GUIDE] = Recorded(inputs[GUIDE], read)
         for role, one in policies.items():
             actions[str(role)], states[role] = one.step(inputs[role], states[role])
-        found.append(actions[str(GUIDE)])
-        if hides_mind:
-            driven = CoWizardAction.decode(actions[str(DRIVER)], engine.limits)
-            kept = CoWizardAction(speech=driven.speech, physical=driven.physical)
-            actions[str(DRIVER)] = kept.encode(engine.limits)
+        found.append(actions)
         engine.step(actions)
     return found
 
 
+def without_updates(actions, limits):
+    """Returns the actions of the other roles, those of the Co-Wizard without what it thinks of route and errands.
+
+    Goals and places stay: the car slows down for a goal, which everybody sees.
+    """
+    blank, driven = CoWizardAction().encode(limits), actions[str(DRIVER)]
+    mental = CoWizardAction.decode(driven, limits).mental
+    hidden = mental is not None and mental.action in (MentalAction.PLAN_UPDATE, MentalAction.STATUS_UPDATE)
+    quiet = {**driven, **{name: blank[name] for name in UPDATES}} if hidden else driven
+    return {str(DRIVER): quiet, str(ADVERSARY): actions[str(ADVERSARY)]}
+
+
 def test_participant_does_the_same_whatever_the_car_thinks():
     limits = SpaceLimits()
-    shown, hidden = (play(player(limits), hides_mind=hides) for hides in (False, True))
-    assert any(one["move"] for one in shown)
-    for one, other in zip(shown, hidden, strict=True):
+    shown = play(player(limits))
+    others = [without_updates(actions, limits) for actions in shown]
+    assert any(
+        one[str(DRIVER)]["mental"] != other[str(DRIVER)]["mental"] for one, other in zip(shown, others, strict=True)
+    )
+    hidden = play(player(limits), others=others)
+    mine, again = ([actions[str(GUIDE)] for actions in played] for played in (shown, hidden))
+    assert any(one["move"] for one in mine)
+    for one, other in zip(mine, again, strict=True):
         assert one.keys() == other.keys()
         assert all(np.array_equal(one[name], other[name]) for name in one)
 
 
 def test_participant_reads_only_fields_of_its_own_observation():
     read = set()
-    play(player(SpaceLimits()), hides_mind=False, read=read, decisions=40)
+    play(player(SpaceLimits()), read=read, decisions=40)
     assert {"subgoals", "landmarks", "co_wizard_text"} <= read
     assert read <= set(observation_space(GUIDE, SpaceLimits()).spaces)
 
