@@ -275,7 +275,19 @@ def answer_to(memory: Memory, view: ParticipantView, utterance: Utterance) -> bo
     if plans and asked.get("direction") is None and direction is not None:
         action = asked.get("action")
         asked = Proposition.of(asked.predicate, negated=asked.negated, action=action, direction=direction)
-    return evidence(memory, view, asked)
+    found = evidence(memory, view, asked)
+    if asked.predicate is Predicate.KNOWS and utterance.heard.words.asked is None:
+        # a place alone: a check means the errand, another question means where the car stands
+        checks = any(act.move is DialogueMove.CHECK for act in utterance.heard.acts)
+        return found and (checks or not _is_elsewhere(memory, view))
+    return found
+
+
+def _is_elsewhere(memory: Memory, view: ParticipantView) -> bool:
+    """Returns whether the car stands far from the target."""
+    progress = memory.records.route.progress
+    far = progress is not None and progress.left(view.station) > memory.records.config.elsewhere_distance
+    return view.standing and far
 
 
 def evidence(memory: Memory, view: ParticipantView, said: Proposition) -> bool | None:

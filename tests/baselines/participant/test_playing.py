@@ -1,23 +1,25 @@
 """What the learned participant keeps and reads while it plays, whatever its weights are."""
 
 import numpy as np
+import pytest
 import torch
 
-from dorothie_gym.baselines.co_wizard.hearing import KEPT, UTTERANCE_SIZE
+from dorothie_gym.baselines.co_wizard.hearing import KEPT, UTTERANCE_SIZE, Utterance
 from dorothie_gym.baselines.participant.decision import Attention, choosing_inputs, perceive
 from dorothie_gym.baselines.participant.demonstrations import Pupil
-from dorothie_gym.baselines.participant.features import ERRAND_SIZE, STATE_SIZE
-from dorothie_gym.baselines.participant.memory import AVERAGE, Event
+from dorothie_gym.baselines.participant.features import ERRAND_SIZE, STATE_SIZE, answer_to
+from dorothie_gym.baselines.participant.memory import AVERAGE, Choice, Event
 from dorothie_gym.baselines.participant.network import Layout, ParticipantNetwork
 from dorothie_gym.baselines.participant.policy import LearnedParticipant
 from dorothie_gym.baselines.participant.remarks import STOP_FORM, form_of
 from dorothie_gym.baselines.participant.teacher import Teacher
 from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Direction, Wording
+from dorothie_gym.dialogue import Direction, Wording, guess_spans, load_lexicon, understand
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, MentalAction, Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, contents
+from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.policy import policy_inputs, policy_seed
 from dorothie_gym.policies.speech import intend
@@ -150,3 +152,17 @@ def test_memory_beside_the_teacher_has_its_target_and_notes_what_is_done():
     assert reached
     assert any(one.target > 0 for one in examples)
     assert {one.guides for one in examples} <= {False, True}
+
+
+@pytest.mark.parametrize(("text", "yes"), [("Are we at {goal}?", False), ("You mean {goal}, right?", True)])
+def test_answer_follows_from_what_the_participant_knows(text, yes):
+    engine = SessionEngine("brookside", config=EnvConfig(max_seconds=60.0))
+    engine.reset(seed=5)
+    scene = perceive(engine.observations.of([GUIDE])[str(GUIDE)], Attention.begin(engine.town, 5))
+    first = next(one.index for one in scene.view.subgoals if one.open and one.allowed)
+    memory = scene.memory.chosen(Choice(target=first), scene.view, scene.rng)
+    name = load_lexicon().forms(memory.records.task.goal.name, "say")[0]
+    words = text.format(goal=name)
+    acts = tuple(span.act for span in guess_spans(words))
+    asked = Utterance(time=scene.view.time, heard=HeardUtterance(acts=acts, words=understand(words)))
+    assert answer_to(memory, scene.view, asked) is yes

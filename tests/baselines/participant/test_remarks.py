@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from dorothie_gym.baselines.participant.remarks import STOP_FORM, check_form, filled, form_of, sources_of
+from dorothie_gym.baselines.participant.remarks import STOP_FORM, check_form, filled, form_of, is_no, is_yes, sources_of
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass, StreetName
@@ -77,3 +77,18 @@ def test_what_is_no_form_is_refused(form):
 def test_form_of_the_stop_needs_nothing():
     check_form(STOP_FORM)
     assert sources_of(STOP_FORM) == frozenset()
+
+
+@pytest.mark.parametrize(
+    ("function", "says"),
+    [
+        (Function.AFFIRMATIVE_ANSWER, (True, False)),
+        (Function.CONFIRM, (True, False)),
+        (Function.NEGATIVE_ANSWER, (False, True)),
+        (Function.INFORM, (False, False)),
+    ],
+)
+def test_yes_and_no_are_told_by_the_move(function, says):
+    form = form_of(intend(function, Proposition.of(Predicate.RIGHT_WAY)), {})
+    assert (is_yes(form), is_no(form)) == says
+    assert not is_yes(STOP_FORM) and not is_no("")
