@@ -17,6 +17,7 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import Player
 from dorothie_gym.policies.policy_loader import SCRIPTED
+from dorothie_gym.rollout.closed_loop.leaderboard import model_name
 from dorothie_gym.rollout.closed_loop.many_rollouts import folder_name, roll_out_all
 from dorothie_gym.rollout.closed_loop.results import ALL_METRICS, RolloutResult, figure_text
 from dorothie_gym.rollout.closed_loop.running import RolloutSettings, command_of
@@ -120,9 +121,9 @@ class CrossPlayResult:
         found = []
         for key in PRINTED_METRICS:
             table = Table("Co-Wizard \\ participant", title=_title(key))
-            for guide in self.participants:
+            for guide in _short(self.participants):
                 table.add_column(guide)
-            for driver, cells in zip(self.co_wizards, self.matrix(key), strict=True):
+            for driver, cells in zip(_short(self.co_wizards), self.matrix(key), strict=True):
                 table.add_row(driver, *cells)
             found.append(table)
         return found
@@ -139,12 +140,18 @@ class CrossPlayResult:
             "closed-loop evaluation.",
         ]
         for key in PAGE_METRICS:
-            head = "| Co-Wizard | " + " | ".join(self.participants) + " |"
+            head = "| Co-Wizard | " + " | ".join(_short(self.participants)) + " |"
             lines += ["", f"## {_title(key).capitalize()}", "", head, "|" + "---|" * (len(self.participants) + 1)]
-            rows = zip(self.co_wizards, self.matrix(key), strict=True)
+            rows = zip(_short(self.co_wizards), self.matrix(key), strict=True)
             lines += [f"| {driver} | {' | '.join(cells)} |" for driver, cells in rows]
         commands = [command_of(result.settings) for result in self.cells.values()]
         return "\n".join([*lines, "", "## Commands", "", "```bash", *commands, "```", ""])
+
+
+def _short(names: Sequence[str]) -> list[str]:
+    """Returns the names of players, of models instead of the paths of their folders where that is clear."""
+    short = [model_name(name) for name in names]
+    return [label if short.count(label) == 1 else name for name, label in zip(names, short, strict=True)]
 
 
 def _title(key: str) -> str:

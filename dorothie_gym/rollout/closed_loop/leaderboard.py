@@ -91,7 +91,7 @@ class LeaderboardEntry:
     def label(self) -> str:
         """Short name of the row: of a model, its name instead of the path of its folder."""
         path = str(self.result.settings[str(Role.CO_WIZARD)])
-        return self.policy.replace(path, _model_name(path), 1)
+        return self.policy.replace(path, model_name(path), 1)
 
     @property
     def time_limit(self) -> float:
@@ -149,7 +149,7 @@ _FOLDERS: Final = ("runs", "models", "best", "last", "small", "paper")
 """Folders in the path of a model that do not name it."""
 
 
-def _model_name(path: str) -> str:
+def model_name(path: str) -> str:
     """Returns the name of a model from its path: "reader, seed 0" for models/reader/small/seed-0."""
     parts = [part for part in PurePath(path.replace("\\", "/")).parts if part not in ("/", ".", "..")]
     if len(parts) < 2:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,13 @@ def test_finished_pairs_are_not_played_again(tmp_path: Path, monkeypatch: pytest
     first = cross_play(settings(), tmp_path)
     monkeypatch.setattr(many_rollouts, "roll_out", None)
     assert cross_play(settings(), tmp_path).to_json() == first.to_json()
+
+
+def test_models_are_named_where_that_is_clear(tmp_path: Path) -> None:
+    found = cross_play(settings(sessions=1), tmp_path)
+    cells = {("runs/reader/seed-0", guide): found.cells["scripted", guide] for guide in found.participants}
+    page = replace(found, co_wizards=("runs/reader/seed-0",), cells=cells).page()
+    assert "| reader, seed 0 | " in page
 
 
 @pytest.mark.parametrize(
