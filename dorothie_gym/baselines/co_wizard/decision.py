@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.baselines.co_wizard.answers import QUESTIONS
 from dorothie_gym.baselines.co_wizard.features import (
     COMMAND_SIZE,
     MAX_COMMANDS,
     MAX_PLACES,
     PLACE_SIZE,
     STATE_SIZE,
+    car_vector,
     command_vectors,
     place_vectors,
     state_vector,
@@ -67,6 +70,22 @@ class Scene:
     def latest(self) -> Utterance | None:
         """The utterance that has just ended."""
         return self.utterances[0] if self.heard else None
+
+    @cached_property
+    def car(self) -> list[float]:
+        """State of the car as numbers."""
+        return car_vector(self.memory, self.view)
+
+    @cached_property
+    def talk(self) -> list[float]:
+        """Last utterances as numbers."""
+        kept = [*self.utterances, *[None] * KEPT][:KEPT]
+        return [number for utterance in kept for number in utterance_vector(utterance, self.view.time)]
+
+    @cached_property
+    def words(self) -> NDArray[np.int64]:
+        """Rows of the words of the utterance that has just ended."""
+        return word_rows("" if self.latest is None else self.latest.heard.words.text)
 
 
 def perceive(observation: ObservationMapping, attention: Attention, last: DialogueMove | None) -> Scene:
@@ -134,16 +153,11 @@ def _inputs(
     scene: Scene, memory: Memory, vectors: list[list[float]], rows: tuple[int, ...], most: int, queued: bool,
     step: RouteStep | None,
 ) -> Inputs:  # fmt: skip
-    view = scene.view
-    state = state_vector(memory, view, step, scene.utterances, queued=queued)
-    for k in range(KEPT):
-        state += utterance_vector(scene.utterances[k] if k < len(scene.utterances) else None, view.time)
+    state = [*scene.car, *state_vector(memory, scene.view, step, scene.utterances, queued=queued), *scene.talk]
     options = np.zeros((most, PLACE_SIZE if most == MAX_PLACES else COMMAND_SIZE), dtype=np.float32)
     if vectors:
         options[: len(vectors)] = vectors
-    latest = scene.latest
-    words = word_rows("" if latest is None else latest.heard.words.text)
-    return Inputs(state=np.asarray(state, dtype=np.float32), words=words, options=options, rows=rows)
+    return Inputs(state=np.asarray(state, dtype=np.float32), words=scene.words, options=options, rows=rows)
 
 
 def remember(scene: Scene, update: Update) -> Memory:
@@ -156,9 +170,9 @@ def remember(scene: Scene, update: Update) -> Memory:
 
 def noted(memory: Memory, remark: Remark, view: CoWizardView) -> Memory:
     """Returns the memory after an own remark."""
-    asks = remark.act.move in (DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK)
+    asks = remark.act.move in QUESTIONS
     way = bool({ActionValue.QUERIED, ActionValue.J_TURN, ActionValue.LANE_FOLLOW} & set(remark.act.values(Slot.ACTION)))
-    return memory.spoken(topic_of(remark), view, asks=asks, asks_way=asks and way)
+    return memory.spoken(remark, topic_of(remark), view, asks=asks, asks_way=asks and way)
 
 
 def finished(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -19,7 +19,7 @@ from dorothie_gym.baselines.co_wizard.decision import (
 )
 from dorothie_gym.baselines.co_wizard.examples import Example, correcting_example, make_example
 from dorothie_gym.baselines.co_wizard.memory import Memory, initial_values
-from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
+from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard, Turn
 from dorothie_gym.baselines.co_wizard.remarks import sources
 from dorothie_gym.baselines.co_wizard.teacher import CALM, Lesson, Teacher
 from dorothie_gym.engine.session_engine import SessionEngine
@@ -28,6 +28,7 @@ from dorothie_gym.ontology import DialogueMove, Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedParticipant
 from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed, replace
+from dorothie_gym.policies.speech import Remark
 from dorothie_gym.recording import Session
 from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.rollout.replay import begin_replay, recorded_actions
@@ -64,32 +65,35 @@ class Pupil:
         self.last: DialogueMove | None = None
 
     def decide(
-        self, observation: ObservationMapping, on_example: OnExample
+        self, observation: ObservationMapping, on_example: OnExample, turn: Turn | None = None
     ) -> tuple[Scene, Memory, Lesson]:  # fmt: skip
         """Lets the teacher decide, and hands on the example; returns scene, memory after listening, and lesson.
 
         Args:
             observation: observation of the Co-Wizard, with its action mask.
             on_example: receives the example.
+            turn: decision of the player where it talks.
         """
         scene = perceive(observation, self.attention, self.last)
         latest = scene.latest
         places, streets = (latest.places, latest.streets) if latest is not None else ((), ())
         lesson = self._teacher.decide(observation, places, streets)
-        listening = listening_inputs(scene, queued=lesson.queued)
+        queued = lesson.queued if turn is None else turn.queued
+        listening = listening_inputs(scene, queued=queued)
         memory = remember(scene, lesson.update)
-        acting, commands = acting_inputs(scene, memory, queued=lesson.queued)
+        acting, commands = acting_inputs(scene, memory, queued=queued)
         available = sources(memory, scene.view, scene.utterances) if lesson.remarks else {}
-        example = make_example(scene, listening, acting, commands, lesson, available, self._rng)
+        talks = turn is None or not turn.silent
+        example = make_example(scene, listening, acting, commands, lesson, available, self._rng, talks=talks)
         if example is not None:
             on_example(example)
         return scene, memory, lesson
 
-    def did(self, scene: Scene, memory: Memory, physical: Physical | None, lesson: Lesson) -> None:
-        """Notes the command that was given, and the remarks of the teacher, which are said."""
-        self.attention = finished(scene, memory, physical, lesson.remarks)[1]
-        if lesson.remarks:
-            self.last = lesson.remarks[-1].act.move
+    def did(self, scene: Scene, memory: Memory, physical: Physical | None, remarks: Sequence[Remark]) -> None:
+        """Notes the command that was given, and what was decided to say."""
+        self.attention = finished(scene, memory, physical, remarks)[1]
+        if remarks:
+            self.last = remarks[-1].act.move
 
 
 def follow(session: Session, town: Town, on_example: OnExample) -> None:
@@ -105,21 +109,22 @@ def follow(session: Session, town: Town, on_example: OnExample) -> None:
     pupil = Pupil(town, engine.limits, seed, Teacher(town, engine.limits, seed))
     for actions in recorded_actions(engine, session):
         scene, memory, lesson = pupil.decide(_observed(engine), on_example)
-        pupil.did(scene, memory, lesson.physical, lesson)
+        pupil.did(scene, memory, lesson.physical, lesson.remarks)
         engine.step(actions)
 
 
 def practise(
-    player: LearnedCoWizard | None, engine: SessionEngine, seed: int, on_example: OnExample, share: float
+    player: LearnedCoWizard, engine: SessionEngine, seed: int, on_example: OnExample, *, share: float, talking: float
 ) -> None:  # fmt: skip
-    """Plays a session in which teacher and player drive in turns, and the teacher talks; hands on the examples.
+    """Plays a session in which teacher and player take turns; hands on the teacher's decisions as examples.
 
     Args:
-        player: the player; None where the teacher alone drives.
+        player: the player.
         engine: engine of the town.
         seed: seed of the session.
         on_example: receives the examples.
         share: share of the time in which the player drives.
+        talking: share of that time in which it also talks.
     """
     engine.reset(seed=seed)
     town, limits = engine.town, engine.limits
@@ -129,32 +134,61 @@ def practise(
     }
     states = {role: policy.initial_state(policy_seed(seed, role), town) for role, policy in others.items()}
     own = policy_seed(seed, CO_WIZARD)
-    teacher = Teacher(town, limits, own, CALM)
-    pupil, rng = Pupil(town, limits, own, teacher), np.random.default_rng((own, 2))
-    attention, left, leads = pupil.attention, 0, False
-    blank = blank_inputs()
+    practice = _Practice(player, Teacher(town, limits, own, CALM), town, limits, own)
+    rng, left, leads, talks = np.random.default_rng((own, 2)), 0, False, False
     while not engine.over:
         if left <= 0:
-            left, leads = int(rng.integers(SHORTEST_TURN, LONGEST_TURN)), bool(rng.random() < share)
-            attention = pupil.attention
+            left = int(rng.integers(SHORTEST_TURN, LONGEST_TURN))
+            leads, talks = bool(rng.random() < share), bool(rng.random() < talking)
+            practice.take_over()
         left -= 1
         inputs, actions = policy_inputs(engine, others), {}
         for role, policy in others.items():
             actions[str(role)], states[role] = policy.step(inputs[role], states[role])
-        observation = _observed(engine)
-        scene, memory, lesson = pupil.decide(observation, on_example)
-        action = lesson.action
-        if leads and player is not None:
-            seen = perceive(observation, attention, pupil.last)
-            after, physical, _ = player.decide(seen, rng, queued=lesson.queued, silent=True)
-            correction = correcting_example(seen, listening_inputs(seen, queued=lesson.queued), blank, memory, lesson)
-            if correction is not None:
-                on_example(correction)
-            mental, attention = finished(seen, after, physical, lesson.remarks)
-            action = CoWizardAction(speech=lesson.action.speech, physical=physical, mental=mental)
-        pupil.did(scene, memory, action.physical, lesson)
-        teacher.settle(action.physical, spoke=True)
+        action = practice.decide(_observed(engine), on_example, leads=leads, talks=leads and talks)
         engine.step({**actions, str(CO_WIZARD): action.encode(limits)})
+
+
+class _Practice:
+    """Player and teacher in one session."""
+
+    def __init__(self, player: LearnedCoWizard, teacher: Teacher, town: Town, limits: SpaceLimits, seed: int) -> None:
+        self._player, self._teacher = player, teacher
+        self._pupil = Pupil(town, limits, seed, teacher)
+        self._state = player.initial_state(seed, town)
+
+    def take_over(self) -> None:
+        """Gives the player the memory that the teacher has led to, and what was said."""
+        voice = replace(self._teacher.speech, queue=())
+        self._state = replace(self._state, attention=self._pupil.attention, voice=voice)
+
+    def decide(
+        self, observation: ObservationMapping, on_example: OnExample, *, leads: bool, talks: bool
+    ) -> CoWizardAction:  # fmt: skip
+        """Takes a decision: the player's where it leads, with the teacher's words unless it talks."""
+        turn = self._player.play(observation, self._state, silent=not talks) if leads else None
+        scene, memory, lesson = self._pupil.decide(observation, on_example, turn if talks else None)
+        if turn is None:
+            self._pupil.did(scene, memory, lesson.physical, lesson.remarks)
+            return lesson.action
+        self._correct(turn, memory, lesson, on_example)
+        remarks, speech = (turn.remarks, turn.action.speech) if talks else (lesson.remarks, lesson.action.speech)
+        if talks:
+            self._teacher.talked(turn.state.voice, remarks, lesson, scene.view)
+            self._state = turn.state
+        else:
+            attention = finished(turn.scene, turn.memory, turn.action.physical, remarks)[1]
+            self._state = replace(turn.state, attention=attention, voice=self._teacher.speech)
+        self._teacher.drove(turn.action.physical)
+        self._pupil.did(scene, memory, turn.action.physical, remarks)
+        return replace(turn.action, speech=speech)
+
+    def _correct(self, turn: Turn, memory: Memory, lesson: Lesson, on_example: OnExample) -> None:
+        """Hands on an example of how the player's memory gets back to the teacher's."""
+        listening = listening_inputs(turn.scene, queued=turn.queued)
+        correction = correcting_example(turn.scene, listening, blank_inputs(), memory, lesson)
+        if correction is not None:
+            on_example(correction)
 
 
 def _observed(engine: SessionEngine) -> ObservationMapping:

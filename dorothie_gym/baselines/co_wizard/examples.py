@@ -54,7 +54,7 @@ class Example:
 
 def make_example(
     scene: Scene, listening: Inputs, acting: Inputs, commands: Sequence[Physical | None], lesson: Lesson,
-    available: Sources, rng: np.random.Generator,
+    available: Sources, rng: np.random.Generator, *, talks: bool = True,
 ) -> Example | None:  # fmt: skip
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
@@ -66,6 +66,7 @@ def make_example(
         lesson: what the teacher did.
         available: names and numbers that could be said.
         rng: draws which idle decisions are kept.
+        talks: whether the remarks, or silence, are learnt.
     """
     update = lesson.update
     before = scene.memory.values
@@ -80,11 +81,8 @@ def make_example(
         row = goal - len(GoalEvent)
         goal = len(GoalEvent) + listening.rows.index(row) if row in listening.rows else UNKNOWN
     command = commands.index(lesson.physical) if lesson.physical in commands else UNKNOWN
-    first, second = "", ""
-    if lesson.remarks:
-        first = form_of(lesson.remarks[0], available)  # type: ignore[assignment]
-    if len(lesson.remarks) > 1:
-        second = form_of(lesson.remarks[1], available)  # type: ignore[assignment]
+    forms = [form_of(remark, available) for remark in lesson.remarks[:2]] if talks else [None, None]
+    first, second = (*forms, "", "")[:2]
     return Example(
         listening=listening, acting=acting, before=before, values=update.values, fresh=update.fresh, goal=goal,
         status=update.status, command=command if lesson.ready else UNKNOWN, remarks=(first, second),

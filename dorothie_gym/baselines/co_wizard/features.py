@@ -55,7 +55,7 @@ MAX_COMMANDS: Final = 20
 def state_vector(
     memory: Memory, view: CoWizardView, step: RouteStep | None, utterances: Sequence[Utterance], *, queued: bool
 ) -> list[float]:
-    """Returns the state of car, road, memory and talk.
+    """Returns the state of road, memory and talk.
 
     Args:
         memory: working memory.
@@ -65,13 +65,16 @@ def state_vector(
         queued: whether own remarks wait to be said.
     """
     return [
-        *_car(memory, view), *_road(memory, view), *_route(memory, view, step), *_remembered(memory, view),
+        *_road(memory, view), *_route(memory, view, step), *_remembered(memory, view),
         *_talk(memory, view, utterances, queued),
     ]  # fmt: skip
 
 
 def _one_hot(index: int, size: int) -> list[float]:
-    return [float(k == index) for k in range(size)]
+    hot = [0.0] * size
+    if 0 <= index < size:
+        hot[index] = 1.0
+    return hot
 
 
 def _time(seconds: float) -> list[float]:
@@ -86,7 +89,8 @@ def _distance(metres: float) -> list[float]:
     return [math.tanh(metres / scale) for scale in (1.0, 5.0, 25.0, 100.0)]
 
 
-def _car(memory: Memory, view: CoWizardView) -> list[float]:
+def car_vector(memory: Memory, view: CoWizardView) -> list[float]:
+    """Returns the state of the car; it does not change within a decision."""
     standing = None if memory.standing_since is None else view.time - memory.standing_since
     fault, limit = camera_fault(view.raw), limit_of(view.raw)
     hazard = HAZARDS.index(view.hazard) if view.hazard in HAZARDS else -1 if view.hazard is ObjectClass.UNLABELED else 5
@@ -181,7 +185,7 @@ def _remembered(memory: Memory, view: CoWizardView) -> list[float]:
 
 def _talk(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance], queued: bool) -> list[float]:
     said = dict(memory.said_at)
-    ages = [math.exp(-seconds_since(view.time, said.get(topic, -AWAY)) / 10.0) for topic in TOPICS]
+    ages = [math.exp(-seconds_since(view.time, said[topic]) / 10.0) if topic in said else 0.0 for topic in TOPICS]
     latest = utterances[0] if utterances and utterances[0].time >= view.time else None
     asked = None if latest is None else latest.asked
     found = None if asked is None else evidence(memory, view, asked)
@@ -284,4 +288,4 @@ PLACE_SIZE: Final = 34
 """Length of the vector of a place."""
 
 STATE_SIZE: Final = 347
-"""Length of `state_vector`."""
+"""Length of `car_vector` and `state_vector` together."""

@@ -75,6 +75,12 @@ class Utterance:
         return tuple(_numbers(self))
 
     @cached_property
+    def asks(self) -> DialogueMove | None:
+        """Move of the first question that yes or no answers; None without one."""
+        moves = (act.move for act in self.heard.acts)
+        return next((move for move in moves if move in (DialogueMove.QUERY_YN, DialogueMove.CHECK)), None)
+
+    @cached_property
     def asked(self) -> Proposition | None:
         """What a question asks, by its words or else by its slots; None if that cannot be told."""
         if self.heard.words.asked is not None:

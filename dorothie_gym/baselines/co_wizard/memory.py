@@ -25,6 +25,7 @@ from dorothie_gym.policies.language_model.navigator import Navigator
 from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.policies.route_progress import default_lane_distance, default_lane_place
+from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.spaces import LanePosition, Mental
 
@@ -124,6 +125,7 @@ class Memory:
         asked_at: time of the last own question [s].
         asked_lane: lane before the junction whose way was asked for; -1 for none.
         heard_at: time of the last utterance of the participant [s].
+        last: last own remark that can be said again; None at first.
         clock: time between decisions.
     """
 
@@ -151,6 +153,7 @@ class Memory:
     asked_at: float = -AWAY
     asked_lane: int = -1
     heard_at: float = -AWAY
+    last: Remark | None = None
     clock: DecisionClock = DecisionClock()
 
     def distance_to(self, place: Place | None, view: CoWizardView) -> float | None:
@@ -284,12 +287,13 @@ class Memory:
             return self
         return replace(self, physical=physical, physical_at=view.time, junction_of_action=view.junction)
 
-    def spoken(self, topic: str, view: CoWizardView, *, asks: bool, asks_way: bool) -> Memory:
+    def spoken(self, remark: Remark, topic: str, view: CoWizardView, *, asks: bool, asks_way: bool) -> Memory:
         """Notes an own remark: what it is about, and whether it asks."""
+        last = remark if asks or remark.act.slots else self.last
         said = (*(pair for pair in self.said_at if pair[0] != topic), (topic, view.time))
         lane = view.choice.lane if asks_way and view.choice is not None else self.asked_lane
         asked = view.time if asks else self.asked_at
-        return replace(self, said_at=said, spoke_at=view.time, asked_at=asked, asked_lane=lane)
+        return replace(self, said_at=said, spoke_at=view.time, asked_at=asked, asked_lane=lane, last=last)
 
 
 _INDEX: Final[Mapping[str, int]] = MappingProxyType({name: k for k, name in enumerate(VARIABLES)})

@@ -60,12 +60,15 @@ class CoWizardNetwork(nn.Module):
         self.listening = _layers(layout.state + WORD_WIDTH, WIDTH)
         self.values = nn.Linear(WIDTH, hot)
         self.kept = nn.Parameter(torch.full((hot,), 2.0))
+        starts = torch.tensor([0, *SIZES[:-1]]).cumsum(0)
+        self.register_buffer("starts", starts, persistent=False)
+        self.starts: Tensor
         self.fresh = nn.Linear(WIDTH, len(FRESH))
         self.goal = nn.Linear(WIDTH, len(GoalEvent))
-        self.place = _scorer(WIDTH + layout.place)
+        self.place = _Scorer(layout.place)
         self.status = nn.Linear(WIDTH, len(STATUSES))
         self.acting = _layers(layout.state + WORD_WIDTH, WIDTH)
-        self.command = _scorer(WIDTH + layout.command)
+        self.command = _Scorer(layout.command)
         self.first = nn.Linear(WIDTH, layout.remarks)
         self.remarks = nn.Embedding(layout.remarks, REMARK_WIDTH)
         self.second = nn.Sequential(
@@ -83,15 +86,15 @@ class CoWizardNetwork(nn.Module):
             before: values of the memory (b, v).
         """
         hidden = self.listening(torch.cat([state, self.words(words)], dim=1))
-        hot = torch.cat([nn.functional.one_hot(before[:, k], size) for k, size in enumerate(SIZES)], dim=1)
+        hot = torch.zeros(len(before), sum(SIZES)).scatter_(1, before + self.starts, 1.0)
         values = torch.split(self.values(hidden) + self.kept * hot, list(SIZES), dim=1)
-        goal = torch.cat([self.goal(hidden), _scores(self.place, hidden, places, count)], dim=1)
+        goal = torch.cat([self.goal(hidden), self.place(hidden, places, count)], dim=1)
         return Heard(values=values, fresh=self.fresh(hidden), goal=goal, status=self.status(hidden))
 
     def act(self, state: Tensor, words: Tensor, commands: Tensor, count: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Returns the logits of the commands (b, k) and of the first remark (b, r), and the hidden layer for `then`."""
         hidden = self.acting(torch.cat([state, self.words(words)], dim=1))
-        return _scores(self.command, hidden, commands, count), self.first(hidden), hidden
+        return self.command(hidden, commands, count), self.first(hidden), hidden
 
     def then(self, hidden: Tensor, first: Tensor) -> Tensor:
         """Returns the logits of the second remark (b, r) behind a first one (b,)."""
@@ -102,14 +105,18 @@ def _layers(inputs: int, width: int) -> nn.Sequential:
     return nn.Sequential(nn.Linear(inputs, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU())
 
 
-def _scorer(inputs: int) -> nn.Sequential:
-    return nn.Sequential(nn.Linear(inputs, OPTION_WIDTH), nn.ReLU(), nn.Linear(OPTION_WIDTH, 1))
+class _Scorer(nn.Module):
+    """Scores options by a hidden layer of the state: two layers over both, the first one a sum of two."""
 
+    def __init__(self, option: int) -> None:
+        super().__init__()
+        self.hidden = nn.Linear(WIDTH, OPTION_WIDTH)
+        self.option = nn.Linear(option, OPTION_WIDTH, bias=False)
+        self.last = nn.Linear(OPTION_WIDTH, 1)
 
-def _scores(scorer: nn.Module, hidden: Tensor, options: Tensor, count: Tensor) -> Tensor:
-    """Returns the score of each option (b, k), minus infinity for those that are only filled in."""
-    number = options.shape[1]
-    repeated = hidden[:, None, :].expand(-1, number, -1)
-    scores = scorer(torch.cat([repeated, options], dim=2)).squeeze(2)
-    missing = torch.arange(number)[None, :] >= count[:, None]
-    return scores.masked_fill(missing, -1e9)  # type: ignore[no-any-return]
+    def forward(self, hidden: Tensor, options: Tensor, count: Tensor) -> Tensor:
+        """Returns the score of each option (b, k), minus infinity for those that are only filled in."""
+        both = torch.relu(self.hidden(hidden)[:, None, :] + self.option(options))
+        scores = self.last(both).squeeze(2)
+        missing = torch.arange(options.shape[1])[None, :] >= count[:, None]
+        return scores.masked_fill(missing, -1e9)  # type: ignore[no-any-return]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from dorothie_gym.baselines.co_wizard.answers import is_sayable
 from dorothie_gym.baselines.co_wizard.decision import (
     Attention,
     Inputs,
@@ -20,8 +22,8 @@ from dorothie_gym.baselines.co_wizard.decision import (
     remember,
 )
 from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory, Update
-from dorothie_gym.baselines.co_wizard.network import CoWizardNetwork
-from dorothie_gym.baselines.co_wizard.remarks import filled, sources, sources_of
+from dorothie_gym.baselines.co_wizard.network import SIZES, CoWizardNetwork
+from dorothie_gym.baselines.co_wizard.remarks import Sources, filled, sources, sources_of, topic_of
 from dorothie_gym.dialogue import WordingContext, draw_style
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import LandmarkName, Role, StreetName
@@ -31,8 +33,11 @@ from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import Remark, SpeechState
 from dorothie_gym.spaces import ActionDict, CoWizardAction, ObservationMapping, Physical, SpaceLimits
 
-TEMPERATURE = 0.7
+TEMPERATURE: Final = 0.7
 """Temperature at which remarks are drawn."""
+
+MAX_DRAWS: Final = 8
+"""Number of remarks that are drawn until one is sayable; then there is silence."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +55,29 @@ class LearnedState:
     attention: Attention
     voice: SpeechState
     count: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turn:
+    """Decision of the player.
+
+    Attributes:
+        scene: what was perceived.
+        memory: memory after listening.
+        action: the action.
+        remarks: what was decided to say.
+        queued: whether own remarks waited before.
+        silent: whether nothing new could be said.
+        state: state after the decision.
+    """
+
+    scene: Scene
+    memory: Memory
+    action: CoWizardAction
+    remarks: tuple[Remark, ...]
+    queued: bool
+    silent: bool
+    state: LearnedState
 
 
 class LearnedCoWizard(Policy[LearnedState]):
@@ -82,6 +110,17 @@ class LearnedCoWizard(Policy[LearnedState]):
 
     def step(self, observation: ObservationMapping, state: LearnedState) -> tuple[ActionDict, LearnedState]:
         """Listens, remembers, drives and talks."""
+        turn = self.play(observation, state)
+        return turn.action.encode(self.limits), turn.state
+
+    def play(self, observation: ObservationMapping, state: LearnedState, *, silent: bool = False) -> Turn:
+        """Takes a decision; returns all that it consists of.
+
+        Args:
+            observation: observation of the Co-Wizard, with its action mask.
+            state: state before.
+            silent: whether nothing is to be said.
+        """
         rng = np.random.default_rng((state.seed, state.count))
         voice = state.voice
         scene = perceive(observation, state.attention, None if voice.last is None else voice.last.act.move)
@@ -89,7 +128,8 @@ class LearnedCoWizard(Policy[LearnedState]):
         if scene.latest is not None:
             late = scene.memory.clock.interval / 2.0
             voice = voice.heard_other(view.time, scene.latest.heard.acts, rng, late).cleared()
-        memory, physical, remarks = self.decide(scene, rng, queued=queued, silent=not voice.idle)
+        silent = silent or not voice.idle
+        memory, physical, remarks = self.decide(scene, rng, queued=queued, silent=silent)
         voice = voice.plan(*remarks)
         speech, voice = voice.speak(
             view.time, view.speaking, rng, _scene(view, memory), interval=memory.clock.interval,
@@ -97,7 +137,10 @@ class LearnedCoWizard(Policy[LearnedState]):
         )  # fmt: skip
         mental, attention = finished(scene, memory, physical, remarks)
         action = CoWizardAction(speech=speech, physical=physical, mental=mental)
-        return action.encode(self.limits), replace(state, attention=attention, voice=voice, count=state.count + 1)
+        return Turn(
+            scene=scene, memory=memory, action=action, remarks=remarks, queued=queued, silent=silent,
+            state=replace(state, attention=attention, voice=voice, count=state.count + 1),
+        )  # fmt: skip
 
     def decide(
         self, scene: Scene, rng: np.random.Generator, *, queued: bool, silent: bool
@@ -121,11 +164,12 @@ class LearnedCoWizard(Policy[LearnedState]):
         before = torch.tensor([scene.memory.values])
         heard = self._network.listen(state, words, places, count, before)
         goal = int(heard.goal[0].argmax())
+        values = torch.cat(heard.values, dim=1)[0].numpy()
         if goal >= len(GoalEvent):
             goal = len(GoalEvent) + inputs.rows[goal - len(GoalEvent)]
         return Update(
-            values=tuple(int(logits[0].argmax()) for logits in heard.values),
-            fresh=tuple(bool(flag > 0.0) for flag in heard.fresh[0]), goal=goal, status=int(heard.status[0].argmax()),
+            values=tuple(int(part.argmax()) for part in np.split(values, np.cumsum(SIZES)[:-1])),
+            fresh=tuple(flag > 0.0 for flag in heard.fresh[0].tolist()), goal=goal, status=int(heard.status[0].argmax()),
         )  # fmt: skip
 
     def _act(
@@ -143,16 +187,28 @@ class LearnedCoWizard(Policy[LearnedState]):
         available = sources(memory, scene.view, scene.utterances)
         allowed = np.array([bool(needs <= available.keys()) for needs in self._needs])
         allowed[0] = False
-        chosen = _drawn(shares * allowed, rng)
-        if not chosen:
+        chosen, remark = self._draw(shares * allowed, scene, memory, available, rng)
+        if remark is None:
             return physical, ()
         allowed[0] = True
-        remarks = [filled(self._vocabulary[chosen], available)]
         then = self._network.then(hidden, torch.tensor([chosen]))[0]
-        more = _drawn(torch.softmax(then.double() / TEMPERATURE, dim=0).numpy() * allowed, rng)
-        if more:
-            remarks.append(filled(self._vocabulary[more], available, joined=True))
-        return physical, tuple(remark for remark in remarks if remark is not None)
+        shares = torch.softmax(then.double() / TEMPERATURE, dim=0).numpy() * allowed
+        _, more = self._draw(shares, scene, memory, available, rng, joined=True)
+        return physical, (remark,) if more is None else (remark, more)
+
+    def _draw(
+        self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,
+        *, joined: bool = False,
+    ) -> tuple[int, Remark | None]:  # fmt: skip
+        """Returns the number of a form and its remark, drawn among those that are sayable; None for silence."""
+        latest = scene.utterances[0] if scene.utterances else None
+        for _ in range(MAX_DRAWS):
+            chosen = _drawn(shares, rng)
+            remark = filled(self._vocabulary[chosen], available, joined=joined) if chosen else None
+            if remark is None or is_sayable(remark, topic_of(remark), memory, scene.view, latest):
+                return chosen, remark
+            shares[chosen] = 0.0
+        return 0, None
 
 
 def _tensors(inputs: Inputs) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:

@@ -13,6 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from dorothie_gym.baselines.co_wizard.answers import answer_to, is_answer, said_again
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import Memory
 from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording
@@ -31,6 +32,7 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
+from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import direction_of, first_new_street
 from dorothie_gym.policies.sight import sight, suitable_speed
 from dorothie_gym.policies.speech import Remark
@@ -42,6 +44,9 @@ _ENUMS: Final = {
         ActionValue, StreetName, LandmarkName, GoalStatus, ObjectClass, Direction, PropKind, Sensor, WeatherParameter
     )
 }  # fmt: skip
+_WHOLES: Final = ("answer", "again")
+"""Sources of whole remarks: the answer to what was just asked, and the last remark said again."""
+
 _OPEN: Final = ("QUERIED", "UNKNOWN")
 _WORDING: Final = ("topic", "direction", "faster", "lights", "speed", "distance", "dropped", "ordinal")
 
@@ -52,9 +57,10 @@ Sources = Mapping[str, object]
 def sources(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance]) -> dict[str, object]:
     """Returns the names and numbers that can be said now, by source; the preferred ones first."""
     town, latest = memory.town, utterances[0] if utterances else None
+    wholes = {"answer": answer_to(latest, memory, view), "again": said_again(latest, memory)}
     mark = next((mark for mark in view.landmarks if mark.row == memory.goal_mark), None)
     progress = memory.navigator.route.progress
-    found: dict[str, object] = {"goal": memory.goal}
+    found: dict[str, object] = {**wholes, "goal": memory.goal}
     if latest is not None and view.time - latest.time < 8.0:
         found |= {f"place{k}": name for k, name in enumerate(latest.places[:2])}
         found |= {f"street{k}": name for k, name in enumerate(latest.streets[:2])}
@@ -89,6 +95,11 @@ def sources(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance])
 
 def form_of(remark: Remark, available: Sources) -> str | None:
     """Returns the form of a remark; None if it has a name or number without a source, or free words."""
+    answer, again = (available.get(name) for name in _WHOLES)
+    if isinstance(again, Remark) and (remark.act, remark.meaning) == (again.act, again.meaning):
+        return _whole_form("again")
+    if isinstance(answer, Remark) and is_answer(remark, answer):
+        return _whole_form("answer")
     try:
         wording = {
             name: _coded(value, available) for name in _WORDING if (value := getattr(remark.wording, name)) is not None
@@ -103,6 +114,10 @@ def form_of(remark: Remark, available: Sources) -> str | None:
     except LookupError:
         return None
     return json.dumps(page, separators=(",", ":"), sort_keys=True)
+
+
+def _whole_form(source: str) -> str:
+    return json.dumps({"whole": ["from", source]}, separators=(",", ":"))
 
 
 def _form(said: Proposition, available: Sources) -> list[Any]:
@@ -142,6 +157,9 @@ def filled(form: str, available: Sources, *, joined: bool = False) -> Remark | N
     """Returns the remark of a form with the present names and numbers; None if a source is missing."""
     page = json.loads(form)
     try:
+        if "whole" in page:
+            whole = _decoded(page["whole"], available)
+            return replace(whole, text="", joined=joined) if isinstance(whole, Remark) else None
         slots = [_decoded(code, available) for code in page["slots"]]
         wording = {name: _decoded(code, available) for name, code in page["wording"].items()}
         content = None if page["content"] is None else _filled(page["content"], available)
@@ -181,6 +199,8 @@ def check_form(form: str) -> None:
 
 def _example(source: str) -> object:
     """Returns what a source can be."""
+    if source in _WHOLES:
+        return Remark(act=DialogueAct.of(DialogueMove.REPLY_U))
     if source in ("goal", "former", "near", "place0", "place1"):
         return LandmarkName.KFC
     numbers = ("seconds", "said_speed", "suitable", "slow", "sight", "since")

@@ -1,7 +1,7 @@
 """The scripted Co-Wizard as a teacher: run beside a session, it says what it would do, remember and say.
 
-The teacher observes what the player observes. What the player did instead is put into its state (`settle`), so that it
-goes on from the player's course, not from its own.
+The teacher observes what the player observes. What the player did and said instead is put into its state (`drove`,
+`talked`), so that it goes on from the player's course, not from its own.
 """
 
 from __future__ import annotations
@@ -9,17 +9,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from dorothie_gym.baselines.co_wizard.answers import QUESTIONS
 from dorothie_gym.baselines.co_wizard.memory import FRESH, ORDERS, STATUSES, VARIABLES, GoalEvent, Update, speed_index
-from dorothie_gym.dialogue import Direction
+from dorothie_gym.dialogue import Direction, Predicate
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard import ScriptedCoWizard
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest
 from dorothie_gym.policies.co_wizard.policy import attend, respond
-from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
+from dorothie_gym.policies.co_wizard.state import CoWizardState, DialogueState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.speech import Remark
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.speech import Remark, SpeechState
 from dorothie_gym.spaces import CoWizardAction, ObservationMapping, Physical, SpaceLimits
 
 CALM = CoWizardStyle(
@@ -67,11 +69,17 @@ class Teacher:
         self._former = self._state
         self._physical: Physical | None = None
         self._intentions, self._commands = self._state.intentions, self._state.commands
+        self._dialogue = self._state.dialogue
 
     @property
     def usual_speed(self) -> int:
         """Cruise speed where nothing is said about it [km/h]."""
         return self._state.intentions.usual
+
+    @property
+    def speech(self) -> SpeechState:
+        """What was said, and what waits to be said."""
+        return self._state.speech
 
     def decide(
         self, observation: ObservationMapping, named: Sequence[LandmarkName], streets: Sequence[StreetName]
@@ -90,6 +98,7 @@ class Teacher:
         end_red_light_rest(state, view)
         update = _update(former, state, view, named, streets)
         self._former, self._intentions, self._commands = former, state.intentions, state.commands
+        self._dialogue = state.dialogue
         heard = _new(former.speech.queue, state.speech.queue)
         physical = drive(state, view)
         waiting = state.speech.queue
@@ -102,18 +111,45 @@ class Teacher:
             ready=view.time >= state.commands.ready_at,
         )  # fmt: skip
 
-    def settle(self, physical: Physical | None, *, spoke: bool) -> None:
-        """Puts into the state what the player did instead.
-
-        Args:
-            physical: physical action of the player.
-            spoke: whether the player says what the teacher said; otherwise the teacher has said nothing.
-        """
+    def drove(self, physical: Physical | None) -> None:
+        """Puts the physical action of the player into the state."""
         state = self._state
         if physical != self._physical:
             state.intentions, state.commands = self._intentions, self._commands
-        if not spoke:
-            state.speech = self._former.speech
+
+    def talked(self, voice: SpeechState, remarks: Sequence[Remark], lesson: Lesson, view: CoWizardView) -> None:
+        """Puts into the state what the player says instead of the teacher.
+
+        What the teacher has decided to mention counts as mentioned, but its questions are not asked, and what the
+        player asks is.
+
+        Args:
+            voice: own remarks of the player, queued and said.
+            remarks: what the player has just decided to say.
+            lesson: what the teacher did.
+            view: observation.
+        """
+        state, before = self._state, self._dialogue
+        state.speech = replace(voice, queue=())
+        if any(remark.act.move in QUESTIONS for remark in lesson.remarks):
+            state.dialogue = replace(
+                state.dialogue, asked_at=before.asked_at, asked_lane=before.asked_lane, proposed=before.proposed
+            )  # fmt: skip
+        for remark in remarks:
+            if remark.act.move in QUESTIONS:
+                state.dialogue = _asking(state.dialogue, remark, view)
+
+
+def _asking(dialogue: DialogueState, remark: Remark, view: CoWizardView) -> DialogueState:
+    """Returns the course of the dialogue after a question of the player."""
+    asks_way = any(said.predicate is Predicate.WILL for said in remark.meaning)
+    if not asks_way or view.choice is None:
+        return dialogue.after_asking(view.time)
+    direction = remark.meaning[0].get("direction")
+    proposed = None
+    if isinstance(direction, Direction):
+        proposed = Directive(direction=direction, junction=view.choice.junction)
+    return dialogue.after_asking_way(view.choice.lane, view.time).with_proposal(proposed)
 
 
 def _new(before: Sequence[Remark], after: Sequence[Remark]) -> tuple[Remark, ...]:

@@ -62,6 +62,7 @@ class CoWizardTraining:
         rounds: number of rounds of practice.
         sessions: sessions of practice in a round.
         share: share of the time in which the player drives in practice.
+        talking: share of that time in which it also talks.
         max_seconds: time limit of a session of practice [s].
         first_epochs: passes of the fit to the corpus.
         epochs: passes of the fit after each round, which goes on from the one before.
@@ -74,6 +75,7 @@ class CoWizardTraining:
     rounds: int = 3
     sessions: int = 25
     share: float = 0.6
+    talking: float = 0.5
     max_seconds: float = 300.0
     first_epochs: int = 8
     epochs: int = 4
@@ -239,7 +241,7 @@ class _Player:
     def __init__(self, folder: Path, settings: CoWizardTraining) -> None:
         torch.set_num_threads(1)
         self._network, page = load_network(folder)
-        self._vocabulary, self._share = page.vocabulary, settings.share
+        self._vocabulary, self._settings = page.vocabulary, settings
         self._config = EnvConfig(max_seconds=settings.max_seconds)
         self._engines: dict[str, SessionEngine] = {}
 
@@ -247,7 +249,8 @@ class _Player:
         engine = self._engines.setdefault(plan.town, SessionEngine(plan.town, config=self._config))
         player = LearnedCoWizard(self._network, self._vocabulary, engine.limits)
         found: list[Example] = []
-        practise(player, engine, plan.seed, found.append, self._share)
+        share, talking = self._settings.share, self._settings.talking
+        practise(player, engine, plan.seed, found.append, share=share, talking=talking)
         _write(found, plan.file)
 
 

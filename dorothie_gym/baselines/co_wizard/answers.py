@@ -1,0 +1,123 @@
+"""Answers of the learned Co-Wizard that follow from its evidence, and which of its remarks the evidence rules out.
+
+Whether a question is answered is chosen by the network. What a yes/no question is answered follows from the evidence
+for what it asks (`beliefs.evidence`), and what was not understood is said again from memory.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from dorothie_gym.baselines.co_wizard.beliefs import evidence
+from dorothie_gym.baselines.co_wizard.hearing import Utterance
+from dorothie_gym.baselines.co_wizard.memory import Memory, seconds_since
+from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition
+from dorothie_gym.ontology import DialogueMove
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.speech import Remark, intend, repeated
+
+QUESTIONS: Final = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK)
+
+ANSWERED_WITHIN: Final = 10.0
+"""Longest time between a question and its answer [s]."""
+
+SAID_AGAIN_AFTER: Final = 8.0
+"""Time after which the same is said again although the participant has said nothing since [s]."""
+
+_ANSWERS: Final = (DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM)
+_STATEMENTS: Final = (*_ANSWERS, DialogueMove.REPLY_W, DialogueMove.EXPLAIN)
+_ABOUT_THE_GOAL: Final = (
+    Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY, Predicate.ARRIVED, Predicate.KNOWS,
+)  # fmt: skip
+
+
+def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -> Remark | None:
+    """Returns the answer to a question that yes or no answers; None if none has just been asked.
+
+    Args:
+        utterance: latest utterance of the participant.
+        memory: working memory.
+        view: observation.
+    """
+    if utterance is None or view.time - utterance.time > ANSWERED_WITHIN or utterance.asks is None:
+        return None
+    asked, checks = utterance.asked, utterance.asks is DialogueMove.CHECK
+    if checks and utterance.places:
+        asked = Proposition.of(Predicate.GOAL, place=utterance.places[0])
+    elif checks and asked is None:
+        asked = Proposition.of(Predicate.GOAL, place=memory.goal)
+    if asked is None:
+        return None
+    if asked.predicate in _ABOUT_THE_GOAL and asked.get("place") is None:
+        asked = Proposition.of(asked.predicate, negated=asked.negated, place=memory.goal)
+    held, elided = evidence(memory, view, asked), [name for name, _ in asked.arguments]
+    if held is None:
+        return intend(CommunicativeFunction.UNCERTAIN_ANSWER, asked, elided=elided)
+    if held:
+        yes = CommunicativeFunction.CONFIRM if checks else CommunicativeFunction.AFFIRMATIVE_ANSWER
+        return intend(yes, asked, elided=elided)
+    return intend(CommunicativeFunction.NEGATIVE_ANSWER, asked.opposite, elided=elided)
+
+
+def is_answer(remark: Remark, answer: Remark) -> bool:
+    """Returns whether a remark answers what `answer` does, yes or no."""
+    if remark.act.move not in _ANSWERS:
+        return False
+    return not remark.meaning or remark.meaning[0].predicate is answer.meaning[0].predicate
+
+
+def said_again(utterance: Utterance | None, memory: Memory) -> Remark | None:
+    """Returns the last own remark, said again, if the participant has just not understood it."""
+    if utterance is None or memory.last is None or not utterance.heard.acts:
+        return None
+    if utterance.heard.acts[0].move is not DialogueMove.CONFUSE:
+        return None
+    if memory.last.act.move in QUESTIONS or not memory.last.act.slots:
+        return memory.last
+    return repeated(memory.last, CommunicativeFunction.CORRECTION)
+
+
+def is_sayable(
+    remark: Remark, topic: str, memory: Memory, view: CoWizardView, utterance: Utterance | None
+) -> bool:  # fmt: skip
+    """Returns whether a remark is not ruled out.
+
+    Ruled out is what the evidence denies, an answer about something that was not asked, and what has just been said.
+
+    Args:
+        remark: the remark.
+        topic: what it is about.
+        memory: working memory.
+        view: observation.
+        utterance: latest utterance of the participant.
+    """
+    said_at = dict(memory.said_at).get(topic)
+    if said_at is not None and said_at > memory.heard_at and seconds_since(view.time, said_at) < SAID_AGAIN_AFTER:
+        return False
+    if remark.act.move not in _STATEMENTS:
+        return True
+    if any(_is_denied(memory, view, said) for said in remark.meaning):
+        return False
+    if remark.act.move is DialogueMove.EXPLAIN or utterance is None or not remark.meaning:
+        return True
+    return _is_about(remark.meaning[0], utterance)
+
+
+def _is_denied(memory: Memory, view: CoWizardView, said: Proposition) -> bool:
+    if said.predicate is Predicate.BECAUSE:
+        cause = said.get("cause")
+        return said.get("at") is None and isinstance(cause, Proposition) and _is_denied(memory, view, cause)
+    return evidence(memory, view, said) is False
+
+
+def _is_about(answer: Proposition, utterance: Utterance) -> bool:
+    """Returns whether an answer is about what an utterance asks, as far as that was understood."""
+    asked = utterance.asked if utterance.asks is not None else utterance.heard.words.asked
+    if asked is None:
+        return True
+    if answer.predicate is Predicate.BECAUSE:
+        effect = answer.get("effect")
+        return asked.predicate is Predicate.BECAUSE or (
+            isinstance(effect, Proposition) and effect.predicate is asked.predicate
+        )
+    return answer.predicate is asked.predicate
