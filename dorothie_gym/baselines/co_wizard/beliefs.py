@@ -27,6 +27,12 @@ LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.25
 CLOSE_DISTANCE: Final = 120.0
 """Way to the goal that is called short [m]."""
 
+BLOCKED_TIME: Final = 30.0
+"""Time for which an obstacle that was met counts [s]."""
+
+CROWD: Final = 3
+"""Least number of people or vehicles in a crowd."""
+
 _Evidence = Callable[[Memory, CoWizardView, Proposition], bool | None]
 
 
@@ -74,6 +80,16 @@ def _failed(memory: Memory, view: CoWizardView, said: Proposition) -> bool | Non
     return bool(found) if asked is None else asked in found
 
 
+def _blocked(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
+    """Returns whether the car has met an obstacle lately, or sees one."""
+    met = view.time - memory.navigator.blocked_at < BLOCKED_TIME
+    return met or view.hazard is ObjectClass.STATIC or any(thing.kind is ObjectClass.STATIC for thing in view.objects)
+
+
+def _crowded(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
+    return sum(thing.kind is said.get("object") for thing in view.objects) >= CROWD
+
+
 def _has_goal(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
     return memory.goal is not None and _about_goal(memory, said)
 
@@ -100,5 +116,7 @@ _EVIDENCE: Final[dict[Predicate, _Evidence]] = {
     Predicate.FAILED: _failed,
     Predicate.LIGHTS_ON: lambda memory, view, said: view.lights,
     Predicate.GOAL: _has_goal,
+    Predicate.BLOCKED: _blocked,
+    Predicate.CROWDED: _crowded,
     Predicate.HINDERS: lambda memory, view, said: view.motion is Motion.HAZARD and view.hazard is said.get("object"),
 }

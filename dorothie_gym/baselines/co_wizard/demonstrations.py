@@ -39,6 +39,12 @@ CO_WIZARD: Final = Role.CO_WIZARD
 SHORTEST_TURN, LONGEST_TURN = 10, 80
 """Range of the number of decisions for which teacher and player in turns drive."""
 
+PATIENCE: Final = 8
+"""Number of decisions in a row with another command than the teacher's after which the teacher takes over.
+
+A player that is stuck would otherwise fill its turn with examples of one moment.
+"""
+
 TRAINED: Final = parse_traits("talkativeness=0..0.8,certainty=0.2..1")
 """Traits of the participants in training; those who are talkative or uncertain beyond are held out."""
 
@@ -137,9 +143,10 @@ def practise(
     practice = _Practice(player, Teacher(town, limits, own, CALM), town, limits, own)
     rng, left, leads, talks = np.random.default_rng((own, 2)), 0, False, False
     while not engine.over:
-        if left <= 0:
+        if left <= 0 or practice.disagreements >= PATIENCE:
+            stuck = practice.disagreements >= PATIENCE
             left = int(rng.integers(SHORTEST_TURN, LONGEST_TURN))
-            leads, talks = bool(rng.random() < share), bool(rng.random() < talking)
+            leads, talks = bool(rng.random() < share) and not stuck, bool(rng.random() < talking)
             practice.take_over()
         left -= 1
         inputs, actions = policy_inputs(engine, others), {}
@@ -156,11 +163,13 @@ class _Practice:
         self._player, self._teacher = player, teacher
         self._pupil = Pupil(town, limits, seed, teacher)
         self._state = player.initial_state(seed, town)
+        self.disagreements = 0
 
     def take_over(self) -> None:
         """Gives the player the memory that the teacher has led to, and what was said."""
         voice = replace(self._teacher.speech, queue=())
         self._state = replace(self._state, attention=self._pupil.attention, voice=voice)
+        self.disagreements = 0
 
     def decide(
         self, observation: ObservationMapping, on_example: OnExample, *, leads: bool, talks: bool
@@ -172,6 +181,7 @@ class _Practice:
             self._pupil.did(scene, memory, lesson.physical, lesson.remarks)
             return lesson.action
         self._correct(turn, memory, lesson, on_example)
+        self.disagreements = self.disagreements + 1 if turn.action.physical != lesson.physical else 0
         remarks, speech = (turn.remarks, turn.action.speech) if talks else (lesson.remarks, lesson.action.speech)
         if talks:
             self._teacher.talked(turn.state.voice, remarks, lesson, scene.view)
@@ -184,7 +194,12 @@ class _Practice:
         return replace(turn.action, speech=speech)
 
     def _correct(self, turn: Turn, memory: Memory, lesson: Lesson, on_example: OnExample) -> None:
-        """Hands on an example of how the player's memory gets back to the teacher's."""
+        """Hands on an example of how the player's memory gets back to the teacher's, if something was just heard.
+
+        Without anything new, the network would learn to change a memory for no reason.
+        """
+        if not turn.scene.heard:
+            return
         listening = listening_inputs(turn.scene, queued=turn.queued)
         correction = correcting_example(turn.scene, listening, blank_inputs(), memory, lesson)
         if correction is not None:

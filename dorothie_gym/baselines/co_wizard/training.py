@@ -42,8 +42,8 @@ from dorothie_gym.rollout.folder import locked_folder
 from dorothie_gym.rollout.processes import run_tasks
 
 SETTINGS_FILE: Final = "training.json"
-LESSONS: Final = "lessons"
-"""Folder with a file for each session."""
+LESSONS, CORPUS = "lessons", "corpus"
+"""Folder with a file for each session, and that of the sessions of the corpus in it."""
 
 _PRACTICE: Final = 29
 """Branch of the seed from which the sessions of the practice are drawn; no rollout or corpus draws from it."""
@@ -103,7 +103,7 @@ class Stage:
 
 
 def train_co_wizard(
-    settings: CoWizardTraining, out: Path, *, workers: int, on_stage: OnStage
+    settings: CoWizardTraining, out: Path, *, workers: int, on_stage: OnStage, lessons: Path | None = None
 ) -> tuple[Stage, ...]:  # fmt: skip
     """Trains a Co-Wizard; a started training is resumed.
 
@@ -112,6 +112,7 @@ def train_co_wizard(
         out: folder; it receives `model.json` and `model.safetensors`, the lessons, and the model of each round.
         workers: number of processes that play sessions; the result does not depend on it.
         on_stage: callback for the progress.
+        lessons: folder of the lessons of the corpus, which trainings with other seeds may share; None for one in `out`.
 
     Returns:
         The fits that were done now.
@@ -126,9 +127,11 @@ def train_co_wizard(
     if not entries:
         raise SessionError(f"{settings.corpus}: there is no session in the fold 'train' to learn from")
     with locked_folder(out, SETTINGS_FILE, settings.as_json()):
-        paths = [out / LESSONS / "corpus" / f"{entry.path.name}.safetensors" for entry in entries]
-        plans = [CorpusPlan(number=k, file=path) for k, path in enumerate(paths)]
-        _gather(partial(_Follower, settings.corpus), plans, workers, partial(on_stage, "Sessions of the corpus"))
+        corpus_lessons = out / LESSONS / CORPUS if lessons is None else lessons
+        with locked_folder(corpus_lessons, SETTINGS_FILE, {"corpus": str(settings.corpus)}):
+            paths = [corpus_lessons / f"{entry.path.name}.safetensors" for entry in entries]
+            plans = [CorpusPlan(number=k, file=path) for k, path in enumerate(paths)]
+            _gather(partial(_Follower, settings.corpus), plans, workers, partial(on_stage, "Sessions of the corpus"))
         files = [path for path in paths if path.is_file()]
         if not files:
             raise SessionError(f"{settings.corpus}: fold 'train' has no session to learn from")

@@ -1,0 +1,123 @@
+import pytest
+
+from dorothie_gym.baselines.co_wizard.answers import SAID_AGAIN_AFTER, answer_to, is_sayable, said_again
+from dorothie_gym.baselines.co_wizard.hearing import Utterance
+from dorothie_gym.baselines.co_wizard.memory import Memory
+from dorothie_gym.baselines.co_wizard.remarks import filled, form_of, sources
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
+from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName
+from dorothie_gym.policies import contents
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.observation_parser import HeardUtterance
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.speech import intend
+
+STANDS = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    engine = SessionEngine("midtown")
+    engine.reset(seed=4)
+    observation = {
+        **engine.observations.of([Role.CO_WIZARD])[str(Role.CO_WIZARD)], "action_mask": engine.mask(Role.CO_WIZARD)
+    }  # fmt: skip
+    view = CoWizardView.read(observation, engine.town)
+    return view, Memory(town=engine.town)
+
+
+def heard(view, text, move, *values):
+    return Utterance(
+        time=view.time, heard=HeardUtterance(acts=(DialogueAct.of(move, *values),), words=understand(text))
+    )
+
+
+def answer(scene, text, move, *values, memory=None):
+    view, usual = scene
+    return answer_to(heard(view, text, move, *values), memory or usual, view)
+
+
+def test_yes_and_no_follow_from_what_the_observation_shows(scene):
+    view = scene[0]
+    here = next(mark for mark in view.landmarks if mark.street is not StreetName.UNKNOWN)
+    elsewhere = StreetName.BEAL if here.street is not StreetName.BEAL else StreetName.MURFIN
+    for street, move in ((here.street, DialogueMove.REPLY_Y), (elsewhere, DialogueMove.REPLY_N)):
+        said = answer(scene, "", DialogueMove.QUERY_YN, here.name, street)
+        assert said.act.move is move
+        held = Proposition.of(Predicate.LOCATED, place=here.name, street=street)
+        assert said.meaning == ((held,) if move is DialogueMove.REPLY_Y else (held.opposite,))
+
+
+def test_what_cannot_be_known_is_answered_so(scene):
+    said = answer(scene, "are we close?", DialogueMove.QUERY_YN)
+    assert said.act.move is DialogueMove.REPLY_U
+
+
+def test_check_of_the_destination_is_confirmed_or_denied(scene):
+    bound = replace(scene[1], goal=LandmarkName.KFC)
+    asked = ("KFC, right?", DialogueMove.CHECK, LandmarkName.KFC)
+    assert answer(scene, *asked, memory=bound).act.move is DialogueMove.CONFIRM
+    assert answer(scene, *asked).act.move is DialogueMove.REPLY_N
+
+
+def test_no_answer_without_a_question(scene):
+    assert answer(scene, "turn left", DialogueMove.INSTRUCT, ActionValue.J_TURN) is None
+    assert answer_to(None, scene[1], scene[0]) is None
+
+
+def test_answer_of_the_corpus_becomes_the_answer_to_another_question(scene):
+    view, memory = scene
+    before = heard(view, "do you see anybody?", DialogueMove.QUERY_YN, ObjectClass.PEDESTRIAN)
+    seen = Proposition.of(Predicate.SEES, object=ObjectClass.PEDESTRIAN)
+    form = form_of(intend(Function.AFFIRMATIVE_ANSWER, seen, elided=("object",)), sources(memory, view, (before,)))
+    shown = {mark.name for mark in view.landmarks}
+    missing = next(name for name in LandmarkName if name not in shown and name.label not in ("Unknown", "Queried"))
+    now = heard(view, "", DialogueMove.QUERY_YN, missing)
+    said = filled(form, sources(memory, view, (now,)))
+    assert said.act.move is DialogueMove.REPLY_N  # no such place is on the map
+    assert said.meaning[0].predicate is Predicate.KNOWS
+
+
+def test_last_remark_is_said_again_where_it_was_not_understood(scene):
+    view, memory = scene
+    asked = intend(Function.SET_QUESTION, contents.destination(LandmarkName.QUERIED))
+    memory = memory.spoken(asked, "goal", view, asks=True, asks_way=False)
+    assert said_again(heard(view, "what?", DialogueMove.CONFUSE), memory) == asked
+    assert said_again(heard(view, "okay", DialogueMove.ACKNOWLEDGE), memory) is None
+
+
+@pytest.mark.parametrize("lit", [False, True])
+def test_statement_that_the_observation_denies_is_not_sayable(scene, lit):
+    view, memory = scene
+    said = intend(Function.INFORM, Proposition.of(Predicate.LIGHTS_ON, negated=not lit))
+    assert is_sayable(said, "lights_on", memory, view, None) is (lit == view.lights)
+
+
+def test_reason_that_does_not_hold_is_not_sayable(scene):
+    view, memory = scene
+    red = Proposition.of(
+        Predicate.BECAUSE, effect=STANDS, cause=Proposition.of(Predicate.HINDERS, object=ObjectClass.PEDESTRIAN)
+    )
+    said = intend(Function.INFORM, red, elided=("effect",), wording=Wording(topic="because"))
+    assert not is_sayable(said, "because", memory, view, None)
+
+
+def test_answer_about_something_else_is_not_sayable(scene):
+    view, memory = scene
+    asked = heard(view, "when will we be there?", DialogueMove.QUERY_W)
+    said = intend(Function.ANSWER, STANDS)
+    assert not is_sayable(said, "stands", memory, view, asked)
+    time = intend(Function.ANSWER, Proposition.of(Predicate.ARRIVES_IN, place=LandmarkName.KFC, seconds=30))
+    assert is_sayable(time, "arrives_in", memory, view, asked)
+
+
+def test_same_is_not_said_twice_unless_the_participant_spoke_or_time_has_passed(scene):
+    view, memory = scene
+    asked = intend(Function.SET_QUESTION, contents.destination(LandmarkName.QUERIED))
+    memory = memory.spoken(asked, "goal", view, asks=True, asks_way=False)
+    assert not is_sayable(asked, "goal", memory, view, None)
+    assert is_sayable(asked, "goal", replace(memory, heard_at=view.time), view, None)
+    earlier = replace(memory, said_at=(("goal", view.time - SAID_AGAIN_AFTER),))
+    assert is_sayable(asked, "goal", earlier, view, None)
