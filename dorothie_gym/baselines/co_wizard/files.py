@@ -26,7 +26,7 @@ KIND: Final = "co-wizard"
 """Kind of the model in `model.json`; `policy_loader` selects the loader by it."""
 
 TENSORS: Final = "model.safetensors"
-MODEL_FORMAT: Final = 1
+MODEL_FORMAT: Final = 2
 _FORMS: Final = "forms"
 
 
@@ -100,9 +100,9 @@ class ModelPage:
 
 
 def save_network(network: CoWizardNetwork, page: ModelPage, folder: Path) -> None:
-    """Writes a model into a folder; an older one stays whole until it is replaced."""
+    """Writes a model into a folder, with weights in half precision; an older one stays whole until it is replaced."""
     folder.mkdir(parents=True, exist_ok=True)
-    tensors = {name: value.detach().contiguous().clone() for name, value in network.state_dict().items()}
+    tensors = {name: value.detach().half().contiguous() for name, value in network.state_dict().items()}
     with replacing(folder / DESCRIPTION) as card, replacing(folder / TENSORS) as weights:
         save_tensors(tensors, weights)
         card.write_text(json.dumps(asdict(page), indent=1) + "\n", encoding="utf-8")

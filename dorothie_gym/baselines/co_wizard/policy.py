@@ -169,7 +169,8 @@ class LearnedCoWizard(Policy[LearnedState]):
             goal = len(GoalEvent) + inputs.rows[goal - len(GoalEvent)]
         return Update(
             values=tuple(int(part.argmax()) for part in np.split(values, np.cumsum(SIZES)[:-1])),
-            fresh=tuple(flag > 0.0 for flag in heard.fresh[0].tolist()), goal=goal, status=int(heard.status[0].argmax()),
+            fresh=tuple(flag > 0.0 for flag in heard.fresh[0].tolist()), goal=goal,
+            status=int(heard.status[0].argmax()),
         )  # fmt: skip
 
     def _act(

@@ -1,6 +1,8 @@
+import dataclasses
 import json
 
 import pytest
+import torch
 from safetensors.torch import load_file
 
 from dorothie_gym.baselines.co_wizard.features import STATE_SIZE
@@ -71,6 +73,26 @@ def test_interrupted_training_ends_with_the_same_weights(corpus, trained, tmp_pa
     assert weights(tmp_path / "two") == weights(trained)
 
 
+def test_weights_are_stored_in_half_precision(trained):
+    stored = load_file(trained / "model.safetensors")
+    assert {value.dtype for value in stored.values()} == {torch.float16}
+    network, _ = load_network(trained)
+    assert {name: value.half().numpy().tobytes() for name, value in network.state_dict().items()} == weights(trained)
+    assert {value.dtype for value in network.state_dict().values()} == {torch.float32}
+
+
+def test_trainings_with_other_seeds_share_the_lessons_of_the_corpus(corpus, trained, tmp_path):
+    shared = tmp_path / "shared"
+    for seed in (3, 4):
+        other = dataclasses.replace(settings(corpus), seed=seed, rounds=0)
+        train_co_wizard(other, tmp_path / str(seed), workers=1, on_stage=lambda *_: None, lessons=shared)
+        assert not (tmp_path / str(seed) / LESSONS).exists()
+    own = trained / LESSONS / "corpus"
+    found = {path.name: path.read_bytes() for path in own.glob("*.safetensors")}
+    assert found == {path.name: path.read_bytes() for path in shared.glob("*.safetensors")}
+    assert weights(tmp_path / "3") != weights(tmp_path / "4")
+
+
 def test_folder_of_other_settings_is_refused(corpus, trained):
     other = CoWizardTraining(corpus=corpus, seed=4)
     with pytest.raises(SessionError, match="has seed 3, not 4"):
@@ -108,7 +130,7 @@ def test_model_plays_no_other_role(trained):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"format": 2}, "another version"),
+        ({"format": 1}, "another version"),
         ({"vocabulary": ["", "{}"]}, "layout"),
         ({"layout": {"state": 1, "place": 1, "command": 1, "remarks": 1}}, "layout"),
     ],
