@@ -36,6 +36,13 @@ from dorothie_gym.spaces import ActionDict, CoWizardAction, ObservationMapping, 
 TEMPERATURE: Final = 0.7
 """Temperature at which remarks are drawn."""
 
+KEPT_BONUS: Final = 2.0
+"""Added to the logit of each present value of the memory where nothing has just been heard.
+
+A change that was missed is made up for at the next decision; one for no reason stays. In practice sessions of a
+training, 2 halved the latter (2,041 to 972), while 169 instead of 92 of 429 changes came later.
+"""
+
 MAX_DRAWS: Final = 8
 """Number of remarks that are drawn until one is sayable; then there is silence."""
 
@@ -164,11 +171,13 @@ class LearnedCoWizard(Policy[LearnedState]):
         before = torch.tensor([scene.memory.values])
         heard = self._network.listen(state, words, places, count, before)
         goal = int(heard.goal[0].argmax())
-        values = torch.cat(heard.values, dim=1)[0].numpy()
+        starts, logits = np.cumsum((0, *SIZES[:-1])), torch.cat(heard.values, dim=1)[0].numpy()
+        if not scene.heard:
+            logits[starts + scene.memory.values] += KEPT_BONUS
         if goal >= len(GoalEvent):
             goal = len(GoalEvent) + inputs.rows[goal - len(GoalEvent)]
         return Update(
-            values=tuple(int(part.argmax()) for part in np.split(values, np.cumsum(SIZES)[:-1])),
+            values=tuple(int(part.argmax()) for part in np.split(logits, starts[1:])),
             fresh=tuple(flag > 0.0 for flag in heard.fresh[0].tolist()), goal=goal,
             status=int(heard.status[0].argmax()),
         )  # fmt: skip
