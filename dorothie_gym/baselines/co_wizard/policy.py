@@ -39,8 +39,8 @@ TEMPERATURE: Final = 0.7
 KEPT_BONUS: Final = 2.0
 """Added to the logit of each present value of the memory where nothing has just been heard.
 
-A change that was missed is made up for at the next decision; one for no reason stays. In practice sessions of a
-training, 2 halved the latter (2,041 to 972), while 169 instead of 92 of 429 changes came later.
+A change that was missed is made up for at the next decision; one for no reason stays. In the second round of a
+training, 2 reduced the latter from 635 to 214, while 166 instead of 87 of 472 changes came later.
 """
 
 MAX_DRAWS: Final = 8
