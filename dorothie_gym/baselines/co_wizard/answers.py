@@ -6,15 +6,28 @@ for what it asks (`beliefs.evidence`), and what was not understood is said again
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final
 
 from dorothie_gym.baselines.co_wizard.beliefs import evidence
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import Memory, seconds_since
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition
-from dorothie_gym.ontology import DialogueMove
+from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, Slot, SlotValue, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import Remark, intend, repeated
+
+_OPEN_QUESTIONS: Final[Mapping[SlotValue, tuple[Predicate, ...]]] = MappingProxyType(
+    {
+        ActionValue.STOP: (Predicate.STANDS,),
+        ActionValue.U_TURN: (Predicate.DOES,),
+        ObjectClass.QUERIED: (Predicate.SEES,),
+        ActionValue.QUERIED: (Predicate.WILL, Predicate.GOAL),
+        StreetName.QUERIED: (Predicate.ON_STREET,),
+    }
+)
+"""What answers to open questions are about, by a slot value of the question; a reason is about its effect."""
 
 QUESTIONS: Final = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.CHECK)
 
@@ -82,7 +95,8 @@ def is_sayable(
 ) -> bool:  # fmt: skip
     """Returns whether a remark is not ruled out.
 
-    Ruled out is what the evidence denies, an answer about something that was not asked, and what has just been said.
+    Ruled out is what the evidence denies, an answer about something that was not asked, an acknowledgement instead of
+    an answer, and what has just been said.
 
     Args:
         remark: the remark.
@@ -94,6 +108,8 @@ def is_sayable(
     said_at = dict(memory.said_at).get(topic)
     if said_at is not None and said_at > memory.heard_at and seconds_since(view.time, said_at) < SAID_AGAIN_AFTER:
         return False
+    if remark.act.move is DialogueMove.ACKNOWLEDGE:
+        return utterance is None or not _waits_for_answer(utterance, memory)
     if remark.act.move not in _STATEMENTS:
         return True
     if any(_is_denied(memory, view, said) for said in remark.meaning):
@@ -101,6 +117,11 @@ def is_sayable(
     if remark.act.move is DialogueMove.EXPLAIN or utterance is None or not remark.meaning:
         return True
     return _is_about(remark.meaning[0], utterance)
+
+
+def _waits_for_answer(utterance: Utterance, memory: Memory) -> bool:
+    """Returns whether an utterance asks something, and nothing has been said since."""
+    return memory.spoke_at < utterance.time and any(act.move in QUESTIONS for act in utterance.heard.acts)
 
 
 def _is_denied(memory: Memory, view: CoWizardView, said: Proposition) -> bool:
@@ -112,12 +133,20 @@ def _is_denied(memory: Memory, view: CoWizardView, said: Proposition) -> bool:
 
 def _is_about(answer: Proposition, utterance: Utterance) -> bool:
     """Returns whether an answer is about what an utterance asks, as far as that was understood."""
-    asked = utterance.asked if utterance.asks is not None else utterance.heard.words.asked
-    if asked is None:
+    asked = _asked_about(utterance)
+    if not asked:
         return True
-    if answer.predicate is Predicate.BECAUSE:
-        effect = answer.get("effect")
-        return asked.predicate is Predicate.BECAUSE or (
-            isinstance(effect, Proposition) and effect.predicate is asked.predicate
-        )
-    return answer.predicate is asked.predicate
+    effect = answer.get("effect") if answer.predicate is Predicate.BECAUSE else answer
+    return answer.predicate in asked or (isinstance(effect, Proposition) and effect.predicate in asked)
+
+
+def _asked_about(utterance: Utterance) -> tuple[Predicate, ...]:
+    """Returns the predicates of answers to a question; empty where what it asks was not understood."""
+    asked = utterance.asked if utterance.asks is not None else utterance.heard.words.asked
+    if asked is not None:
+        return (asked.predicate,)
+    for act in utterance.heard.acts:
+        if act.move is DialogueMove.QUERY_W:
+            found = (predicates for value, predicates in _OPEN_QUESTIONS.items() if value in act.slots)
+            return next(found, (Predicate.LOCATED,) if act.values(Slot.LANDMARK) else ())
+    return ()

@@ -10,7 +10,7 @@ from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.observation_parser import HeardUtterance
+from dorothie_gym.policies.observation_parser import HeardUtterance, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
 
@@ -111,6 +111,36 @@ def test_answer_about_something_else_is_not_sayable(scene):
     assert not is_sayable(said, "stands", memory, view, asked)
     time = intend(Function.ANSWER, Proposition.of(Predicate.ARRIVES_IN, place=LandmarkName.KFC, seconds=30))
     assert is_sayable(time, "arrives_in", memory, view, asked)
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "about"),
+    [
+        ("why did we stop?", ActionValue.STOP, STANDS),
+        ("which way now?", ActionValue.QUERIED, contents.action(ActionValue.LANE_FOLLOW)),
+        ("what street is this?", StreetName.QUERIED, Proposition.of(Predicate.ON_STREET, street=StreetName.BEAL)),
+    ],
+)
+def test_open_question_rules_out_answers_about_something_else(scene, text, value, about):
+    view, memory = scene
+    asked = heard(view, text, DialogueMove.QUERY_W, value)
+    here = street_of(view.raw, memory.town, view.lane)
+    answers = (STANDS, contents.action(ActionValue.LANE_FOLLOW), Proposition.of(Predicate.ON_STREET, street=here))
+    sayable = [
+        said.predicate for said in answers
+        if is_sayable(intend(Function.ANSWER, said), str(said.predicate), memory, view, asked)
+    ]  # fmt: skip
+    assert sayable == [about.predicate]
+
+
+def test_question_is_not_acknowledged_but_an_instruction_is(scene):
+    view, memory = scene
+    okay = intend(Function.POSITIVE_FEEDBACK)
+    asked = heard(view, "why did we stop?", DialogueMove.QUERY_W, ActionValue.STOP)
+    told = heard(view, "turn left", DialogueMove.INSTRUCT, ActionValue.J_TURN)
+    assert not is_sayable(okay, "Acknowledge", memory, view, asked)
+    assert is_sayable(okay, "Acknowledge", memory, view, told)
+    assert is_sayable(okay, "Acknowledge", replace(memory, spoke_at=view.time), view, asked)
 
 
 def test_same_is_not_said_twice_unless_the_participant_spoke_or_time_has_passed(scene):
