@@ -146,7 +146,7 @@ def _asked_about(utterance: Utterance) -> tuple[Predicate, ...]:
     if asked is not None:
         return (asked.predicate,)
     for act in utterance.heard.acts:
-        if act.move is DialogueMove.QUERY_W:
+        if act.move in (DialogueMove.QUERY_W, DialogueMove.QUERY_YN):
             found = (predicates for value, predicates in _OPEN_QUESTIONS.items() if value in act.slots)
             return next(found, (Predicate.LOCATED,) if act.values(Slot.LANDMARK) else ())
     return ()

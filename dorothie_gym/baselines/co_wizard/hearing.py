@@ -76,9 +76,16 @@ class Utterance:
 
     @cached_property
     def asks(self) -> DialogueMove | None:
-        """Move of the first question that yes or no answers; None without one."""
-        moves = (act.move for act in self.heard.acts)
-        return next((move for move in moves if move in (DialogueMove.QUERY_YN, DialogueMove.CHECK)), None)
+        """Move of the first question that yes or no answers; None without one.
+
+        A question about a stop or U-turn of which no more was understood asks why, as far as can be told: "way did we
+        stop?".
+        """
+        for act in self.heard.acts:
+            why = self.heard.words.asked is None and {ActionValue.STOP, ActionValue.U_TURN} & act.slots
+            if act.move is DialogueMove.CHECK or (act.move is DialogueMove.QUERY_YN and not why):
+                return act.move
+        return None
 
     @cached_property
     def asked(self) -> Proposition | None:

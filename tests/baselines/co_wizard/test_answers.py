@@ -62,6 +62,14 @@ def test_check_of_the_destination_is_confirmed_or_denied(scene):
     assert answer(scene, *asked).act.move is DialogueMove.REPLY_N
 
 
+def test_misheard_why_is_not_answered_by_yes_or_no(scene):
+    assert answer(scene, "way did we stop?", DialogueMove.QUERY_YN, ActionValue.STOP) is None
+    view, memory = scene
+    asked = heard(view, "way did we stop?", DialogueMove.QUERY_YN, ActionValue.STOP)
+    stops = Proposition.of(Predicate.DOES, action=ActionValue.STOP)
+    assert not is_sayable(intend(Function.AFFIRMATIVE_ANSWER, stops), "does", memory, view, asked)
+
+
 def test_no_answer_without_a_question(scene):
     assert answer(scene, "turn left", DialogueMove.INSTRUCT, ActionValue.J_TURN) is None
     assert answer_to(None, scene[1], scene[0]) is None
