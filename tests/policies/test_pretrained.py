@@ -97,7 +97,7 @@ def test_unknown_name_is_one_line_with_the_list() -> None:
     done = call("rollout", "--co-wizard", "pretrained:maskable_ppo", "--sessions", "1")
     assert done.exit_code == 2 and done.stderr.count("\n") == 1
     assert "did you mean 'pretrained:maskable-ppo'?" in done.stderr and ", ".join(NAMES) in done.stderr
-    with pytest.raises(PolicyLoadError, match="shipped models are pretrained:maskable-ppo"):
+    with pytest.raises(PolicyLoadError, match="shipped models are pretrained:co-wizard"):
         pretrained_folder("dqn")
 
 

@@ -7,7 +7,7 @@ of lessons, and each fit a model, so that an interrupted training goes on where 
 
 from __future__ import annotations
 
-import time
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -122,7 +122,7 @@ def train_co_wizard(
         ProcessError: a session failed in another process.
     """
     torch.set_num_threads(1)  # small layers: more threads only wait for each other, and change the last bits
-    begun, done = time.process_time(), []
+    begun, done = _processor_seconds(), []
     entries = Corpus.load(settings.corpus).filter(fold="train").entries
     if not entries:
         raise SessionError(f"{settings.corpus}: there is no session in the fold 'train' to learn from")
@@ -152,6 +152,11 @@ def train_co_wizard(
     return tuple(done)
 
 
+def _processor_seconds() -> float:
+    """Returns the processor time of this process and of those that have ended [s]."""
+    return sum(os.times()[:4])
+
+
 def _fit(
     settings: CoWizardTraining, number: int, folder: Path, files: Sequence[Path], vocabulary: tuple[str, ...],
     former: CoWizardNetwork | None, begun: float, on_stage: OnStage,
@@ -168,7 +173,7 @@ def _fit(
     loss = fit(network, examples, epochs=epochs, seed=seed, on_epoch=lambda epoch, _: on_stage(title, epoch, epochs))
     page = ModelPage(
         format=MODEL_FORMAT, kind=KIND, layout=network.layout, vocabulary=vocabulary, steps=len(examples) * epochs,
-        seconds=round(time.process_time() - begun, 1),
+        seconds=round(_processor_seconds() - begun, 1),
         settings={**settings.as_json(), "corpus": settings.corpus.name},
     )  # fmt: skip
     save_network(network, page, folder)
