@@ -20,7 +20,7 @@ def env() -> NavigationContinuousEnv:
     return NavigationContinuousEnv(traffic="none")
 
 
-@pytest.mark.parametrize("seed", [0, 6])
+@pytest.mark.parametrize("seed", [1, 6])
 def test_path_following_driver_succeeds(env: NavigationContinuousEnv, seed: int) -> None:
     observation, _ = env.reset(seed=seed)
     over = False
