@@ -167,11 +167,11 @@ class CoWizardStyle:
         """Returns the style of a persona; the random generator adds what is the speaker's own."""
         gentle, brisk = persona.driving is Driving.GENTLE, persona.driving is Driving.BRISK
         return cls(
-            echoes=within(0.1, 0.4, persona.politeness, rng),
+            echoes=within(0.2, 0.5, persona.politeness, rng),
             checks=within(0.4, 0.1, persona.certainty, rng),
-            announces=within(0.0, 0.18, persona.talkativeness, rng),
-            silent=within(0.65, 0.25, persona.talkativeness, rng),
-            asks=within(0.6, 0.2, persona.certainty, rng),
+            announces=within(0.05, 0.25, persona.talkativeness, rng),
+            silent=within(0.5, 0.15, persona.talkativeness, rng),
+            asks=within(0.7, 0.3, persona.certainty, rng),
             proposes=within(0.1, 0.6, persona.certainty, rng),
             mishears=within(0.05, 0.0, persona.attention, rng),
             careful=within(0.9, 1.0, persona.patience, rng),

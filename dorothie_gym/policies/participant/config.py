@@ -197,14 +197,14 @@ class ParticipantStyle:
             chat=within(205.0, 100.0, (persona.talkativeness + persona.humour) / 2.0, rng),
             waits=within(0.4, 0.8, persona.patience, rng) + 0.15 * vague,
             hints=within(0.3, 0.7, persona.politeness, rng) + 0.2 * landmarks,
-            reasons=within(0.05, 0.3, persona.talkativeness, rng) + 0.15 * landmarks,
+            reasons=within(0.15, 0.4, persona.talkativeness, rng) + 0.15 * landmarks,
             aligns=within(0.15, 0.0, persona.certainty, rng),
-            nods=within(0.55, 0.85, persona.politeness, rng),
+            nods=within(0.65, 0.95, persona.politeness, rng),
             curious=within(0.02, 0.25, persona.attention, rng),
             puzzled=within(0.35, 0.0, persona.certainty, rng),
             points_out=within(0.5, 0.85, persona.politeness, rng) + 0.15 * landmarks,
             thanks=within(0.4, 0.9, persona.politeness, rng),
-            verifies=within(0.2, 0.0, persona.certainty, rng),
+            verifies=within(0.3, 0.05, persona.certainty, rng),
             notices=0.0 if persona.ignores else within(0.7, 1.0, persona.attention, rng),
         )
 

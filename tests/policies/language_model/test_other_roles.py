@@ -23,7 +23,7 @@ from tests.policies.language_model.simple_readers import Interferer, guide
 
 def test_participant_guides_the_scripted_car_to_its_places() -> None:
     reached = live = 0
-    for seed in (0, 4):
+    for seed in (0, 1):
         model = PromptModel(guide)
         summary = play({Role.PARTICIPANT: (NOWHERE, model)}, seed=seed)
         reached, live = reached + summary["subgoals"]["reached"], live + summary["subgoals"]["live"]
