@@ -72,8 +72,8 @@ class CoWizardTraining:
 
     corpus: Path
     seed: int = 0
-    rounds: int = 3
-    sessions: int = 25
+    rounds: int = 5
+    sessions: int = 30
     share: float = 0.6
     talking: float = 0.5
     max_seconds: float = 300.0
