@@ -33,7 +33,8 @@ class Fit(Protocol):
 
 
 def _train_co_wizard(corpus: Path, folder: Path, seed: int, workers: int, on_stage: OnStage) -> Sequence[Fit]:
-    from dorothie_gym.baselines.co_wizard.training import LESSONS, CoWizardTraining, train_co_wizard
+    from dorothie_gym.baselines.co_wizard.training import CoWizardTraining, train_co_wizard
+    from dorothie_gym.baselines.imitation.rounds import LESSONS
 
     settings = CoWizardTraining(corpus=corpus, seed=seed)
     return train_co_wizard(settings, folder, workers=workers, on_stage=on_stage, lessons=folder.parent / LESSONS)

@@ -167,7 +167,8 @@ def train_in_rounds(
         shared = lessons or out / LESSONS / "corpus"
         paths = [shared / f"{entry.path.name}.safetensors" for entry in entries]
         plans = [CorpusPlan(number=k, file=path) for k, path in enumerate(paths)]
-        _gather(learner.follower, plans, workers, partial(on_stage, "Sessions of the corpus"))
+        with locked_folder(shared, SETTINGS_FILE, {"corpus": str(settings.corpus)}):
+            _gather(learner.follower, plans, workers, partial(on_stage, "Sessions of the corpus"))
         corpus_files = [path for path in paths if path.is_file()]
         if not corpus_files:
             raise SessionError(f"{settings.corpus}: fold 'train' has no session to learn from")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, TypeVar
+from typing import Final, Protocol, Self, TypeVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import cross_entropy
 
-from dorothie_gym.baselines.imitation.batches import UNKNOWN, TensorBatch
+from dorothie_gym.baselines.imitation.batches import UNKNOWN
 
 BATCH_SIZE: Final = 256
 RATE, LAST_RATE = 1e-3, 5e-5
@@ -18,7 +18,20 @@ RATE, LAST_RATE = 1e-3, 5e-5
 DECAY: Final = 1e-4
 """Weight decay."""
 
-Examples = TypeVar("Examples", bound=TensorBatch)
+
+class Rows(Protocol):
+    """Examples of which some rows can be taken."""
+
+    def __len__(self) -> int:
+        """Returns the number of examples."""
+        ...
+
+    def rows(self, numbers: Tensor) -> Self:
+        """Returns the examples with some numbers (n,)."""
+        ...
+
+
+Examples = TypeVar("Examples", bound=Rows)
 OnEpoch = Callable[[int, float], None]
 """Callback with the number of epochs done and the mean loss of the last one."""
 

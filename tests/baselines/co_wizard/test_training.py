@@ -8,7 +8,8 @@ from safetensors.torch import load_file
 from dorothie_gym.baselines.co_wizard.features import STATE_SIZE
 from dorothie_gym.baselines.co_wizard.files import load_network
 from dorothie_gym.baselines.co_wizard.hearing import KEPT, UTTERANCE_SIZE
-from dorothie_gym.baselines.co_wizard.training import LESSONS, CoWizardTraining, train_co_wizard
+from dorothie_gym.baselines.co_wizard.training import CoWizardTraining, train_co_wizard
+from dorothie_gym.baselines.imitation.rounds import LESSONS
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import ModelFileError, SessionError
