@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Final
 
 import torch
-from safetensors import SafetensorError, safe_open
+from safetensors import safe_open
 from safetensors.torch import load_file
 
 from dorothie_gym.baselines.co_wizard.examples import UNKNOWN, Batch, Example, batch_of, forms_in
 from dorothie_gym.baselines.co_wizard.network import CoWizardNetwork, Layout
 from dorothie_gym.baselines.co_wizard.remarks import check_form
+from dorothie_gym.baselines.imitation.model_files import RoleModelPage, load_model, save_model
 from dorothie_gym.baselines.tensor_files import save_tensors
-from dorothie_gym.errors import InputFileError, ModelFileError, one_line
 from dorothie_gym.files import replacing
-from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, raising, read_json
-from dorothie_gym.policies.policy_loader import DESCRIPTION
 
 KIND: Final = "co-wizard"
 """Kind of the model in `model.json`; `policy_loader` selects the loader by it."""
 
-TENSORS: Final = "model.safetensors"
 MODEL_FORMAT: Final = 2
 _FORMS: Final = "forms"
 
@@ -77,71 +74,29 @@ def vocabulary_of(paths: Sequence[Path], least: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelPage:
+class ModelPage(RoleModelPage):
     """Content of `model.json`.
 
     Attributes:
-        format: version of the files.
-        kind: `KIND`.
         layout: lengths of inputs and outputs.
-        vocabulary: forms of remarks, silence first.
-        steps: number of examples times passes.
-        seconds: processor time of the training [s].
-        settings: settings of the training.
     """
 
-    format: int
-    kind: str
     layout: Layout
-    vocabulary: tuple[str, ...]
-    steps: int
-    seconds: float
-    settings: Mapping[str, object]
 
 
 def save_network(network: CoWizardNetwork, page: ModelPage, folder: Path) -> None:
     """Writes a model into a folder, with weights in half precision; an older one stays whole until it is replaced."""
-    folder.mkdir(parents=True, exist_ok=True)
-    tensors = {name: value.detach().half().contiguous() for name, value in network.state_dict().items()}
-    with replacing(folder / DESCRIPTION) as card, replacing(folder / TENSORS) as weights:
-        save_tensors(tensors, weights)
-        card.write_text(json.dumps(asdict(page), indent=1) + "\n", encoding="utf-8")
+    save_model(network, page, folder, torch.float16)
 
 
 def load_network(folder: Path) -> tuple[CoWizardNetwork, ModelPage]:
-    """Reads a model.
-
-    Args:
-        folder: folder of the model, or `model.json` in it.
+    """Reads a model from its folder, or from `model.json` in it.
 
     Raises:
         ModelFileError: a file is missing, damaged, or of another version.
     """
-    folder = folder.parent if folder.is_file() else folder
-    card, weights = folder / DESCRIPTION, folder / TENSORS
-    with raising(ModelFileError):
-        try:
-            page = checked(read_json(card, MAX_MODEL_JSON), ModelPage, card)
-        except OSError as error:
-            raise ModelFileError(f"{card}: cannot be read ({error.strerror})") from None
-    if page.format != MODEL_FORMAT or page.kind != KIND:
-        raise ModelFileError(f"{card}: is no {KIND} of format {MODEL_FORMAT}; it is of another version of dorothie_gym")
-    if page.layout != Layout.of(len(page.vocabulary)):
-        raise ModelFileError(
-            f"{card}: field 'layout' is that of another version of dorothie_gym; train the model again"
-        )
-    for number, form in enumerate(page.vocabulary[1:], start=1):
-        try:
-            check_form(form)
-        except (ValueError, LookupError, TypeError, InputFileError) as error:
-            raise ModelFileError(f"{card}: vocabulary[{number}] is no remark ({one_line(error)})") from None
-    network = CoWizardNetwork(page.layout)
-    try:
-        check_file(weights, MAX_WEIGHTS)
-        tensors = load_file(weights)
-        network.load_state_dict(tensors)
-    except (SafetensorError, OSError, InputFileError, RuntimeError) as error:
-        raise ModelFileError(f"{weights}: cannot be read ({one_line(error)})") from None
-    if any(not bool(value.isfinite().all()) for value in tensors.values()):
-        raise ModelFileError(f"{weights}: has a weight that is no finite number")
-    return network.eval(), page
+    return load_model(folder, ModelPage, KIND, MODEL_FORMAT, make=_network, check_form=check_form)
+
+
+def _network(page: ModelPage) -> CoWizardNetwork | None:
+    return CoWizardNetwork(page.layout) if page.layout == Layout.of(len(page.vocabulary)) else None
