@@ -32,6 +32,8 @@ runner = CliRunner()
         (["train", "co-wizard", "--config", "paper"], "--config and --encoder are not for co-wizard"),
         (["train", "co-wizard", "--encoder", "minilm"], "--config and --encoder are not for co-wizard"),
         (["train", "participant", "--strict"], "--config and --encoder are not for participant"),
+        (["train", "co-wizard", "--ad-wizard", "silent"], "--ad-wizard is for co-wizard-rl only"),
+        (["train", "co-wizard-rl", "--ad-wizard", "scriptd"], "there is no policy 'scriptd'"),
         (["train", "detr"], "run first: dorothie-gym train segformer"),
     ],
 )

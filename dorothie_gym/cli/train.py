@@ -23,7 +23,7 @@ from dorothie_gym.cli.output import (
     stdout,
     wide_stdout,
 )
-from dorothie_gym.cli.train_roles import ROLES, train_role
+from dorothie_gym.cli.train_roles import CO_WIZARD_RL, ROLES, train_role
 from dorothie_gym.cli.train_vision import VISION_MODELS, train_vision
 
 if TYPE_CHECKING:
@@ -49,9 +49,7 @@ Size = Annotated[str, typer.Option("--config", "--size", help="small (two cores)
 Seeds = Annotated[int, typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...")]
 SomeSeeds = Annotated[
     int | None,
-    typer.Option(
-        min=1, max=99, help="Number of seeds: 0, 1, ...; default 5, of segformer, detr, co-wizard and participant 1."
-    ),
+    typer.Option(min=1, max=99, help="Number of seeds: 0, 1, ...; default 5, of the vision models and the roles 1."),
 ]
 Device = Annotated[
     str | None, typer.Option(help="segformer and detr: cpu, cuda, ...; default the GPU where there is one.")
@@ -68,6 +66,13 @@ Detector = Annotated[
     typer.Option(
         "--detector", metavar="DIR",
         help="Models of detections and queries: folder of the trained detector; default OUT/detr/small/seed-0.",
+    ),
+]  # fmt: skip
+AdWizard = Annotated[
+    str | None,
+    typer.Option(
+        "--ad-wizard", metavar="POLICY",
+        help="co-wizard-rl: Ad-Wizard of every other session, by name or path; default scripted.",
     ),
 ]  # fmt: skip
 Hubert = Annotated[
@@ -93,7 +98,7 @@ def train(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="toto, toto-belief, bert, ... (see `table`); segformer, detr; co-wizard, participant.",
+            help="toto, toto-belief, bert, ... (see `table`); segformer, detr; co-wizard, co-wizard-rl, participant.",
             autocompletion=complete_model,
         ),
     ],
@@ -109,13 +114,17 @@ def train(
     epochs: Epochs = None,
     detector: Detector = None,
     hubert: Hubert = None,
+    ad_wizard: AdWizard = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a model with several seeds, test it, and print its scores.
 
     An interrupted run is resumed by the same command. The vision models, segformer and detr, learn from pictures of the
     recorded sessions; co-wizard learns to talk and drive, and participant to guide, by imitation and practice.
+    co-wizard-rl is co-wizard, trained further by reinforcement.
     """
+    if ad_wizard is not None and model != CO_WIZARD_RL:
+        fail(f"--ad-wizard is for {CO_WIZARD_RL} only")
     if model in VISION_MODELS:
         if detector is not None:
             fail(_NOT_OF_DETECTIONS)
@@ -133,7 +142,10 @@ def train(
         if detector is not None or hubert is not None or strict or size != SMALL or encoder != AUTO:
             fail(f"--detector, --hubert, --strict, --config and --encoder are not for {model}")
         with _reporting_errors():
-            train_role(model, *_places(corpus, out), seeds=seeds or 1, workers=workers, as_json=as_json)
+            train_role(
+                model, *_places(corpus, out), seeds=seeds or 1, workers=workers, ad_wizard=ad_wizard or "scripted",
+                as_json=as_json,
+            )  # fmt: skip
         return
     _train_benchmark_model(
         model, corpus, out, size=size, seeds=seeds or 5, encoder=encoder, workers=workers, strict=strict,

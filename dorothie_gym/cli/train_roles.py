@@ -1,85 +1,147 @@
-"""`dorothie-gym train co-wizard` and `train participant`: training of a learned role by imitation and practice."""
+"""`dorothie-gym train` for the learned roles: co-wizard, co-wizard-rl and participant."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.cli.output import exit_interrupted, print_json, stage_progress, stdout
 
+if TYPE_CHECKING:
+    from dorothie_gym.baselines.imitation.rounds import Stage
+
 OnStage = Callable[[str, int, int], None]
 
-
-class Fit(Protocol):
-    """A fit of a network: the name of its model's folder, its number of examples, and its loss."""
-
-    @property
-    def name(self) -> str:
-        """Name of the folder."""
-        ...
-
-    @property
-    def examples(self) -> int:
-        """Number of examples."""
-        ...
-
-    @property
-    def loss(self) -> float:
-        """Mean loss of the last pass [nats]."""
-        ...
+CO_WIZARD_RL: Final = "co-wizard-rl"
+"""Name of the Co-Wizard that is trained further by reinforcement."""
 
 
-def _train_co_wizard(corpus: Path, folder: Path, seed: int, workers: int, on_stage: OnStage) -> Sequence[Fit]:
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What is to be trained.
+
+    Attributes:
+        corpus: folder of the corpus.
+        out: folder of the trainings.
+        seed: seed.
+        workers: number of processes.
+        ad_wizard: Ad-Wizard of half the sessions of reinforcement, by name or path.
+        on_stage: callback for the progress.
+    """
+
+    corpus: Path
+    out: Path
+    seed: int
+    workers: int
+    ad_wizard: str
+    on_stage: OnStage
+
+    def folder(self, model: str) -> Path:
+        """Returns the folder of the training of a model."""
+        return self.out / model / f"seed-{self.seed}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoleReport:
+    """Report of a training.
+
+    Attributes:
+        role: the role's option in `rollout`.
+        lines: lines to be printed.
+        figures: figures in JSON types.
+    """
+
+    role: str
+    lines: tuple[str, ...]
+    figures: Mapping[str, object]
+
+
+def _train_co_wizard(request: Request) -> RoleReport:
     from dorothie_gym.baselines.co_wizard.training import CoWizardTraining, train_co_wizard
     from dorothie_gym.baselines.imitation.rounds import LESSONS
 
-    settings = CoWizardTraining(corpus=corpus, seed=seed)
-    return train_co_wizard(settings, folder, workers=workers, on_stage=on_stage, lessons=folder.parent / LESSONS)
+    folder = request.folder("co-wizard")
+    settings = CoWizardTraining(corpus=request.corpus, seed=request.seed)
+    stages = train_co_wizard(
+        settings, folder, workers=request.workers, on_stage=request.on_stage, lessons=folder.parent / LESSONS
+    )
+    return _fits("co-wizard", stages)
 
 
-def _train_participant(corpus: Path, folder: Path, seed: int, workers: int, on_stage: OnStage) -> Sequence[Fit]:
+def _reinforce_co_wizard(request: Request) -> RoleReport:
+    from dorothie_gym.baselines.co_wizard.reinforcement import ReinforcementSettings, reinforce_co_wizard
+    from dorothie_gym.ontology import Role
+    from dorothie_gym.policies import find_player
+
+    find_player(request.ad_wizard, Role.AD_WIZARD)  # reported before the imitation
+    imitation = _train_co_wizard(request)
+    settings = ReinforcementSettings(
+        start=request.folder("co-wizard"), seed=request.seed, ad_wizard=request.ad_wizard
+    )  # fmt: skip
+    found = reinforce_co_wizard(
+        settings, request.folder(CO_WIZARD_RL), workers=request.workers, on_stage=request.on_stage
+    )
+    lines = tuple(
+        f"iteration {number}: {each.sessions} sessions, mean reward {each.reward:.2f}, divergence "
+        f"{each.distance:.3f} from the imitation"
+        for number, each in enumerate(found, start=1)
+    )
+    figures = {**imitation.figures, "iterations": [asdict(each) for each in found]}
+    return RoleReport(role="co-wizard", lines=(*imitation.lines, *lines), figures=figures)
+
+
+def _train_participant(request: Request) -> RoleReport:
     from dorothie_gym.baselines.imitation.rounds import LESSONS, RoundSettings
     from dorothie_gym.baselines.participant.training import train_participant
 
-    settings = RoundSettings(corpus=corpus, seed=seed)
-    lessons = folder.parent / LESSONS
-    return train_participant(settings, folder, workers=workers, on_stage=on_stage, lessons=lessons)
+    folder = request.folder("participant")
+    settings = RoundSettings(corpus=request.corpus, seed=request.seed)
+    stages = train_participant(
+        settings, folder, workers=request.workers, on_stage=request.on_stage, lessons=folder.parent / LESSONS
+    )
+    return _fits("participant", stages)
 
 
-ROLES: Final[Mapping[str, Callable[[Path, Path, int, int, OnStage], Sequence[Fit]]]] = MappingProxyType(
-    {"co-wizard": _train_co_wizard, "participant": _train_participant}
+def _fits(role: str, stages: Sequence[Stage]) -> RoleReport:
+    return RoleReport(
+        role=role,
+        lines=tuple(f"{one.name}: {one.examples:,} examples, loss {one.loss:.3f}" for one in stages),
+        figures={"fits": [{"model": one.name, "examples": one.examples, "loss": one.loss} for one in stages]},
+    )
+
+
+ROLES: Final[Mapping[str, Callable[[Request], RoleReport]]] = MappingProxyType(
+    {"co-wizard": _train_co_wizard, CO_WIZARD_RL: _reinforce_co_wizard, "participant": _train_participant}
 )
-"""Training of each role by the name of the model, which is that of its option in `rollout` as well."""
+"""Training of each learned role by the name of the model."""
 
 
-def train_role(model: str, corpus: Path, out: Path, *, seeds: int, workers: int | None, as_json: bool) -> None:
+def train_role(
+    model: str, corpus: Path, out: Path, *, seeds: int, workers: int | None, ad_wizard: str, as_json: bool
+) -> None:  # fmt: skip
     """Trains players of a role with several seeds, each in a folder of its own, and prints how to play them."""
     from dorothie_gym.processors import available_processors
 
-    found: list[tuple[Path, Sequence[Fit]]] = []
+    found: list[tuple[Path, RoleReport]] = []
     try:
         with stage_progress(quiet=as_json) as on_stage:
             for seed in range(seeds):
-                folder = out / model / f"seed-{seed}"
-                found.append((folder, ROLES[model](corpus, folder, seed, workers or available_processors(), on_stage)))
+                request = Request(
+                    corpus=corpus, out=out, seed=seed, workers=workers or available_processors(),
+                    ad_wizard=ad_wizard, on_stage=on_stage,
+                )  # fmt: skip
+                found.append((request.folder(model), ROLES[model](request)))
     except KeyboardInterrupt:
         exit_interrupted(f"Interrupted with {len(found)} of {seeds} trainings finished; resume with the same command.")
     if as_json:
-        runs = [
-            {
-                "folder": str(folder),
-                "fits": [{"model": one.name, "examples": one.examples, "loss": one.loss} for one in stages],
-            }
-            for folder, stages in found
-        ]
+        runs = [{"folder": str(folder), **report.figures} for folder, report in found]
         print_json({"model": model, "corpus": str(corpus), "runs": runs})
         return
-    for folder, stages in found:
-        for one in stages:
-            stdout().print(f"{one.name}: {one.examples:,} examples, loss {one.loss:.3f}", markup=False, soft_wrap=True)
-        stdout().print(
-            f"Play: dorothie-gym rollout --{model} {shlex.quote(str(folder))}", markup=False, soft_wrap=True
-        )  # fmt: skip
+    for folder, report in found:
+        play = f"Play: dorothie-gym rollout --{report.role} {shlex.quote(str(folder))}"
+        for line in (*report.lines, play):
+            stdout().print(line, markup=False, soft_wrap=True)

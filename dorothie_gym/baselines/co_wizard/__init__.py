@@ -2,5 +2,5 @@
 
 `memory` is what it remembers, `hearing` what it hears, `features` what it sees, `remarks` what it can say, `network`
 the network, `teacher` the scripted Co-Wizard whose decisions it imitates, `demonstrations`, `fitting` and `training`
-the training, and `policy` the player.
+the training, and `policy` the player; `experience`, `policy_gradient` and `reinforcement` train it further.
 """

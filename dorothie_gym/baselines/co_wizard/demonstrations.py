@@ -114,7 +114,7 @@ def follow(session: Session, town: Town, on_example: OnExample) -> None:
     seed = policy_seed(session.header.seed or 0, CO_WIZARD)
     pupil = Pupil(town, engine.limits, seed, Teacher(town, engine.limits, seed))
     for actions in recorded_actions(engine, session):
-        scene, memory, lesson = pupil.decide(_observed(engine), on_example)
+        scene, memory, lesson = pupil.decide(observed(engine), on_example)
         pupil.did(scene, memory, lesson.physical, lesson.remarks)
         engine.step(actions)
 
@@ -152,7 +152,7 @@ def practise(
         inputs, actions = policy_inputs(engine, others), {}
         for role, policy in others.items():
             actions[str(role)], states[role] = policy.step(inputs[role], states[role])
-        action = practice.decide(_observed(engine), on_example, leads=leads, talks=leads and talks)
+        action = practice.decide(observed(engine), on_example, leads=leads, talks=leads and talks)
         engine.step({**actions, str(CO_WIZARD): action.encode(limits)})
 
 
@@ -206,6 +206,6 @@ class _Practice:
             on_example(correction)
 
 
-def _observed(engine: SessionEngine) -> ObservationMapping:
+def observed(engine: SessionEngine) -> ObservationMapping:
     """Returns the observation of the Co-Wizard, with its action mask."""
     return {**engine.observations.of([CO_WIZARD])[str(CO_WIZARD)], "action_mask": engine.mask(CO_WIZARD)}

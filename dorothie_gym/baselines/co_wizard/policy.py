@@ -21,6 +21,7 @@ from dorothie_gym.baselines.co_wizard.decision import (
     perceive,
     remember,
 )
+from dorothie_gym.baselines.co_wizard.examples import UNKNOWN
 from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory, Update
 from dorothie_gym.baselines.co_wizard.network import SIZES, CoWizardNetwork
 from dorothie_gym.baselines.co_wizard.remarks import Sources, filled, sources, sources_of, topic_of
@@ -31,7 +32,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import Remark, SpeechState
-from dorothie_gym.spaces import ActionDict, CoWizardAction, ObservationMapping, Physical, SpaceLimits
+from dorothie_gym.spaces import ActionDict, CoWizardAction, ObservationMapping, SpaceLimits
 
 TEMPERATURE: Final = 0.7
 """Temperature at which remarks are drawn."""
@@ -65,12 +66,31 @@ class LearnedState:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Choice:
+    """What is chosen in the second step of a decision, among what.
+
+    Attributes:
+        inputs: inputs of the step.
+        command: index of the command.
+        first: number of the first remark's form; 0 for silence, `UNKNOWN` if none could be chosen.
+        possible: whether each form could be drawn (r,), if one was: its names and numbers are known, and it was not
+            found unsayable.
+    """
+
+    inputs: Inputs
+    command: int
+    first: int
+    possible: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Turn:
     """Decision of the player.
 
     Attributes:
         scene: what was perceived.
         memory: memory after listening.
+        choice: what was chosen in the second step.
         action: the action.
         remarks: what was decided to say.
         queued: whether own remarks waited before.
@@ -80,6 +100,7 @@ class Turn:
 
     scene: Scene
     memory: Memory
+    choice: Choice
     action: CoWizardAction
     remarks: tuple[Remark, ...]
     queued: bool
@@ -96,16 +117,21 @@ class LearnedCoWizard(Policy[LearnedState]):
 
     reads_mask = True
 
-    def __init__(self, network: CoWizardNetwork, vocabulary: Sequence[str], limits: SpaceLimits | None = None) -> None:
+    def __init__(
+        self, network: CoWizardNetwork, vocabulary: Sequence[str], limits: SpaceLimits | None = None, *,
+        command_temperature: float = 0.0,
+    ) -> None:  # fmt: skip
         """Prepares the policy.
 
         Args:
             network: trained network.
             vocabulary: forms of remarks; the first one stands for silence.
             limits: sizes of the spaces.
+            command_temperature: temperature at which commands are drawn; 0 for the likeliest ones.
         """
         super().__init__(Role.CO_WIZARD, limits)
         self._network, self._vocabulary = network.eval(), tuple(vocabulary)
+        self._command_temperature = command_temperature
         self._needs = [frozenset() if not form else sources_of(form) for form in self._vocabulary]
 
     def initial_state(self, seed: int, town: Town) -> LearnedState:
@@ -136,7 +162,11 @@ class LearnedCoWizard(Policy[LearnedState]):
             late = scene.memory.clock.interval / 2.0
             voice = voice.heard_other(view.time, scene.latest.heard.acts, rng, late).cleared()
         silent = silent or not voice.idle
-        memory, physical, remarks = self.decide(scene, rng, queued=queued, silent=silent)
+        with torch.inference_mode():
+            memory = remember(scene, self._listen(scene, listening_inputs(scene, queued=queued)))
+            inputs, commands = acting_inputs(scene, memory, queued=queued)
+            choice, remarks = self._act(scene, memory, inputs, rng, silent=silent)
+        physical = commands[choice.command]
         voice = voice.plan(*remarks)
         speech, voice = voice.speak(
             view.time, view.speaking, rng, _scene(view, memory), interval=memory.clock.interval,
@@ -145,25 +175,9 @@ class LearnedCoWizard(Policy[LearnedState]):
         mental, attention = finished(scene, memory, physical, remarks)
         action = CoWizardAction(speech=speech, physical=physical, mental=mental)
         return Turn(
-            scene=scene, memory=memory, action=action, remarks=remarks, queued=queued, silent=silent,
+            scene=scene, memory=memory, choice=choice, action=action, remarks=remarks, queued=queued, silent=silent,
             state=replace(state, attention=attention, voice=voice, count=state.count + 1),
         )  # fmt: skip
-
-    def decide(
-        self, scene: Scene, rng: np.random.Generator, *, queued: bool, silent: bool
-    ) -> tuple[Memory, Physical | None, tuple[Remark, ...]]:  # fmt: skip
-        """Returns the new memory, the command, and what is to be said.
-
-        Args:
-            scene: what is perceived.
-            rng: draws the remarks.
-            queued: whether own remarks waited to be said.
-            silent: whether nothing is to be said.
-        """
-        with torch.inference_mode():
-            memory = remember(scene, self._listen(scene, listening_inputs(scene, queued=queued)))
-            inputs, commands = acting_inputs(scene, memory, queued=queued)
-            return memory, *self._act(scene, memory, inputs, commands, rng, silent=silent)
 
     def _listen(self, scene: Scene, inputs: Inputs) -> Update:
         """Returns the likeliest update of the memory."""
@@ -183,28 +197,36 @@ class LearnedCoWizard(Policy[LearnedState]):
         )  # fmt: skip
 
     def _act(
-        self, scene: Scene, memory: Memory, inputs: Inputs, commands: Sequence[Physical | None],
-        rng: np.random.Generator, *, silent: bool,
-    ) -> tuple[Physical | None, tuple[Remark, ...]]:  # fmt: skip
-        """Returns the likeliest command, and remarks that are drawn."""
+        self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
+    ) -> tuple[Choice, tuple[Remark, ...]]:  # fmt: skip
+        """Returns what is chosen, and the remarks that are drawn."""
         scores, first, hidden = self._network.act(*_tensors(inputs))
-        physical = commands[int(scores[0].argmax())]
+        command = self._command(scores[0], rng)
+        none = np.zeros(len(self._vocabulary), dtype=np.bool_)
         if silent:
-            return physical, ()
+            return Choice(inputs=inputs, command=command, first=UNKNOWN, possible=none), ()
         shares = torch.softmax(first[0].double() / TEMPERATURE, dim=0).numpy()
         if rng.random() < shares[0]:
-            return physical, ()
+            return Choice(inputs=inputs, command=command, first=0, possible=none), ()
         available = sources(memory, scene.view, scene.utterances)
-        allowed = np.array([bool(needs <= available.keys()) for needs in self._needs])
-        allowed[0] = False
-        chosen, remark = self._draw(shares * allowed, scene, memory, available, rng)
+        possible = np.array([bool(needs <= available.keys()) for needs in self._needs])
+        possible[0] = False
+        shares *= possible
+        chosen, remark = self._draw(shares, scene, memory, available, rng)
         if remark is None:
-            return physical, ()
-        allowed[0] = True
+            return Choice(inputs=inputs, command=command, first=UNKNOWN, possible=none), ()
+        choice = Choice(inputs=inputs, command=command, first=chosen, possible=shares > 0.0)
+        possible[0] = True
         then = self._network.then(hidden, torch.tensor([chosen]))[0]
-        shares = torch.softmax(then.double() / TEMPERATURE, dim=0).numpy() * allowed
+        shares = torch.softmax(then.double() / TEMPERATURE, dim=0).numpy() * possible
         _, more = self._draw(shares, scene, memory, available, rng, joined=True)
-        return physical, (remark,) if more is None else (remark, more)
+        return choice, (remark,) if more is None else (remark, more)
+
+    def _command(self, scores: torch.Tensor, rng: np.random.Generator) -> int:
+        """Returns the index of the likeliest command, or of one that is drawn."""
+        if not self._command_temperature:
+            return int(scores.argmax())
+        return _drawn(torch.softmax(scores.double() / self._command_temperature, dim=0).numpy(), rng)
 
     def _draw(
         self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,
