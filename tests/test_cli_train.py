@@ -34,6 +34,8 @@ runner = CliRunner()
         (["train", "participant", "--strict"], "--config and --encoder are not for participant"),
         (["train", "co-wizard", "--ad-wizard", "silent"], "--ad-wizard is for co-wizard-rl only"),
         (["train", "co-wizard-rl", "--ad-wizard", "scriptd"], "there is no policy 'scriptd'"),
+        (["train", "segformer", "--strict"], "--hubert, --strict and --encoder are not for segformer"),
+        (["train", "detr", "--encoder", "hashing"], "--hubert, --strict and --encoder are not for detr"),
         (["train", "detr"], "run first: dorothie-gym train segformer"),
     ],
 )

@@ -128,6 +128,8 @@ def train(
     if model in VISION_MODELS:
         if detector is not None:
             fail(_NOT_OF_DETECTIONS)
+        if hubert is not None or strict or encoder != AUTO:
+            fail(f"--hubert, --strict and --encoder are not for {model}")
         with _reporting_errors():
             folder, where = _places(corpus, out)
             train_vision(
