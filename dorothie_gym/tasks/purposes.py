@@ -248,7 +248,11 @@ def _named_place() -> re.Pattern[str]:
 
 _ADJECTIVE = r"(?:(?:new|own|old|little|other) )?"
 _OWNER = rf"(?:(?!(?:{_PREPOSITIONS}|of|and|for) )[\w.-]+ ){{0,3}}[\w.-]+(?:'s|s')"
-_PERSON_PHRASE = rf"(?:{_OWNER} )?[\w.-]+(?: [A-Z][\w.-]+)*"
+_DESCRIBED = (
+    r"(?:the|an?|my|your|his|her|their)"
+    rf"(?: (?!(?:{_PREPOSITIONS}|on|of|and|for|who|where|that|because)\b)[a-z][\w-]*){{1,3}}"
+)  # "the pianist", "your old teacher"
+_PERSON_PHRASE = rf"(?:{_OWNER} )?(?:{_DESCRIBED}|[\w.-]+)(?: [A-Z][\w.-]+)*"
 _HOUSE = re.compile(
     rf",? ?\b(?P<place>(?P<prep>{_PREPOSITIONS}) "
     rf"(?:(?:the (?:garden|garage|door|gate) of )?(?P<owner>{_OWNER}) {_ADJECTIVE}(?:house|home|flat)"

@@ -58,6 +58,12 @@ EXAMPLES = {
     "Have dinner at the house of Ingrid's brother Olav instead, because her oven has broken": (
         "have dinner", "at the house of Ingrid's brother Olav", "Ingrid's brother Olav", (), "her oven has broken",
     ),
+    "Take it to Bashir at the house of the pianist": (
+        "take it to Bashir at the house of the pianist", "at the house of the pianist", "the pianist", (), None,
+    ),
+    "Sing at the house of your old teacher Mina on Baits": (
+        "sing on Baits", "at the house of my old teacher Mina", "my old teacher Mina", (), None,
+    ),
     "The queue at KFC is too long: meet the others at Qdoba": (
         "meet the others", "at Qdoba", "the others", (), "the queue at KFC is too long",
     ),
