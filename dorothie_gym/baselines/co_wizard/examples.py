@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Final
+from dataclasses import dataclass
+from typing import ClassVar, Final
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from dorothie_gym.baselines.co_wizard.decision import Inputs, Scene
 from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory
 from dorothie_gym.baselines.co_wizard.remarks import Sources, form_of
 from dorothie_gym.baselines.co_wizard.teacher import Lesson
+from dorothie_gym.baselines.imitation.batches import UNKNOWN, TensorBatch, reals, whole
 from dorothie_gym.spaces import Physical
 
 IDLE_SHARE: Final = 0.25
 """Share of the decisions at which nothing happens that is kept; each then counts as often as it stands for."""
-
-UNKNOWN: Final = -1
-"""Target of what is not learnt from an example."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,8 +118,10 @@ def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Mem
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class Batch(TensorBatch):
     """Examples as tensors; the first axis of each is that of the examples."""
+
+    REMARKS: ClassVar[tuple[str, ...]] = ("first", "second")
 
     listening: torch.Tensor
     words: torch.Tensor
@@ -141,19 +140,6 @@ class Batch:
     second: torch.Tensor
     weight: torch.Tensor
 
-    def __len__(self) -> int:
-        """Returns the number of examples."""
-        return len(self.weight)
-
-    def rows(self, index: torch.Tensor) -> Batch:
-        """Returns some examples."""
-        return Batch(*(getattr(self, one.name)[index] for one in fields(self)))
-
-    @classmethod
-    def joined(cls, batches: Sequence[Batch]) -> Batch:
-        """Returns all examples of some batches."""
-        return cls(*(torch.cat([getattr(batch, one.name) for batch in batches]) for one in fields(cls)))
-
 
 def batch_of(found: Sequence[Example], forms: Sequence[str]) -> Batch:
     """Returns examples as tensors.
@@ -168,32 +154,18 @@ def batch_of(found: Sequence[Example], forms: Sequence[str]) -> Batch:
         return UNKNOWN if form is None else numbers.get(form, UNKNOWN)
 
     return Batch(
-        listening=_reals([one.listening.state for one in found]),
+        listening=reals([one.listening.state for one in found]),
         words=torch.from_numpy(np.stack([one.listening.words for one in found]).astype(np.int16)),
-        places=_reals([one.listening.options for one in found]),
-        place_count=_whole([len(one.listening.rows) for one in found]),
-        before=_whole([one.before for one in found]), values=_whole([one.values for one in found]),
-        fresh=_reals([np.asarray(one.fresh, dtype=np.float32) for one in found]),
-        goal=_whole([one.goal for one in found]), status=_whole([one.status for one in found]),
-        acting=_reals([one.acting.state for one in found]),
-        commands=_reals([one.acting.options for one in found]),
-        command_count=_whole([len(one.acting.rows) for one in found]),
-        command=_whole([one.command for one in found]),
-        first=_whole([number(one.remarks[0]) for one in found]),
-        second=_whole([number(one.remarks[1]) for one in found]),
+        places=reals([one.listening.options for one in found]),
+        place_count=whole([len(one.listening.rows) for one in found]),
+        before=whole([one.before for one in found]), values=whole([one.values for one in found]),
+        fresh=reals([np.asarray(one.fresh, dtype=np.float32) for one in found]),
+        goal=whole([one.goal for one in found]), status=whole([one.status for one in found]),
+        acting=reals([one.acting.state for one in found]),
+        commands=reals([one.acting.options for one in found]),
+        command_count=whole([len(one.acting.rows) for one in found]),
+        command=whole([one.command for one in found]),
+        first=whole([number(one.remarks[0]) for one in found]),
+        second=whole([number(one.remarks[1]) for one in found]),
         weight=torch.tensor([one.weight for one in found], dtype=torch.float32),
     )  # fmt: skip
-
-
-def forms_in(found: Sequence[Example]) -> tuple[str, ...]:
-    """Returns the forms of the remarks of some examples, sorted, behind silence."""
-    return ("", *sorted({form for one in found for form in one.remarks if form}))
-
-
-def _reals(vectors: Sequence[NDArray[np.float32]]) -> torch.Tensor:
-    """Returns vectors as half-precision numbers: inputs are coarse, and there are many."""
-    return torch.from_numpy(np.stack(vectors).astype(np.float16))
-
-
-def _whole(numbers: Sequence[object]) -> torch.Tensor:
-    return torch.tensor(numbers, dtype=torch.int16)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from dorothie_gym.baselines.co_wizard.demonstrations import TRAINED, observed
 from dorothie_gym.baselines.co_wizard.policy import Choice, LearnedCoWizard
-from dorothie_gym.baselines.imitation.batches import TensorBatch
+from dorothie_gym.baselines.imitation.batches import TensorBatch, reals, whole
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ScriptedParticipant
@@ -81,17 +79,13 @@ def _experience(choices: Sequence[Choice], rewards: Sequence[float]) -> Experien
     last = torch.zeros(len(choices), dtype=torch.bool)
     last[-1] = True
     return Experience(
-        state=_stacked([choice.inputs.state for choice in choices], np.float16),
-        words=_stacked([choice.inputs.words for choice in choices], np.int16),
-        commands=_stacked([choice.inputs.options for choice in choices], np.float16),
-        command_count=torch.tensor([len(choice.inputs.rows) for choice in choices], dtype=torch.int16),
-        command=torch.tensor([choice.command for choice in choices], dtype=torch.int16),
-        first=torch.tensor([choice.first for choice in choices], dtype=torch.int16),
-        possible=_stacked([choice.possible for choice in choices], np.bool_),
+        state=reals([choice.inputs.state for choice in choices]),
+        words=torch.from_numpy(np.stack([choice.inputs.words for choice in choices]).astype(np.int16)),
+        commands=reals([choice.inputs.options for choice in choices]),
+        command_count=whole([len(choice.inputs.rows) for choice in choices]),
+        command=whole([choice.command for choice in choices]),
+        first=whole([choice.first for choice in choices]),
+        possible=torch.from_numpy(np.stack([choice.possible for choice in choices])),
         reward=torch.tensor(rewards, dtype=torch.float32),
         last=last,
     )
-
-
-def _stacked(arrays: Sequence[NDArray[Any]], dtype: type[np.generic]) -> Tensor:
-    return torch.from_numpy(np.stack(arrays).astype(dtype))

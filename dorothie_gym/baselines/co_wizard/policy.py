@@ -21,10 +21,10 @@ from dorothie_gym.baselines.co_wizard.decision import (
     perceive,
     remember,
 )
-from dorothie_gym.baselines.co_wizard.examples import UNKNOWN
 from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory, Update
 from dorothie_gym.baselines.co_wizard.network import SIZES, CoWizardNetwork
 from dorothie_gym.baselines.co_wizard.remarks import Sources, filled, sources, sources_of, topic_of
+from dorothie_gym.baselines.imitation.batches import UNKNOWN
 from dorothie_gym.dialogue import WordingContext, draw_style
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import LandmarkName, Role, StreetName

@@ -12,20 +12,18 @@ from typing import Final
 import torch
 
 from dorothie_gym.baselines.co_wizard.demonstrations import follow, is_held_out, practise
-from dorothie_gym.baselines.co_wizard.examples import Example
+from dorothie_gym.baselines.co_wizard.examples import Batch, Example, batch_of
 from dorothie_gym.baselines.co_wizard.files import (
     KIND,
     MODEL_FORMAT,
     ModelPage,
     load_network,
-    read_lessons,
     save_network,
-    vocabulary_of,
-    write_lessons,
 )
 from dorothie_gym.baselines.co_wizard.fitting import loss_of
 from dorothie_gym.baselines.co_wizard.network import CoWizardNetwork, Layout
 from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
+from dorothie_gym.baselines.imitation.batches import forms_in
 from dorothie_gym.baselines.imitation.rounds import (
     CorpusPlan,
     FitPlan,
@@ -104,8 +102,8 @@ class CoWizardLearner:
     def fit(self, plan: FitPlan, on_stage: OnStage) -> Stage:
         """Fits a network to lessons, and saves it."""
         settings = self.settings
-        vocabulary = vocabulary_of(plan.corpus_files, settings.least)
-        examples = read_lessons(plan.files, vocabulary)
+        vocabulary = Batch.vocabulary_of(plan.corpus_files, settings.least)
+        examples = Batch.read(plan.files, vocabulary)
         torch.manual_seed(settings.seed)
         network = CoWizardNetwork(Layout.of(len(vocabulary))) if plan.former is None else load_network(plan.former)[0]
         on_stage(plan.title, 0, plan.epochs)
@@ -157,5 +155,5 @@ class _Practice:
 
 
 def _write(found: Sequence[Example], file: Path) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_lessons(found, file)
+    forms = forms_in(form for one in found for form in one.remarks)
+    batch_of(found, forms).write(file, forms)

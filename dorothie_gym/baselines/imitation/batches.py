@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar, Final, Self
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from safetensors import safe_open
 from safetensors.torch import load_file
 
@@ -84,6 +86,21 @@ class TensorBatch:
                 counts.update(forms[number] for number in tensors[name].flatten().tolist() if number > 0)
         order = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
         return ("", *(form for form, count in order if count >= least))
+
+
+def reals(vectors: Sequence[NDArray[np.float32]]) -> torch.Tensor:
+    """Returns vectors (n, ...) as half-precision numbers: inputs are coarse, and there are many."""
+    return torch.from_numpy(np.stack(vectors).astype(np.float16))
+
+
+def whole(numbers: Sequence[object]) -> torch.Tensor:
+    """Returns integers, or rows of them, as a tensor of 16 bits."""
+    return torch.tensor(numbers, dtype=torch.int16)
+
+
+def forms_in(remarks: Iterable[str | None]) -> tuple[str, ...]:
+    """Returns the different forms of some remarks, sorted, behind silence."""
+    return ("", *sorted({form for form in remarks if form}))
 
 
 def forms_of(path: Path) -> list[str]:

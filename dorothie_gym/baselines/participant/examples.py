@@ -8,9 +8,8 @@ from typing import ClassVar, Final
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from dorothie_gym.baselines.imitation.batches import UNKNOWN, TensorBatch
+from dorothie_gym.baselines.imitation.batches import UNKNOWN, TensorBatch, reals, whole
 from dorothie_gym.baselines.participant.decision import Inputs, Scene
 from dorothie_gym.baselines.participant.memory import KEEP_TARGET, Choice, Memory
 from dorothie_gym.baselines.participant.remarks import STOP_FORM, form_of, is_stop
@@ -115,26 +114,12 @@ def batch_of(found: Sequence[Example], forms: Sequence[str]) -> Batch:
     numbers = {form: k for k, form in enumerate(forms)}
     remarks = [[UNKNOWN if form is None else numbers.get(form, UNKNOWN) for form in one.remarks] for one in found]
     return Batch(
-        choosing=_reals([one.choosing.state for one in found]),
+        choosing=reals([one.choosing.state for one in found]),
         words=torch.from_numpy(np.stack([one.choosing.words for one in found]).astype(np.int16)),
-        errands=_reals([one.choosing.errands for one in found]),
-        errand_count=_whole([len(one.choosing.numbers) for one in found]),
-        guides=_whole([int(one.guides) for one in found]), target=_whole([one.target for one in found]),
-        guiding=_whole([int(one.guiding) for one in found]),
-        speaking=_reals([one.speaking.state for one in found]), remarks=_whole(remarks),
+        errands=reals([one.choosing.errands for one in found]),
+        errand_count=whole([len(one.choosing.numbers) for one in found]),
+        guides=whole([int(one.guides) for one in found]), target=whole([one.target for one in found]),
+        guiding=whole([int(one.guiding) for one in found]),
+        speaking=reals([one.speaking.state for one in found]), remarks=whole(remarks),
         weight=torch.tensor([one.weight for one in found], dtype=torch.float32),
     )  # fmt: skip
-
-
-def forms_in(found: Sequence[Example]) -> tuple[str, ...]:
-    """Returns the forms of the remarks of some examples, sorted, behind silence."""
-    return ("", *sorted({form for one in found for form in one.remarks if form}))
-
-
-def _reals(vectors: Sequence[NDArray[np.float32]]) -> torch.Tensor:
-    """Returns vectors as half-precision numbers: inputs are coarse, and there are many."""
-    return torch.from_numpy(np.stack(vectors).astype(np.float16))
-
-
-def _whole(numbers: Sequence[object]) -> torch.Tensor:
-    return torch.tensor(numbers, dtype=torch.int16)

@@ -12,6 +12,7 @@ from typing import Final
 import torch
 
 from dorothie_gym.baselines.co_wizard.demonstrations import is_held_out
+from dorothie_gym.baselines.imitation.batches import forms_in
 from dorothie_gym.baselines.imitation.rounds import (
     CorpusPlan,
     FitPlan,
@@ -23,7 +24,7 @@ from dorothie_gym.baselines.imitation.rounds import (
 )
 from dorothie_gym.baselines.imitation.supervised import fit
 from dorothie_gym.baselines.participant.demonstrations import follow, practise
-from dorothie_gym.baselines.participant.examples import Batch, Example, batch_of, forms_in
+from dorothie_gym.baselines.participant.examples import Batch, Example, batch_of
 from dorothie_gym.baselines.participant.files import KIND, MODEL_FORMAT, ModelPage, load_network, save_network
 from dorothie_gym.baselines.participant.fitting import loss_of
 from dorothie_gym.baselines.participant.network import Layout, ParticipantNetwork
@@ -126,5 +127,5 @@ class _Practice:
 
 
 def _write(found: list[Example], file: Path) -> None:
-    forms = forms_in(found)
+    forms = forms_in(form for one in found for form in one.remarks)
     batch_of(found, forms).write(file, forms)

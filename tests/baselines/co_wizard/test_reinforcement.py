@@ -8,7 +8,6 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from dorothie_gym.baselines.co_wizard.examples import UNKNOWN
 from dorothie_gym.baselines.co_wizard.experience import Experience
 from dorothie_gym.baselines.co_wizard.files import load_network
 from dorothie_gym.baselines.co_wizard.network import CoWizardNetwork, Layout
@@ -22,6 +21,7 @@ from dorothie_gym.baselines.co_wizard.policy_gradient import (
     log_chance,
 )
 from dorothie_gym.baselines.co_wizard.reinforcement import ReinforcementSettings, reinforce_co_wizard
+from dorothie_gym.baselines.imitation.batches import UNKNOWN
 from dorothie_gym.errors import ModelFileError, PolicyLoadError, SessionError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import find_player
