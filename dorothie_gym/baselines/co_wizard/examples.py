@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -13,11 +13,8 @@ from dorothie_gym.baselines.co_wizard.decision import Inputs, Scene
 from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory
 from dorothie_gym.baselines.co_wizard.remarks import Sources, form_of
 from dorothie_gym.baselines.co_wizard.teacher import Lesson
-from dorothie_gym.baselines.imitation.batches import UNKNOWN, TensorBatch, reals, whole
+from dorothie_gym.baselines.imitation.batches import IDLE_SHARE, UNKNOWN, TensorBatch, reals, whole
 from dorothie_gym.spaces import Physical
-
-IDLE_SHARE: Final = 0.25
-"""Share of the decisions at which nothing happens that is kept; each then counts as often as it stands for."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, cross_entropy
 
 from dorothie_gym.baselines.co_wizard.examples import Batch
 from dorothie_gym.baselines.co_wizard.network import CoWizardNetwork
-from dorothie_gym.baselines.imitation.supervised import entropy, weighted_mean
-
-CHANGED_WEIGHT: Final = 3.0
-"""Weight of a memory variable in the decisions in which it changes, relative to the others."""
+from dorothie_gym.baselines.imitation.supervised import changed_weights, entropy, weighted_mean
 
 
 def loss_of(network: CoWizardNetwork, batch: Batch) -> Tensor:
@@ -26,7 +21,7 @@ def loss_of(network: CoWizardNetwork, batch: Batch) -> Tensor:
         weighted_mean(entropy(heard.status, batch.status), weight),
     ]
     for k, logits in enumerate(heard.values):
-        changed = 1.0 + (CHANGED_WEIGHT - 1.0) * (before[:, k] != values[:, k])
+        changed = changed_weights(before[:, k], values[:, k])
         losses.append(weighted_mean(cross_entropy(logits, values[:, k], reduction="none"), weight * changed))
     fresh = binary_cross_entropy_with_logits(heard.fresh, batch.fresh.float(), reduction="none")
     losses.append(weighted_mean(fresh.sum(dim=1), weight))

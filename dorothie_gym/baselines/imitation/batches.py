@@ -21,6 +21,9 @@ from dorothie_gym.files import replacing
 UNKNOWN: Final = -1
 """Target of what is not learnt from an example."""
 
+IDLE_SHARE: Final = 0.25
+"""Share of the decisions at which nothing happens that is kept; each then counts as often as it stands for."""
+
 _FORMS: Final = "forms"
 
 

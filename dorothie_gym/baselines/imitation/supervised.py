@@ -19,6 +19,10 @@ DECAY: Final = 1e-4
 """Weight decay."""
 
 
+CHANGED_WEIGHT: Final = 3.0
+"""Weight of a value in the decisions in which it changes, relative to the others."""
+
+
 class Rows(Protocol):
     """Examples of which some rows can be taken."""
 
@@ -75,6 +79,11 @@ def fit(
 def entropy(logits: Tensor, target: Tensor) -> Tensor:
     """Returns the cross-entropy of each example (b,); 0 where the target is unknown."""
     return cross_entropy(logits, target.long(), reduction="none", ignore_index=UNKNOWN)
+
+
+def changed_weights(before: Tensor, after: Tensor) -> Tensor:
+    """Returns the weights of the predictions of a value (b,): higher where it changes, which is seldom."""
+    return 1.0 + (CHANGED_WEIGHT - 1.0) * (before != after)
 
 
 def weighted_mean(losses: Tensor, weight: Tensor) -> Tensor:

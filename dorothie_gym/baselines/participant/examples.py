@@ -9,14 +9,11 @@ from typing import ClassVar, Final
 import numpy as np
 import torch
 
-from dorothie_gym.baselines.imitation.batches import UNKNOWN, TensorBatch, reals, whole
+from dorothie_gym.baselines.imitation.batches import IDLE_SHARE, UNKNOWN, TensorBatch, reals, whole
 from dorothie_gym.baselines.participant.decision import Inputs, Scene
 from dorothie_gym.baselines.participant.memory import KEEP_TARGET, Choice, Memory
 from dorothie_gym.baselines.participant.remarks import STOP_FORM, form_of, is_stop
 from dorothie_gym.policies.speech import Remark
-
-IDLE_SHARE: Final = 0.25
-"""Share of the decisions at which nothing happens that is kept; each then counts as often as it stands for."""
 
 MOST_REMARKS: Final = 4
 """Largest number of remarks of one decision."""

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from dorothie_gym.baselines.imitation.supervised import entropy, weighted_mean
+from dorothie_gym.baselines.imitation.supervised import changed_weights, entropy, weighted_mean
 from dorothie_gym.baselines.participant.examples import Batch
 from dorothie_gym.baselines.participant.network import ParticipantNetwork
-
-CHANGED_WEIGHT: Final = 3.0
-"""Weight of the guidance in the decisions in which it begins or ends, relative to the others."""
 
 
 def loss_of(network: ParticipantNetwork, batch: Batch) -> Tensor:
@@ -23,7 +18,7 @@ def loss_of(network: ParticipantNetwork, batch: Batch) -> Tensor:
         batch.choosing.float(), words, batch.errands.float(), batch.errand_count.long(), guides
     )
     losses = [weighted_mean(entropy(target, batch.target), weight)]
-    changed = 1.0 + (CHANGED_WEIGHT - 1.0) * (batch.guides != batch.guiding)
+    changed = changed_weights(batch.guides, batch.guiding)
     wanted = binary_cross_entropy_with_logits(guiding, batch.guiding.float(), reduction="none")
     losses.append(weighted_mean(wanted, weight * changed))
     first, hidden = network.speak(batch.speaking.float(), words)
