@@ -8,11 +8,12 @@ from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import ParsedText, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies import contents
-from dorothie_gym.policies.co_wizard.judgement import believes, seconds_to_goal
+from dorothie_gym.policies.co_wizard.judgement import DETOUR_TIME, believes, seconds_to_goal
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.spaces import Motion
 
 _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START})
 """Actions that are carried out at once and therefore never checked."""
@@ -88,7 +89,8 @@ def plan_remark(
     """
     if rng.random() > state.style.rambles:
         return ()
-    goal, seconds = state.beliefs.goal, seconds_to_goal(state, view)
+    goal = state.beliefs.goal
+    seconds = seconds_to_goal(state, view) if _drives_as_planned(state, view) else None
     elided: tuple[str, ...] = ("place",)
     if seconds is not None and rng.random() < 0.6:
         content = Proposition.of(Predicate.ARRIVES_IN, place=goal, seconds=seconds)
@@ -102,3 +104,11 @@ def plan_remark(
         content, elided = Proposition.of(Predicate.GOAL, negated=True), ()
     repeated = any(content.predicate is known.predicate for item in state.speech.said for known in item.meaning)
     return () if repeated else (intend(Function.INFORM, content, elided=elided, joined=joined),)
+
+
+def _drives_as_planned(state: CoWizardState, view: CoWizardView) -> bool:
+    """Returns whether the car follows its route: nothing is in its way, and no instruction leads elsewhere."""
+    intentions = state.intentions
+    told = intentions.directive is not None or intentions.wish is not None
+    blocked = view.time - state.dialogue.blocked_at < DETOUR_TIME
+    return not (told or blocked or view.motion is Motion.HAZARD)

@@ -26,7 +26,8 @@ NAMED_ACTIONS: Final = {
 """Manoeuvres that the Co-Wizard names, and the slot value of each."""
 
 _OBEYED_WITHIN: Final = 15.0  # time from an instruction to what it causes [s]
-_DETOUR_TIME: Final = 30.0  # time for which an obstacle explains a U-turn [s]
+DETOUR_TIME: Final = 30.0
+"""Time for which an obstacle explains a U-turn [s]."""
 
 Belief = Callable[[CoWizardState, CoWizardView, Proposition], bool | None]
 """Returns whether a proposition without negation is true; None if the Co-Wizard does not know."""
@@ -206,7 +207,7 @@ def reason_to_turn_round(state: CoWizardState, view: CoWizardView) -> Propositio
     told = view.time - state.dialogue.u_turn_instructed_at < state.config.wish_time + _OBEYED_WITHIN
     if state.intentions.wish is Wish.U_TURN or told:
         return Proposition.of(Predicate.TOLD, action=ActionValue.U_TURN)
-    if view.time - state.dialogue.blocked_at < _DETOUR_TIME:
+    if view.time - state.dialogue.blocked_at < DETOUR_TIME:
         return Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
     if goal is not None and state.beliefs.exact:
         return Proposition.of(Predicate.BEHIND, place=goal)
