@@ -112,7 +112,7 @@ class CoWizardConfig:
     next_delay: float = 4.0
     start_delay: float = 7.0
     lost_variance: float = 36.0
-    gps_variance: float = 0.25
+    gps_variance: float = 0.18
     found_variance: float = 0.08
     contradictions: int = 2
     looks_every: int = 8
