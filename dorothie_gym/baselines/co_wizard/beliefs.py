@@ -21,7 +21,7 @@ from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.sight import camera_fault
 from dorothie_gym.spaces import Motion
 
-LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.25
+LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.18
 """Variances of the position: the car does not know where it is; the position is not measured [m^2]."""
 
 CLOSE_DISTANCE: Final = 120.0
