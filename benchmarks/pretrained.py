@@ -23,6 +23,7 @@ from dorothie_gym import __version__
 from dorothie_gym.baselines.checkpoints import KIND, ModelCard
 from dorothie_gym.baselines.co_wizard import files as co_wizard
 from dorothie_gym.baselines.experiment import RESULT_FILE
+from dorothie_gym.baselines.participant import files as participant
 from dorothie_gym.baselines.rl.checkpoint import TENSORS, load_model, save_model
 from dorothie_gym.baselines.rl.run import BEST, PROGRESS
 from dorothie_gym.engine.config import EnvConfig
@@ -62,12 +63,13 @@ CHECKED: Final = EnvConfig(max_seconds=60.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """Training of a shipped model: the commands, and the folders of the results within the work folder."""
+    """Training of a shipped model: the commands, the folders of the results within the work folder, and the role."""
 
     description: str
     command: str
     folders: tuple[str, ...]
     generate: str = GENERATE
+    role: Role = Role.CO_WIZARD
 
 
 RECIPES: Final[Mapping[str, Recipe]] = {
@@ -76,6 +78,13 @@ RECIPES: Final[Mapping[str, Recipe]] = {
         command="train co-wizard --corpus talks --workers 1 --out models",
         folders=(f"models/co-wizard/seed-{SEED}",),
         generate=GENERATE_TALKS,
+    ),
+    "participant": Recipe(
+        description="The learned participant chooses the next errand, guides and talks",
+        command="train participant --corpus talks --workers 1 --out models",
+        folders=(f"models/participant/seed-{SEED}",),
+        generate=GENERATE_TALKS,
+        role=Role.PARTICIPANT,
     ),
     "maskable-ppo": Recipe(
         description="MaskablePPO drives; understanding and speech are scripted",
@@ -130,9 +139,9 @@ def _call(command: str, work: Path) -> None:
 
 def _choose(recipe: Recipe, work: Path) -> tuple[Path, RolloutResult]:
     """Plays the validation sessions with each result of a training; returns the best one, and its sessions."""
-    players = [find_player(str(work / folder), Role.CO_WIZARD) for folder in recipe.folders]
+    players = [find_player(str(work / folder), recipe.role) for folder in recipe.folders]
     different = {player.sha256: player for player in reversed(players)}  # the best evaluation can be the last step
-    found = [(Path(player.name), _validate(player, work / "validation")) for player in different.values()]
+    found = [(Path(player.name), _validate(player, recipe.role, work / "validation")) for player in different.values()]
     for folder, result in found:
         print(
             f"{folder}: {', '.join(f'{key} {figure.mean:.3f}' for key, figure in _figures(result).items())}", flush=True
@@ -148,7 +157,7 @@ def _export(name: str, recipe: Recipe, work: Path, trained: Path, result: Rollou
     page = json.loads((trained / DESCRIPTION).read_text(encoding="utf-8"))
     export = _EXPORTS.get(page["kind"], _export_driver)
     scores = export(trained, shipped)
-    _check_same_actions(trained, shipped, work / "checks" / name)
+    _check_same_actions(trained, shipped, recipe.role, work / "checks" / name)
     card = PretrainedCard(
         description=recipe.description,
         commands=tuple(f"dorothie-gym {command}" for command in (recipe.generate, recipe.command)),
@@ -159,10 +168,11 @@ def _export(name: str, recipe: Recipe, work: Path, trained: Path, result: Rollou
         seconds=page["seconds"],
         weights=_count_weights(shipped),
         observation=dict(FIELDS) if export is _export_driver else None,
-        rollout=command_of({**result.settings, str(Role.CO_WIZARD): f"{PREFIX}{name}"}),
+        rollout=command_of({**result.settings, str(recipe.role): f"{PREFIX}{name}"}),
         sessions=VALIDATION_SESSIONS,
         figures=_figures(result),
         scores=scores,
+        role=recipe.role.value,
     )
     (shipped / CARD_FILE).write_text(json.dumps(asdict(card), indent=1) + "\n", encoding="utf-8")
     return card
@@ -199,8 +209,8 @@ def _export_benchmark_model(trained: Path, shipped: Path) -> dict[str, float | N
     return scores
 
 
-def _export_co_wizard(trained: Path, shipped: Path) -> dict[str, float | None]:
-    """Writes a learned Co-Wizard; its training has no validation."""
+def _export_role(trained: Path, shipped: Path) -> dict[str, float | None]:
+    """Writes a learned Co-Wizard or participant; its training has no validation."""
     for name in (DESCRIPTION, TENSORS):
         shutil.copyfile(trained / name, shipped / name)
     return {}
@@ -208,32 +218,35 @@ def _export_co_wizard(trained: Path, shipped: Path) -> dict[str, float | None]:
 
 _EXPORTS: Final[Mapping[str, Callable[[Path, Path], dict[str, float | None]]]] = {
     KIND: _export_benchmark_model,
-    co_wizard.KIND: _export_co_wizard,
+    co_wizard.KIND: _export_role,
+    participant.KIND: _export_role,
 }
 """Functions that write models into the package, by kind; all others are drivers."""
 
 
-def _check_same_actions(trained: Path, shipped: Path, folder: Path) -> None:
+def _check_same_actions(trained: Path, shipped: Path, role: Role, folder: Path) -> None:
     """Plays two sessions with the trained model and with the exported one, whose actions must be equal."""
     found = []
     for model in (trained, shipped):
         shutil.rmtree(folder, ignore_errors=True)
-        settings = _rollout_settings(find_player(str(model), Role.CO_WIZARD), 2, CHECKED)
+        settings = _rollout_settings(find_player(str(model), role), role, 2, CHECKED)
         roll_out(settings, folder)
         found.append([(folder / plan.path / "actions.jsonl").read_bytes() for plan in settings.plans()])
     if found[0] != found[1]:
         raise SystemExit(f"{shipped} acts otherwise than {trained}")
 
 
-def _validate(player: Player, folder: Path) -> RolloutResult:
+def _validate(player: Player, role: Role, folder: Path) -> RolloutResult:
     """Plays the validation sessions, or reads those that the same weights have played."""
     assert player.sha256 is not None
-    return roll_out(_rollout_settings(player, VALIDATION_SESSIONS), folder / player.sha256[:12])
+    return roll_out(_rollout_settings(player, role, VALIDATION_SESSIONS), folder / player.sha256[:12])
 
 
-def _rollout_settings(co_wizard: Player, sessions: int, config: EnvConfig | None = None) -> RolloutSettings:
+def _rollout_settings(
+    player: Player, role: Role, sessions: int, config: EnvConfig | None = None
+) -> RolloutSettings:  # fmt: skip
     return RolloutSettings(
-        cast={**ALL_SCRIPTED, Role.CO_WIZARD: co_wizard},
+        cast={**ALL_SCRIPTED, role: player},
         towns=parse_towns("seen"),
         sessions=sessions,
         seed=VALIDATION_SEED,

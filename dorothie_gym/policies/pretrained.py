@@ -54,6 +54,7 @@ class PretrainedCard:
         sessions: their number.
         figures: closed-loop metrics over them by key; the interval of `success` is Wilson's.
         scores: metrics of the training on its validation episodes or points by key; None where a metric is undefined.
+        role: role that the model plays.
     """
 
     description: str
@@ -69,6 +70,7 @@ class PretrainedCard:
     sessions: int
     figures: Mapping[str, CardFigure]
     scores: Mapping[str, float | None]
+    role: str = Role.CO_WIZARD.value
 
 
 def pretrained_names() -> tuple[str, ...]:
@@ -79,8 +81,8 @@ def pretrained_names() -> tuple[str, ...]:
 
 
 def names_for(role: Role) -> tuple[str, ...]:
-    """Returns the names of the shipped models that play a role."""
-    return pretrained_names() if role is Role.CO_WIZARD else ()
+    """Returns the names of the shipped models that play a role; raises `PolicyLoadError` if a card is damaged."""
+    return tuple(name for name in pretrained_names() if pretrained_card(name).role == role)
 
 
 def is_pretrained(name: str) -> bool:
