@@ -27,13 +27,17 @@ from dorothie_gym.policies import (
     pretrained_folder,
     pretrained_names,
 )
+from dorothie_gym.policies.pretrained import names_for
 from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings, roll_out
 from dorothie_gym.spaces import SpaceLimits
 
-LIMIT = 7_000_000
+LIMIT = 8_000_000
 """Largest size of all shipped models [bytes]."""
 
-NAMES = ("pretrained:co-wizard", "pretrained:maskable-ppo", "pretrained:ppo", "pretrained:reader", "pretrained:toto")
+CO_WIZARDS = (
+    "pretrained:co-wizard", "pretrained:maskable-ppo", "pretrained:ppo", "pretrained:reader", "pretrained:toto",
+)  # fmt: skip
+NAMES = tuple(sorted((*CO_WIZARDS, "pretrained:participant")))
 
 
 def call(*arguments: str) -> Result:
@@ -41,14 +45,15 @@ def call(*arguments: str) -> Result:
 
 
 def play(name: str, folder: Path, sessions: int, seconds: float) -> RolloutResult:
+    role = Role.PARTICIPANT if "participant" in name else Role.CO_WIZARD
     settings = RolloutSettings(
-        cast={**ALL_SCRIPTED, Role.CO_WIZARD: find_player(name, Role.CO_WIZARD)}, towns=("brookside",),
+        cast={**ALL_SCRIPTED, role: find_player(name, role)}, towns=("brookside",),
         sessions=sessions, seed=7, config=EnvConfig(max_seconds=seconds),
     )  # fmt: skip
     return roll_out(settings, folder)
 
 
-def test_five_models_are_shipped_in_less_than_seven_megabytes() -> None:
+def test_six_models_are_shipped_in_less_than_eight_megabytes() -> None:
     assert pretrained_names() == NAMES
     files = [path for path in pretrained.SHIPPED.rglob("*") if path.is_file()]
     assert sum(path.stat().st_size for path in files) < LIMIT
@@ -60,7 +65,8 @@ def test_card_tells_how_the_model_was_made_and_how_well_it_does_in_validation(na
     card = pretrained_card(name)
     assert all(command.startswith("dorothie-gym ") for command in card.commands)
     assert card.licence == "MIT" and card.steps > 0 and card.seconds > 0.0
-    assert f"--co-wizard {name} " in card.rollout and f"--towns {','.join(SEEN_TOWNS)} " in card.rollout
+    assert f"--{card.role.replace('_', '-')} {name} " in card.rollout
+    assert f"--towns {','.join(SEEN_TOWNS)} " in card.rollout
     assert "--seed 1" in card.rollout, "the seed of the tests is 0"
     success = card.figures["success"]
     wilson = wilson_interval(round(success.mean * card.sessions), card.sessions)
@@ -68,11 +74,11 @@ def test_card_tells_how_the_model_was_made_and_how_well_it_does_in_validation(na
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_model_plays_the_co_wizard_by_name(name: str, tmp_path: Path) -> None:
+def test_model_plays_its_role_by_name(name: str, tmp_path: Path) -> None:
     pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
     result = play(name, tmp_path / "named", 2, 20.0)
     assert [row.error for row in result.rows] == [None, None]
-    player = find_player(name, Role.CO_WIZARD)
+    player = find_player(name, Role(pretrained_card(name).role))
     assert player.training == {"steps": pretrained_card(name).steps, "seconds": pretrained_card(name).seconds}
     by_path = play(str(pretrained_folder(name)), tmp_path / "path", 2, 20.0)
     assert [row.record for row in by_path.rows] == [row.record for row in result.rows]
@@ -88,7 +94,9 @@ def test_masked_driver_completes_errands_that_driving_on_does_not(tmp_path: Path
     assert idle.figures()["success"].mean == 0.0
 
 
-def test_only_the_co_wizard_has_shipped_models() -> None:
+def test_shipped_models_are_named_for_their_own_role() -> None:
+    assert names_for(Role.CO_WIZARD) == CO_WIZARDS
+    assert names_for(Role.PARTICIPANT) == ("pretrained:participant",)
     with pytest.raises(PolicyLoadError, match=r"participant: there is no policy 'pretrained:maskable-ppo'"):
         find_player("pretrained:maskable-ppo", Role.PARTICIPANT)
 
@@ -96,7 +104,7 @@ def test_only_the_co_wizard_has_shipped_models() -> None:
 def test_unknown_name_is_one_line_with_the_list() -> None:
     done = call("rollout", "--co-wizard", "pretrained:maskable_ppo", "--sessions", "1")
     assert done.exit_code == 2 and done.stderr.count("\n") == 1
-    assert "did you mean 'pretrained:maskable-ppo'?" in done.stderr and ", ".join(NAMES) in done.stderr
+    assert "did you mean 'pretrained:maskable-ppo'?" in done.stderr and ", ".join(CO_WIZARDS) in done.stderr
     with pytest.raises(PolicyLoadError, match="shipped models are pretrained:co-wizard"):
         pretrained_folder("dqn")
 
@@ -175,7 +183,7 @@ def test_policies_are_listed_with_size_training_and_validation() -> None:
     shown = call("policies").stdout
     for name in NAMES:
         card, row = pretrained_card(name), rows[name]
-        assert row["roles"] == ["co_wizard"] and row["bytes"] > 10_000
+        assert row["roles"] == [card.role] and row["bytes"] > 10_000
         assert row["validation"]["success"] == dataclasses.asdict(card.figures["success"])
         assert name in shown and f"{100 * card.figures['success'].mean:.0f} %" in shown
         assert all(command in shown for command in card.commands)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import torch
+
 from dorothie_gym.baselines.imitation.model_files import RoleModelPage, load_model, save_model
 from dorothie_gym.baselines.participant.network import Layout, ParticipantNetwork
 from dorothie_gym.baselines.participant.remarks import check_form
@@ -28,8 +30,8 @@ class ModelPage(RoleModelPage):
 
 
 def save_network(network: ParticipantNetwork, page: ModelPage, folder: Path) -> None:
-    """Writes a model into a folder; an older one stays whole until it is replaced."""
-    save_model(network, page, folder)
+    """Writes a model into a folder, with weights in half precision; an older one stays whole until it is replaced."""
+    save_model(network, page, folder, torch.float16)
 
 
 def load_network(folder: Path) -> tuple[ParticipantNetwork, ModelPage]:

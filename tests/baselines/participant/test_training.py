@@ -1,6 +1,7 @@
 import json
 
 import pytest
+import torch
 from safetensors.torch import load_file
 
 from dorothie_gym.baselines.imitation.rounds import LESSONS, RoundSettings
@@ -57,6 +58,13 @@ def test_interrupted_training_ends_with_the_same_weights(corpus, trained, tmp_pa
     stages = train_participant(settings(corpus), tmp_path / "two", workers=1, on_stage=lambda *_: None)
     assert [stage.name for stage in stages] == ["two"]  # the first fit is not done again
     assert weights(tmp_path / "two") == weights(trained)
+
+
+def test_weights_are_stored_in_half_precision(trained):
+    stored = load_file(trained / "model.safetensors")
+    assert {value.dtype for value in stored.values()} == {torch.float16}
+    network, _ = load_network(trained)
+    assert {name: value.half().numpy().tobytes() for name, value in network.state_dict().items()} == weights(trained)
 
 
 def test_folder_of_other_settings_is_refused(corpus, trained):
