@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from dorothie_gym.baselines.participant.examples import MOST_REMARKS
 from dorothie_gym.baselines.participant.features import answer_to
 from dorothie_gym.baselines.participant.memory import KEEP_TARGET, Choice, Memory
 from dorothie_gym.baselines.participant.network import ParticipantNetwork
+from dorothie_gym.baselines.participant.observed_truth import is_denied
 from dorothie_gym.baselines.participant.remarks import (
     STOP_FORM,
     filled,
@@ -51,8 +52,8 @@ class LearnedState:
 class LearnedParticipant(Policy[LearnedState]):
     """Participant whose network chooses the next errand, and what to say to the car and when.
 
-    Target and guidance are the likeliest ones; remarks are drawn, yes only where it is true, and no where it is not.
-    Names, numbers and words of a remark are filled in (see `remarks`).
+    Target and guidance are the likeliest ones. Remarks are drawn: yes only where it is true, no only where it is not,
+    and no crowd or weather that is not there. Names, numbers and words of a remark are filled in (see `remarks`).
     """
 
     def __init__(
@@ -110,17 +111,27 @@ class LearnedParticipant(Policy[LearnedState]):
                 allowed &= ~(self._no if true else self._yes)
             allowed[0] = False
             remarks: list[Remark] = []
-            chosen = _drawn(shares * allowed, scene.rng)
-            allowed[0] = True
-            while chosen and len(remarks) < MOST_REMARKS:
-                form = self._vocabulary[chosen]
-                said = stop_remark(memory) if form == STOP_FORM else filled(form, available, joined=bool(remarks))
+            while len(remarks) < MOST_REMARKS:
+                chosen, said = self._draw(shares * allowed, scene, memory, available, joined=bool(remarks))
                 if said is None:
                     break
                 remarks.append(said)
-                allowed[chosen] = False
-                chosen = _drawn(_shares(self._network.then(hidden, torch.tensor([chosen]))) * allowed, scene.rng)
+                allowed[[0, chosen]] = True, False
+                shares = _shares(self._network.then(hidden, torch.tensor([chosen])))
         return tuple(remarks)
+
+    def _draw(
+        self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Mapping[str, object], *,
+        joined: bool,
+    ) -> tuple[int, Remark | None]:  # fmt: skip
+        """Returns the number of a form and its remark, drawn among those that are not denied; None for silence."""
+        while chosen := _drawn(shares, scene.rng):
+            form = self._vocabulary[chosen]
+            said = stop_remark(memory) if form == STOP_FORM else filled(form, available, joined=joined)
+            if said is None or not is_denied(said, scene.view):
+                return chosen, said
+            shares[chosen] = 0.0
+        return 0, None
 
 
 def finished(scene: Scene, memory: Memory, remarks: Sequence[Remark]) -> tuple[Speech | None, Attention]:
