@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
+from dorothie_gym.policies import pretrained_folder
 
 runner = CliRunner()
 
@@ -34,6 +35,10 @@ runner = CliRunner()
         (["train", "participant", "--strict"], "--config and --encoder are not for participant"),
         (["train", "co-wizard", "--ad-wizard", "silent"], "--ad-wizard is for co-wizard-rl only"),
         (["train", "co-wizard-rl", "--ad-wizard", "scriptd"], "there is no policy 'scriptd'"),
+        (
+            ["train", "co-wizard-rl", "--ad-wizard", str(pretrained_folder("pretrained:co-wizard"))],
+            "plays the co_wizard, not the ad_wizard",
+        ),
         (["train", "segformer", "--strict"], "--hubert, --strict and --encoder are not for segformer"),
         (["train", "detr", "--encoder", "hashing"], "--hubert, --strict and --encoder are not for detr"),
         (["train", "detr"], "run first: dorothie-gym train segformer"),

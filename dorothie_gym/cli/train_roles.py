@@ -73,11 +73,13 @@ def _train_co_wizard(request: Request) -> RoleReport:
 
 
 def _reinforce_co_wizard(request: Request) -> RoleReport:
-    from dorothie_gym.baselines.co_wizard.reinforcement import ReinforcementSettings, reinforce_co_wizard
-    from dorothie_gym.ontology import Role
-    from dorothie_gym.policies import find_player
+    from dorothie_gym.baselines.co_wizard.reinforcement import (
+        ReinforcementSettings,
+        check_ad_wizard,
+        reinforce_co_wizard,
+    )
 
-    find_player(request.ad_wizard, Role.AD_WIZARD)  # reported before the imitation
+    check_ad_wizard(request.ad_wizard)  # before the imitation, which takes longer
     imitation = _train_co_wizard(request)
     settings = ReinforcementSettings(
         start=request.folder("co-wizard"), seed=request.seed, ad_wizard=request.ad_wizard

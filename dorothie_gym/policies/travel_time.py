@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import statistics
 from typing import Final
@@ -47,8 +46,7 @@ def travel_time(town: Town, progress: RouteProgress, station: float, now: float,
 def _arrival(town: Town, progress: RouteProgress, station: float, begun: float, delay: float) -> float:
     """Returns the time at which a car that sets off at a time stops at the goal, with a factor on driving."""
     time, start = begun, station
-    for leg, following in itertools.pairwise((*progress.legs, None)):
-        assert leg is not None
+    for leg, following in zip(progress.legs, (*progress.legs[1:], None), strict=True):
         time += delay * _seconds_on(town, leg, start)
         start = -math.inf
         if following is not None:

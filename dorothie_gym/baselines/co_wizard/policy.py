@@ -25,6 +25,7 @@ from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory, Update
 from dorothie_gym.baselines.co_wizard.network import SIZES, CoWizardNetwork
 from dorothie_gym.baselines.co_wizard.remarks import Sources, filled, sources, sources_of, topic_of
 from dorothie_gym.baselines.imitation.batches import UNKNOWN
+from dorothie_gym.baselines.imitation.drawing import drawn
 from dorothie_gym.dialogue import WordingContext, draw_style
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import LandmarkName, Role, StreetName
@@ -226,7 +227,7 @@ class LearnedCoWizard(Policy[LearnedState]):
         """Returns the index of the likeliest command, or of one that is drawn."""
         if not self._command_temperature:
             return int(scores.argmax())
-        return _drawn(torch.softmax(scores.double() / self._command_temperature, dim=0).numpy(), rng)
+        return drawn(torch.softmax(scores.double() / self._command_temperature, dim=0).numpy(), rng)
 
     def _draw(
         self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,
@@ -235,7 +236,7 @@ class LearnedCoWizard(Policy[LearnedState]):
         """Returns the number of a form and its remark, drawn among those that are sayable; None for silence."""
         latest = scene.utterances[0] if scene.utterances else None
         for _ in range(MAX_DRAWS):
-            chosen = _drawn(shares, rng)
+            chosen = drawn(shares, rng)
             remark = filled(self._vocabulary[chosen], available, joined=joined) if chosen else None
             if remark is None or is_sayable(remark, topic_of(remark), memory, scene.view, latest):
                 return chosen, remark
@@ -250,14 +251,6 @@ def _tensors(inputs: Inputs) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, 
         torch.from_numpy(state)[None], torch.from_numpy(inputs.words)[None], torch.from_numpy(options)[None],
         torch.tensor([len(inputs.rows)]),
     )  # fmt: skip
-
-
-def _drawn(shares: NDArray[np.float64], rng: np.random.Generator) -> int:
-    """Returns a number drawn in proportion to shares; 0 if all are 0."""
-    total = float(shares.sum())
-    if total <= 0.0:
-        return 0
-    return min(int(np.searchsorted(np.cumsum(shares), rng.random() * total)), len(shares) - 1)
 
 
 def _scene(view: CoWizardView, memory: Memory) -> WordingContext:

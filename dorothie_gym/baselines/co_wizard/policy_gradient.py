@@ -155,7 +155,7 @@ def advantages_of(found: Experience, values: Tensor, settings: Optimisation) -> 
 
 def log_chance(network: CoWizardNetwork, part: Experience, settings: Optimisation) -> Tensor:
     """Returns the logarithm of the probability of the choices (b,), at the temperatures of the player."""
-    commands, first, _ = _acted(network, part)
+    commands, first = _acted(network, part)
     chosen = log_softmax(commands / settings.command_temperature, dim=1).gather(1, part.command.long()[:, None])[:, 0]
     first = first / TEMPERATURE
     number = part.first.long()
@@ -171,9 +171,9 @@ def log_chance(network: CoWizardNetwork, part: Experience, settings: Optimisatio
 
 def divergence(network: CoWizardNetwork, other: CoWizardNetwork, part: Experience, settings: Optimisation) -> Tensor:
     """Returns the divergence of the choices of a network from those of another one (b,) [nats]."""
-    commands, first, _ = _acted(network, part)
+    commands, first = _acted(network, part)
     with torch.no_grad():
-        other_commands, other_first, _ = _acted(other, part)
+        other_commands, other_first = _acted(other, part)
     return _divergence(commands, other_commands, settings.command_temperature) + _divergence(
         first, other_first, TEMPERATURE
     )
@@ -184,8 +184,11 @@ def _divergence(scores: Tensor, others: Tensor, temperature: float) -> Tensor:
     return (own.exp() * (own - other)).sum(dim=1)
 
 
-def _acted(network: CoWizardNetwork, part: Experience) -> tuple[Tensor, Tensor, Tensor]:
-    return network.act(part.state.float(), part.words.long(), part.commands.float(), part.command_count.long())
+def _acted(network: CoWizardNetwork, part: Experience) -> tuple[Tensor, Tensor]:
+    """Returns the logits of the commands (b, k) and of the first remark (b, r)."""
+    inputs = part.state.float(), part.words.long(), part.commands.float(), part.command_count.long()
+    commands, first, _ = network.act(*inputs)
+    return commands, first
 
 
 def _in_parts(found: Experience, compute: Callable[[Experience], Tensor]) -> Tensor:

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import json
 import shutil
-import time
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Final
 
-import numpy as np
 import torch
 from safetensors.torch import load_file
 
@@ -23,17 +21,24 @@ from dorothie_gym.baselines.co_wizard.experience import Experience, play
 from dorothie_gym.baselines.co_wizard.files import ModelPage, load_network, save_network
 from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
 from dorothie_gym.baselines.co_wizard.policy_gradient import Optimisation, Progress, ValueNetwork, improve
-from dorothie_gym.baselines.imitation.rounds import OnStage
+from dorothie_gym.baselines.imitation.rounds import (
+    OnStage,
+    PracticePlan,
+    gather,
+    practice_plans,
+    processor_seconds,
+)
 from dorothie_gym.baselines.tensor_files import save_tensors
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.errors import CheckpointError
 from dorothie_gym.files import replacing, write_atomically
-from dorothie_gym.maps import SEEN_TOWNS
+from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import find_player
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 from dorothie_gym.rollout.folder import locked_folder
-from dorothie_gym.rollout.processes import run_tasks
+from dorothie_gym.spaces import SpaceLimits
 
 SETTINGS_FILE: Final = "reinforcement.json"
 PROGRESS_FILE: Final = "progress.json"
@@ -77,16 +82,6 @@ class ReinforcementSettings:
         return {**asdict(self), "start": str(self.start)}
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Session:
-    """Session to be played: number, town, seed, and file of the experience."""
-
-    number: int
-    town: str
-    seed: int
-    file: Path
-
-
 def reinforce_co_wizard(
     settings: ReinforcementSettings, out: Path, *, workers: int, on_stage: OnStage
 ) -> tuple[Progress, ...]:  # fmt: skip
@@ -103,12 +98,13 @@ def reinforce_co_wizard(
 
     Raises:
         ModelFileError: the model to begin with cannot be read.
-        PolicyLoadError: there is no such Ad-Wizard.
+        ValueError: there is no such Ad-Wizard, or the policy plays another role.
         SessionError: the folder holds something else.
+        CheckpointError: the figures of an iteration cannot be read.
         ProcessError: a session failed in another process.
     """
     torch.set_num_threads(1)  # small layers: more threads only wait for each other, and change the last bits
-    find_player(settings.ad_wizard, Role.AD_WIZARD)  # reported before the first session
+    check_ad_wizard(settings.ad_wizard)
     load_network(settings.start)
     found: list[Progress] = []
     with locked_folder(out, SETTINGS_FILE, settings.as_json()):
@@ -117,8 +113,7 @@ def reinforce_co_wizard(
             folder = out / f"iteration-{number + 1}"
             if not (folder / PROGRESS_FILE).is_file():
                 _iterate(settings, number, former, folder, workers, on_stage)
-            page = json.loads((folder / PROGRESS_FILE).read_text(encoding="utf-8"))
-            found.append(Progress(**page))
+            found.append(_read_progress(folder / PROGRESS_FILE))
             former = folder
         if not (out / DESCRIPTION).is_file():
             save_network(*load_network(former), out)
@@ -126,19 +121,26 @@ def reinforce_co_wizard(
     return tuple(found)
 
 
+def check_ad_wizard(name: str) -> None:
+    """Raises `ValueError` if a policy, by name or path, does not play the Ad-Wizard."""
+    find_player(name, Role.AD_WIZARD).make(Role.AD_WIZARD, SpaceLimits())
+
+
+def _read_progress(path: Path) -> Progress:
+    """Returns the figures of an iteration; raises `CheckpointError` if their file is damaged."""
+    with raising(lambda message: CheckpointError(f"{message}; delete it")):
+        return checked(read_json(path, MAX_SMALL_JSON), Progress, path)
+
+
 def _iterate(
     settings: ReinforcementSettings, number: int, former: Path, folder: Path, workers: int, on_stage: OnStage
 ) -> None:  # fmt: skip
     """Plays the sessions of an iteration and improves the network by them."""
-    begun = time.process_time()
+    begun = processor_seconds()
     place = folder / "experience"
-    plans = _plans(settings, number, place)
-    missing = [plan for plan in plans if not plan.file.is_file()]
+    plans = practice_plans([settings.seed, number], settings.sessions, _SESSIONS, place)
     title = f"Sessions, iteration {number + 1} of {settings.iterations}"
-    on_stage(title, len(plans) - len(missing), len(plans))
-    played = run_tasks(partial(_Playing, former, settings), missing, workers=workers)
-    for done, _ in enumerate(played, start=len(plans) - len(missing) + 1):
-        on_stage(title, done, len(plans))
+    gather(partial(_Playing, former, settings), plans, workers, partial(on_stage, title))
     network, page = load_network(former)
     before, _ = load_network(settings.start)
     torch.manual_seed(settings.seed)
@@ -148,7 +150,7 @@ def _iterate(
     experience = Experience.read([plan.file for plan in plans], page.vocabulary)
     seed = settings.seed * 1000 + number
     progress = improve(network, values, before, experience, settings.optimisation, seed)
-    seconds = page.seconds + time.process_time() - begun
+    seconds = page.seconds + processor_seconds() - begun
     about = ModelPage(
         format=page.format, kind=page.kind, layout=page.layout, vocabulary=page.vocabulary,
         steps=page.steps + progress.decisions, seconds=round(seconds, 1),
@@ -161,19 +163,6 @@ def _iterate(
     shutil.rmtree(place)
 
 
-def _plans(settings: ReinforcementSettings, number: int, folder: Path) -> list[_Session]:
-    """Returns the sessions of an iteration; the seen towns take turns."""
-    return [
-        _Session(
-            number=k,
-            town=SEEN_TOWNS[k % len(SEEN_TOWNS)],
-            seed=int(np.random.SeedSequence([settings.seed, number, k, _SESSIONS]).generate_state(1)[0] >> 1),
-            file=folder / f"{k:04d}.safetensors",
-        )
-        for k in range(settings.sessions)
-    ]
-
-
 class _Playing:
     """Plays sessions in a process."""
 
@@ -184,7 +173,7 @@ class _Playing:
         self._config = EnvConfig(max_seconds=settings.max_seconds)
         self._engines: dict[str, SessionEngine] = {}
 
-    def __call__(self, plan: _Session) -> None:
+    def __call__(self, plan: PracticePlan) -> None:
         engine = self._engines.setdefault(plan.town, SessionEngine(plan.town, config=self._config))
         temperature = self._settings.optimisation.command_temperature
         player = LearnedCoWizard(self._network, self._vocabulary, engine.limits, command_temperature=temperature)

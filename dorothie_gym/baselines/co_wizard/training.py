@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -31,6 +30,7 @@ from dorothie_gym.baselines.imitation.rounds import (
     PracticePlan,
     RoundSettings,
     Stage,
+    processor_seconds,
     train_in_rounds,
 )
 from dorothie_gym.baselines.imitation.supervised import fit
@@ -68,11 +68,6 @@ def train_co_wizard(
     return train_in_rounds(learner, settings, out, workers=workers, on_stage=on_stage, lessons=lessons)
 
 
-def _processor_seconds() -> float:
-    """Returns the processor time of this process and of those that have ended [s]."""
-    return sum(os.times()[:4])
-
-
 @dataclass(frozen=True, kw_only=True)
 class CoWizardLearner:
     """Functions of the training, see `rounds.Learner`.
@@ -83,7 +78,7 @@ class CoWizardLearner:
     """
 
     settings: CoWizardTraining
-    begun: float = field(default_factory=_processor_seconds)
+    begun: float = field(default_factory=processor_seconds)
 
     @property
     def branch(self) -> int:
@@ -114,7 +109,7 @@ class CoWizardLearner:
         )  # fmt: skip
         page = ModelPage(
             format=MODEL_FORMAT, kind=KIND, layout=network.layout, vocabulary=vocabulary,
-            steps=len(examples) * plan.epochs, seconds=round(_processor_seconds() - self.begun, 1),
+            steps=len(examples) * plan.epochs, seconds=round(processor_seconds() - self.begun, 1),
             settings={**settings.as_json(), "corpus": settings.corpus.name},
         )  # fmt: skip
         save_network(network, page, plan.folder)

@@ -7,6 +7,7 @@ of lessons, and each fit a model, so that an interrupted training goes on where 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -87,8 +88,9 @@ class CorpusPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class PracticePlan:
-    """Session of practice: town, seed, and the file of its lessons."""
+    """Session of practice: its number in the round, town, seed, and the file of what is learnt from."""
 
+    number: int
     town: str
     seed: int
     file: Path
@@ -168,7 +170,7 @@ def train_in_rounds(
         paths = [shared / f"{entry.path.name}.safetensors" for entry in entries]
         plans = [CorpusPlan(number=k, file=path) for k, path in enumerate(paths)]
         with locked_folder(shared, SETTINGS_FILE, {"corpus": str(settings.corpus)}):
-            _gather(learner.follower, plans, workers, partial(on_stage, "Sessions of the corpus"))
+            gather(learner.follower, plans, workers, partial(on_stage, "Sessions of the corpus"))
         corpus_files = [path for path in paths if path.is_file()]
         if not corpus_files:
             raise SessionError(f"{settings.corpus}: fold 'train' has no session to learn from")
@@ -176,9 +178,10 @@ def train_in_rounds(
         for number in range(settings.rounds + 1):
             folder = out if number == settings.rounds else out / f"round-{number}"
             if former is not None:
-                practice = _practice(settings, number, out, learner.branch)
+                place = out / LESSONS / f"practice-{number}"
+                practice = practice_plans([settings.seed, number], settings.sessions, learner.branch, place)
                 title = f"Practice, round {number} of {settings.rounds}"
-                _gather(partial(learner.player, former), practice, workers, partial(on_stage, title))
+                gather(partial(learner.player, former), practice, workers, partial(on_stage, title))
                 files += [plan.file for plan in practice]
             if not (folder / "model.json").is_file():
                 done.append(learner.fit(_fit_plan(settings, number, folder, files, corpus_files, former), on_stage))
@@ -198,26 +201,39 @@ def _fit_plan(
     )  # fmt: skip
 
 
-def _practice(settings: RoundSettings, number: int, out: Path, branch: int) -> list[PracticePlan]:
-    """Returns the sessions of a round; the seen towns take turns."""
+def practice_plans(seeds: Sequence[int], sessions: int, branch: int, folder: Path) -> list[PracticePlan]:
+    """Returns the sessions of a round; the seen towns take turns.
+
+    Args:
+        seeds: seed of the training, and number of the round.
+        sessions: number of sessions.
+        branch: branch of the seed, see `Learner.branch`.
+        folder: folder of the files.
+    """
     return [
         PracticePlan(
+            number=k,
             town=SEEN_TOWNS[k % len(SEEN_TOWNS)],
-            seed=int(np.random.SeedSequence([settings.seed, number, k, branch]).generate_state(1)[0] >> 1),
-            file=out / LESSONS / f"practice-{number}" / f"{k:04d}.safetensors",
+            seed=int(np.random.SeedSequence([*seeds, k, branch]).generate_state(1)[0] >> 1),
+            file=folder / f"{k:04d}.safetensors",
         )
-        for k in range(settings.sessions)
+        for k in range(sessions)
     ]
+
+
+def processor_seconds() -> float:
+    """Returns the processor time of this process and of those that have ended [s]."""
+    return sum(os.times()[:4])
 
 
 Plan = TypeVar("Plan", CorpusPlan, PracticePlan)
 
 
-def _gather(
+def gather(
     prepare: Callable[[], Callable[[Plan], None]], plans: Sequence[Plan], workers: int,
     report: Callable[[int, int], None],
 ) -> None:  # fmt: skip
-    """Makes the missing files of lessons."""
+    """Makes the missing files of sessions."""
     missing = [plan for plan in plans if not plan.file.is_file()]
     report(len(plans) - len(missing), len(plans))
     for number, _ in enumerate(run_tasks(prepare, missing, workers=workers), start=len(plans) - len(missing) + 1):

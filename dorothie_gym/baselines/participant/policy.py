@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from dorothie_gym.baselines.imitation.drawing import drawn
 from dorothie_gym.baselines.participant.decision import (
     Attention,
     Inputs,
@@ -116,7 +117,7 @@ class LearnedParticipant(Policy[LearnedState]):
                 if said is None:
                     break
                 remarks.append(said)
-                allowed[[0, chosen]] = True, False
+                allowed[0], allowed[chosen] = True, False
                 shares = _shares(self._network.then(hidden, torch.tensor([chosen])))
         return tuple(remarks)
 
@@ -125,7 +126,7 @@ class LearnedParticipant(Policy[LearnedState]):
         joined: bool,
     ) -> tuple[int, Remark | None]:  # fmt: skip
         """Returns the number of a form and its remark, drawn among those that are not denied; None for silence."""
-        while chosen := _drawn(shares, scene.rng):
+        while chosen := drawn(shares, scene.rng):
             form = self._vocabulary[chosen]
             said = stop_remark(memory) if form == STOP_FORM else filled(form, available, joined=joined)
             if said is None or not is_denied(said, scene.view):
@@ -163,11 +164,3 @@ def _shares(scores: torch.Tensor) -> NDArray[np.float64]:
     """Returns the probabilities of remarks at `TEMPERATURE` (r,) from logits (1, r)."""
     shares: NDArray[np.float64] = torch.softmax(scores[0].double() / TEMPERATURE, dim=0).numpy()
     return shares
-
-
-def _drawn(shares: NDArray[np.float64], rng: np.random.Generator) -> int:
-    """Returns a number drawn in proportion to shares; 0 if all are 0."""
-    total = float(shares.sum())
-    if total <= 0.0:
-        return 0
-    return min(int(np.searchsorted(np.cumsum(shares), rng.random() * total)), len(shares) - 1)

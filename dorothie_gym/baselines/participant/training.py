@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -20,6 +19,7 @@ from dorothie_gym.baselines.imitation.rounds import (
     PracticePlan,
     RoundSettings,
     Stage,
+    processor_seconds,
     train_in_rounds,
 )
 from dorothie_gym.baselines.imitation.supervised import fit
@@ -50,9 +50,15 @@ def train_participant(
 
 @dataclass(frozen=True, kw_only=True)
 class ParticipantLearner:
-    """Functions of the training, see `rounds.Learner`."""
+    """Functions of the training, see `rounds.Learner`.
+
+    Attributes:
+        settings: settings of the training.
+        begun: processor time at the beginning of the training [s].
+    """
 
     settings: RoundSettings
+    begun: float = field(default_factory=processor_seconds)
 
     @property
     def branch(self) -> int:
@@ -70,15 +76,13 @@ class ParticipantLearner:
 
     def fit(self, plan: FitPlan, on_stage: OnStage) -> Stage:
         """Fits a network to lessons, and saves it."""
-        begun, settings = time.process_time(), self.settings
+        settings = self.settings
         vocabulary = Batch.vocabulary_of(plan.corpus_files, settings.least)
         examples = Batch.read(plan.files, vocabulary)
         torch.manual_seed(settings.seed)
         network = ParticipantNetwork(Layout.of(len(vocabulary)))
-        seconds = 0.0
         if plan.former is not None:
-            network, page = load_network(plan.former)
-            seconds = page.seconds
+            network, _ = load_network(plan.former)
         on_stage(plan.title, 0, plan.epochs)
         loss = fit(
             network, examples, partial(loss_of, network), epochs=plan.epochs,
@@ -87,7 +91,7 @@ class ParticipantLearner:
         )  # fmt: skip
         page = ModelPage(
             format=MODEL_FORMAT, kind=KIND, layout=network.layout, vocabulary=vocabulary,
-            steps=len(examples) * plan.epochs, seconds=round(seconds + time.process_time() - begun, 1),
+            steps=len(examples) * plan.epochs, seconds=round(processor_seconds() - self.begun, 1),
             settings={**settings.as_json(), "corpus": settings.corpus.name},
         )  # fmt: skip
         save_network(network, page, plan.folder)

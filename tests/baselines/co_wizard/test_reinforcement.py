@@ -22,7 +22,7 @@ from dorothie_gym.baselines.co_wizard.policy_gradient import (
 )
 from dorothie_gym.baselines.co_wizard.reinforcement import ReinforcementSettings, reinforce_co_wizard
 from dorothie_gym.baselines.imitation.batches import UNKNOWN
-from dorothie_gym.errors import ModelFileError, PolicyLoadError, SessionError
+from dorothie_gym.errors import CheckpointError, ModelFileError, PolicyLoadError, SessionError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import find_player
 from dorothie_gym.policies.pretrained import pretrained_folder
@@ -188,6 +188,14 @@ def test_interrupted_reinforcement_ends_with_the_same_weights(reinforced, tmp_pa
 def test_folder_of_other_settings_is_refused(reinforced):
     with pytest.raises(SessionError, match="has seed 4, not 5"):
         reinforce_co_wizard(settings(seed=5), reinforced, workers=1, on_stage=quiet)
+
+
+def test_damaged_figures_are_one_error_that_names_the_file(tmp_path):
+    folder = tmp_path / "run"
+    reinforce_co_wizard(settings(iterations=1, sessions=1, max_seconds=5.0), folder, workers=1, on_stage=quiet)
+    (folder / "iteration-1" / "progress.json").write_text('{"decisions": "many"}')
+    with pytest.raises(CheckpointError, match=r"progress\.json.*delete it"):
+        reinforce_co_wizard(settings(iterations=1, sessions=1, max_seconds=5.0), folder, workers=1, on_stage=quiet)
 
 
 def test_unknown_ad_wizard_or_model_is_reported_before_a_folder_is_made(tmp_path):
