@@ -33,6 +33,7 @@ _ASKS = re.compile(
     re.IGNORECASE,
 )
 """Questions and requests in the form of a question."""
+_PARTICIPLE = re.compile(r"[a-z]+ing\b")
 _PLAIN = re.compile(r"[^a-z' ]+")
 _PLAIN_WORDING = Wording()
 _NO_CONTEXT = WordingContext()
@@ -214,8 +215,8 @@ class _Sentence:
             marker = markers.get((kind, self._voice, move)) or markers.get(("opener", self._voice, move))
             if marker is not None and realizer.random() < marker.rate * style.chattiness:
                 front = marker.phrase.say(realizer)
-        if front and _repeats(front, body):
-            front = None
+        if front and (_repeats(front, body) or (scene.joined is not None and _PARTICIPLE.match(body))):
+            front = None  # nor "my camera is out, and slowing down"
         realizer.fronted = bool(front)
         if front:
             body = f"{front} {body}"

@@ -41,6 +41,7 @@ _DOWN = re.compile(
 _LIGHTS = re.compile(r"\blights?\b|\bbeams?\b|\bheadlights?\b|\bheadlamps?\b|\blamps?\b")
 _ORDER = re.compile(r"\b(before|after)(?= that\b| it\b| (?:the )?#landmark| or | ,| \?|$)")
 _BIT = r"(a|just a|a wee|another) (bit|little|touch|tad|hair)"
+_HEARING = re.compile(r"\b(hear me|(there|listening|with me|come through) \?)")
 _FURTHER = re.compile(
     rf"\b({_BIT} (more|further|farther|forward|closer|ahead|longer)|(some|few) more"
     rf"|(going|go|roll|rolling|move|forward|up|ahead|on|inch|creep) {_BIT}(?! \w+er\b)"
@@ -122,6 +123,7 @@ class ParsedText:
         affirms: True for an initial yes, False for an initial no.
         question: whether the text contains a question mark.
         asked: proposition that a question is about, if the words tell; other questions are told by their slot values.
+        about_hearing: whether the words ask if the other one hears, rather than understands: "can you hear me?".
         told: proposition about weather, crowds, sensors or the view that a statement makes, if the words tell.
     """
 
@@ -149,6 +151,7 @@ class ParsedText:
     affirms: bool | None = None
     question: bool = False
     asked: Proposition | None = None
+    about_hearing: bool = False
     told: Proposition | None = None
 
     @property
@@ -173,7 +176,9 @@ def understand(text: str) -> ParsedText:
         The parsed text. Every text is accepted.
     """
     lists = word_lists()
-    mentions, words = find_names(_without_vocative(split_words(text), lists))
+    said = _without_vocative(split_words(text), lists)
+    spoken = " ".join(said)
+    mentions, words = find_names(said)
     words = mask_directions(words, lists)
     joined = " ".join(words)
     numbered = not NUMBER_WORDS.isdisjoint(words) or any(word[0].isdigit() for word in words)
@@ -210,8 +215,15 @@ def understand(text: str) -> ParsedText:
         affirms=_affirms(words, lists),
         question="?" in words,
         asked=_first("questions", "asks", masked),
-        told=None if "?" in words else _first("statements", "says", masked),
+        about_hearing="?" in words and _HEARING.search(spoken) is not None,
+        told=_first("statements", "says", _stated(masked)) or _first("statements", "says", _stated(spoken)),
     )
+
+
+def _stated(text: str) -> str:
+    """Returns the words before a question in the same breath: "it's foggy" of "it's foggy, shall I slow down?"."""
+    head, mark, _ = text.rpartition("?")
+    return head[: max(head.rfind(","), head.rfind("."), 0)] if mark else text
 
 
 def _without_vocative(words: list[str], lists: WordLists) -> list[str]:

@@ -258,6 +258,7 @@ class SlotRealizer:
 
     def _name(self, value: SlotValue, named: bool) -> str:
         lexicon, style, scene = load_lexicon(), self._style, self._scene
+        named = named or value is LandmarkName.PERSON  # who is not "that place"
         if not named and scene.mentioned and value in scene.mentioned and self.random() < style.anaphora:
             return self.pick(lexicon.forms(value, "again"))
         if not named and value is scene.street and self.random() < style.anaphora:
@@ -287,7 +288,7 @@ class SlotRealizer:
         return f"{owner}'s house" if owner else f"my friend {friend}"
 
 
-_NAMES_PERSON = 0.6  # probability that a house or a person is called by name
+_NAMES_PERSON = 0.8  # probability that a house or a person is called by name
 _ELSEWHERE = frozenset({GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE})  # of other errands
 _INDEFINITE = re.compile(r"^(an?|some|another|the) ")
 _POSSESSED = re.compile(r"^(my|your|our|his|her|their|\w+'s) ")

@@ -15,6 +15,7 @@ import numpy as np
 from dorothie_gym.dialogue import (
     CommunicativeFunction,
     Intention,
+    Predicate,
     Proposition,
     SpeakerStyle,
     Wording,
@@ -212,6 +213,16 @@ class SpeechState:
             if not same:
                 kept.append(replace(item, joined=False) if dropped and item.joined else item)
             dropped = same
+        return replace(self, queue=tuple(kept))
+
+    def without_statements(self, predicates: Collection[Predicate]) -> SpeechState:
+        """Drops the queued remarks about some predicates; what is joined to them stays."""
+        kept, dropped = [], False
+        for item in self.queue:
+            about = any(said.predicate in predicates for said in item.meaning)
+            if not about:
+                kept.append(replace(item, joined=False) if dropped and item.joined else item)
+            dropped = about
         return replace(self, queue=tuple(kept))
 
     def hold(self, until: float) -> SpeechState:

@@ -12,6 +12,8 @@ from dorothie_gym.analysis.talk.session_world import SessionWorld
 from dorothie_gym.dialogue import Direction, Predicate, Proposition
 from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, PhysicalAction, Role
 from dorothie_gym.recording import FRAME_RATE
+from dorothie_gym.recording.events import EventType
+from dorothie_gym.tasks.purposes import in_first_person
 
 CARRIED_OUT_WITHIN: Final = 60.0
 """Time within which an announced action is carried out [s]."""
@@ -111,10 +113,12 @@ def is_nearer(world: SessionWorld, said: Proposition, time: float, speaker: Role
 
 
 def has_purpose(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Returns whether the story or the tasks name the person and the thing that an errand is said to be about."""
+    """Returns whether story, tasks or messages name the person and the thing that an errand is said to be about."""
     header = world.session.header
     texts = [header.story, *(str(row["description"]) for row in header.subgoals)]
     texts += [str(row["change"] or "") for row in header.subgoals]
+    messages = world.session.of_type(EventType.MESSAGE)
+    texts += [in_first_person(str(event.data.get("text"))) for event in messages if event.time <= time]
     known = " ".join(texts).casefold()
     named = [str(said.get(name)) for name in ("person", "item") if said.get(name) is not None]
     return all(_ARTICLE.sub("", _plain(words)) in _plain(known) for words in named) if named else None

@@ -43,10 +43,10 @@ def acknowledge(
     at_once = action in _AT_ONCE or words.further or words.distance is not None
     if rng.random() < state.style.checks * 0.25 and not at_once:
         state.say(intend(Function.CHECK_QUESTION, wanted, wording=wording))
-    elif rng.random() < state.style.echoes:
+    elif rng.random() < state.style.echoes and not (words.further or words.distance is not None):
         state.say(*_repeated(wanted, wording, rng))
     else:
-        more = () if action in _AT_ONCE else plan_remark(state, view, rng, joined=True)
+        more = plan_remark(state, view, rng, joined=True) if state.beliefs.exact and action not in _AT_ONCE else ()
         state.say(taken_on(state, wanted, rng), *more)
 
 
@@ -54,8 +54,9 @@ def sign_of_hearing(topic: str) -> Remark:
     """Returns the sign that something was heard.
 
     Args:
-        topic: what it was: an order ("ordered"), news ("told"), an answer ("answered"), an errand done ("done"), or
-            small talk ("chat").
+        topic: what it was: an order ("ordered"), news ("told"), something to be seen ("seen"), an answer ("answered"),
+            an errand done ("done"), small talk ("chat"), or a question whether it was understood ("align") or heard at
+            all ("hears").
     """
     return intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic))
 

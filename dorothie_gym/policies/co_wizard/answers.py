@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 
 import numpy as np
 
@@ -16,8 +17,10 @@ from dorothie_gym.ontology import (
     Slot,
     StreetName,
 )
+from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
+from dorothie_gym.policies.co_wizard.goals import set_goal
 from dorothie_gym.policies.co_wizard.judgement import (
     believes,
     reason_to_stand,
@@ -41,6 +44,9 @@ _ABOUT_THE_GOAL = frozenset(
 
 _ABOUT_THE_VIEW = frozenset({Predicate.VISIBILITY, Predicate.SAFE, Predicate.FAILED})
 
+_REQUEST = re.compile(r"\b(could|can|would|will) you\b(?!.*\b(know|find|see|remember|hear|tell|take)\b)")
+"""Words that ask for something to be done, even where the verb was misheard."""
+
 RECENT_STOP = 45.0
 """Time after a standstill within which the reason for it can be asked for [s]."""
 
@@ -50,12 +56,17 @@ def answer_yes_no(
 ) -> None:
     """Answers a yes/no question by what the Co-Wizard believes of it."""
     asked = asked_proposition(act, words)
-    if asked is None:
+    place = contents.first_name(act.values(Slot.LANDMARK))
+    if place is not None and state.beliefs.goal is None and _REQUEST.search(words.text.lower()):
+        set_goal(state, view, place, contents.named_streets(act), rng, sure=False)  # "could you hard to KFC?"
+    elif asked is None:
         state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
     elif asked.predicate is Predicate.LIGHTS_ON:
         _answer_lights(state, view)
     else:
-        state.say(judged(state, view, asked), *_more(state, view, asked, rng))
+        if asked.predicate is Predicate.KNOWS:  # "it isn't on my map" need not be said twice
+            state.speech = state.speech.without_statements(frozenset({Predicate.KNOWS}))
+        state.say_first(judged(state, view, asked), *_more(state, view, asked, rng))
 
 
 def asked_proposition(act: DialogueAct, words: ParsedText) -> Proposition | None:

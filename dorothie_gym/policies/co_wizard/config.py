@@ -138,7 +138,6 @@ class CoWizardStyle:
         gentle: whether the car slows down well before a place on the map.
         rambles: probability that the present plan is mentioned along with another remark.
         offers: probability that a task on the way is proposed as the first one.
-        reassures: probability that a description is followed by a question whether it was understood.
         notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
         recalls: probability that the thing or person of an errand is repeated, or mentioned on arrival.
         pace: cruise speed where nothing is said about it [km/h].
@@ -157,7 +156,6 @@ class CoWizardStyle:
     gentle: bool = False
     rambles: float = 0.0
     offers: float = 0.0
-    reassures: float = 0.0
     notices: float = 0.0
     recalls: float = 0.0
     pace: int = USUAL_SPEED
@@ -169,8 +167,8 @@ class CoWizardStyle:
         return cls(
             echoes=within(0.2, 0.5, persona.politeness, rng),
             checks=within(0.4, 0.1, persona.certainty, rng),
-            announces=within(0.05, 0.25, persona.talkativeness, rng),
-            silent=within(0.5, 0.15, persona.talkativeness, rng),
+            announces=within(0.1, 0.4, persona.talkativeness, rng),
+            silent=within(0.3, 0.1, persona.talkativeness, rng),
             asks=within(0.7, 0.3, persona.certainty, rng),
             proposes=within(0.1, 0.6, persona.certainty, rng),
             mishears=within(0.05, 0.0, persona.attention, rng),
@@ -179,7 +177,6 @@ class CoWizardStyle:
             gentle=gentle,
             rambles=within(0.05, 0.25, persona.talkativeness, rng),
             offers=within(0.3, 1.0, persona.attention, rng),
-            reassures=within(0.15, 0.0, persona.certainty, rng),
             pace=35 if gentle else int(rng.choice((40, 45))) if brisk else 40,
             chats=within(0.1, 0.6, persona.humour, rng),
             notices=0.0 if persona.ignores else within(0.6, 1.0, persona.attention, rng),

@@ -140,7 +140,7 @@ def _set_unknown_goal(
     draw = rng.random()
     if draw < 0.25 and not streets:
         state.say(no_map, intend(Function.SET_QUESTION, where, joined=True))
-    elif draw < 0.4:
+    elif draw < 0.4 and not streets:
         state.say(no_map, intend(Function.SET_QUESTION, where, elided=("street",), joined=True))
     elif draw < 0.6:
         route = Proposition.of(Predicate.HAS_ROUTE, place=name)
@@ -155,7 +155,7 @@ def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: 
     state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
     mark, later = known_landmark(state, view, name, ()), contents.errand(name, GoalStatus.PENDING)
     goal, progress = state.beliefs.goal, state.route.progress
-    if goal is None or goal is name:
+    if goal is None or goal is name or goal in state.speech.heard:  # the order is clear
         state.say(kept_for_later(state, name))
         return
     if mark is not None and progress is not None and rng.random() < state.style.offers:
@@ -242,8 +242,6 @@ def hear_description(
         state.say(sign_of_hearing("answered" if asked else "told"))
     else:
         state.say(intend(Function.POSITIVE_FEEDBACK, contents.located(goal, street), elided=("place",)))
-    if rng.random() < state.style.reassures:
-        state.say(intend(Function.FEEDBACK_ELICITATION, joined=True))
 
 
 def _described_place(

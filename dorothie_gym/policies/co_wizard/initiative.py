@@ -9,6 +9,7 @@ from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording, Wo
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology import (
     ActionValue,
+    DialogueMove,
     GoalStatus,
     LandmarkName,
     ObjectClass,
@@ -50,7 +51,9 @@ _WISHED = {
 
 
 def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
-    """Queues at most one remark, if none is queued or being said."""
+    """Queues at most one remark, if none is queued or being said; drops the reason for a standstill that is over."""
+    if not view.standing and any(_explains_standing(item) for item in state.speech.queue):
+        state.speech = state.speech.without_statements(frozenset({Predicate.BECAUSE}))
     if not state.speech.idle or view.speaking > 0.0:
         return
     for consider in (
@@ -67,6 +70,11 @@ def take_initiative(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
         consider(state, view, rng)
         if not state.speech.idle:
             return
+
+
+def _explains_standing(item: Remark) -> bool:
+    """Returns whether a remark tells, unasked, why the car stands."""
+    return item.act.move is DialogueMove.EXPLAIN and any(said.predicate is Predicate.BECAUSE for said in item.meaning)
 
 
 def scene_of(state: CoWizardState, view: CoWizardView) -> WordingContext:
@@ -87,7 +95,7 @@ def _give_up_wish(state: CoWizardState, view: CoWizardView, rng: np.random.Gener
     if wish is not None and view.time > state.intentions.wish_until:
         state.intentions = state.intentions.without_wish()
         refused = Proposition.of(Predicate.POSSIBLE, negated=True, action=_WISHED.get(wish))
-        state.say(intend(Function.INFORM, refused, elided=("action",), wording=Wording(topic="refused")))
+        state.say(intend(Function.INFORM, refused, wording=Wording(topic="given_up")))
 
 
 def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -131,7 +139,8 @@ def _waits_for_way(state: CoWizardState, view: CoWizardView) -> bool:
 def _may_ask_way(state: CoWizardState, view: CoWizardView, choice: Choice) -> bool:
     """Returns whether the way at a junction is unknown and the junction is near."""
     intentions, progress = state.intentions, state.route.progress
-    busy = intentions.halted or intentions.creeping or intentions.nudge is not None
+    creeps = intentions.creeping and view.motion is not Motion.WAITING
+    busy = intentions.halted or creeps or intentions.nudge is not None
     if busy or view.time < state.config.first_word or intentions.wish is Wish.U_TURN or view.manoeuvring:
         return False
     waiting = _waits_for_way(state, view)
@@ -166,7 +175,7 @@ def _say_arrived(state: CoWizardState, view: CoWizardView, rng: np.random.Genera
         return
     state.dialogue = state.dialogue.after_asking(view.time)
     arrived = Proposition.of(Predicate.ARRIVED, place=goal)
-    if state.beliefs.exact and rng.random() < state.style.echoes + 0.15:
+    if state.beliefs.exact and rng.random() < state.style.echoes + 0.35:
         state.say(intend(Function.INFORM, arrived), *arrival_reminder(state, rng))
     elif not state.beliefs.exact:
         state.say(intend(Function.PROPOSITIONAL_QUESTION, arrived, elided=("place",)))
@@ -194,13 +203,14 @@ def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator
     unanswered = silent < config.goal_interval and dialogue.asked_at > dialogue.heard_at
     if unanswered or not (intentions.halted or view.standing):
         return
-    again = view.time - dialogue.asked_at < 2.0 * config.goal_interval
+    unheard = dialogue.asked_at > dialogue.heard_at
     state.dialogue = dialogue.after_asking(view.time)
     draw = rng.random()
-    if again and draw < 0.5:
-        state.say(intend(Function.FEEDBACK_ELICITATION))
+    if unheard and draw < 0.5:
+        state.say(intend(Function.FEEDBACK_ELICITATION, wording=Wording(topic="hearing")))
     elif lost:
-        asked = contents.located(goal, StreetName.QUERIED) if draw < 0.75 else contents.action(ActionValue.QUERIED)
+        street = draw < 0.75 and not state.beliefs.described
+        asked = contents.located(goal, StreetName.QUERIED) if street else contents.action(ActionValue.QUERIED)
         state.say(intend(Function.SET_QUESTION, asked))
     elif state.beliefs.statuses and draw < 0.25:
         state.say(intend(Function.SET_QUESTION, contents.errand(None, GoalStatus.QUERIED)))
@@ -231,8 +241,7 @@ def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Gen
     full = resting or rng.random() < 0.3
     wording = Wording(topic="because_standing" if full else "because")
     elided = () if full else ("effect",)
-    explained = intend(Function.INFORM, because, elided=elided, wording=wording, expires=view.time + HAZARD_EXPIRES)
-    state.say(explained, *plan_remark(state, view, rng, joined=True))
+    state.say(intend(Function.INFORM, because, elided=elided, wording=wording, expires=view.time + HAZARD_EXPIRES))
 
 
 def _mention_camera(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:

@@ -107,7 +107,7 @@ def _is_close(state: CoWizardState, view: CoWizardView, said: Proposition) -> bo
 
 def _knows(state: CoWizardState, view: CoWizardView, said: Proposition) -> bool | None:
     place = said.get("place") or state.beliefs.goal
-    if place is None:
+    if place is None or (place is state.beliefs.goal and not (state.beliefs.exact or state.beliefs.described)):
         return False
     return any(mark.name is place and mark.place not in state.beliefs.ruled_out for mark in view.landmarks)
 

@@ -24,7 +24,7 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
     if asked_at is not None and view.time - asked_at > state.config.detour_answer_time:
         take_detour(state, view, rng, agreed=False)
     thing = _obstacle_on_path(state, view)
-    if thing is None or view.manoeuvring:
+    if thing is None or view.manoeuvring or _is_behind_goal(state, view, thing):
         return
     lanes = lanes_ahead(state.town, view.lane, view.station, state.config.roadblock_sight)
     if state.route.progress is not None:
@@ -69,6 +69,12 @@ def _obstacle_on_path(state: CoWizardState, view: CoWizardView) -> SeenObject | 
         if view.motion is Motion.HAZARD and view.hazard is ObjectClass.STATIC:
             return thing
     return None
+
+
+def _is_behind_goal(state: CoWizardState, view: CoWizardView, thing: SeenObject) -> bool:
+    """Returns whether an obstacle lies behind the place where the car will stop."""
+    progress = state.route.progress
+    return progress is not None and state.beliefs.exact and thing.distance > progress.left(view.station)
 
 
 def _distance_to_path(waypoints: np.ndarray, thing: SeenObject) -> float:

@@ -39,9 +39,10 @@ def remember(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generat
     if told is None or told in state.beliefs.told:
         return
     state.beliefs = state.beliefs.with_told(told)
-    if rng.random() < state.style.recalls:
+    if rng.random() < state.style.recalls and len(state.speech.queue) < 2:
+        wording = None if state.speech.idle else Wording(topic="purpose_too")
         joined = not state.speech.idle
-        state.say(intend(Function.POSITIVE_FEEDBACK, told, elided=("place",), joined=joined))
+        state.say(intend(Function.POSITIVE_FEEDBACK, told, elided=("place",), wording=wording, joined=joined))
 
 
 def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:

@@ -44,6 +44,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.sight import camera_fault
 from dorothie_gym.policies.speech import Remark, intend, repeated
 from dorothie_gym.policies.turn_lanes import junction_meant
 
@@ -58,6 +59,17 @@ _STOP_AHEAD = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
 _SETTLED = contents.QUESTIONS | {DialogueMove.ALIGN}
 _PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
 _REPEATABLE = contents.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
+_WITHOUT_CONTENT = frozenset(
+    {
+        DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT, DialogueMove.REPLY_Y,
+        DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFUSE,
+    }
+)  # fmt: skip
+"""Moves that may be said without any content."""
+
+_CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predicate.KNOWS})
+"""What is repeated as "I said ..."; other statements are made again as they were."""
+
 _SIGNS_OF_HEARING = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
@@ -300,12 +312,21 @@ def _explanation(
         else:
             _accept_change(state, contents.errand(name, GoalStatus.ABANDONED), rng)
     elif name is not None and not statuses and (state.beliefs.goal is None or state.intentions.arrived):
-        # with nowhere to go, a place that is mentioned may be the next one
-        set_goal(state, view, name, contents.named_streets(act), rng, sure=False)
+        _mentioned_place(state, view, act, name, rng)
     elif act.values(Slot.STREET):
         hear_description(state, view, contents.named_streets(act), landmarks, rng)
     elif act.slots or not _senseless(state, view, act, words, asks=False):
         _statement(state, view, act, words, rng)
+
+
+def _mentioned_place(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, name: LandmarkName, rng: np.random.Generator
+) -> None:
+    """Takes a place that is mentioned while there is nowhere to go for the next one, unless the car stands at it."""
+    if name is state.beliefs.goal:
+        state.say(intend(Function.NEGATIVE_FEEDBACK))
+    else:
+        set_goal(state, view, name, contents.named_streets(act), rng, sure=False)
 
 
 def _is_here(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
@@ -334,7 +355,8 @@ def _statement(
         state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
         state.say(sign_of_hearing("told"))
     elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
-        state.say(sign_of_hearing("told"))
+        sees = words.told is not None and camera_fault(view.raw) is None
+        state.say(sign_of_hearing("seen" if sees else "told"))
 
 
 def _reply(
@@ -414,7 +436,7 @@ def _alignment(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
     if state.beliefs.goal is not None or state.intentions.directive is not None:
-        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="align")))
+        state.say(sign_of_hearing("hears" if words.about_hearing else "align"))
     else:
         state.say(intend(Function.NEGATIVE_FEEDBACK))
 
@@ -451,8 +473,12 @@ def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Propo
 def _confusion(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Repeats the last remark that can be repeated."""
+    """Repeats the last remark, or the last of some content in its utterance."""
     state.feel(Happening.MISUNDERSTOOD, view.time)
+    latest = state.speech.last
+    if latest is not None and latest.act.move in _WITHOUT_CONTENT and not latest.act.slots and not latest.joined:
+        state.say(replace(latest, text=""))
+        return
     said = [
         item
         for place, item in enumerate(state.speech.said, start=1)
@@ -461,8 +487,9 @@ def _confusion(
     if not said:
         return
     last = said[-1]
-    repeats = last.act.move in contents.QUESTIONS or not last.act.slots
-    state.say(replace(last, text="", joined=False) if repeats else repeated(last, Function.CORRECTION))
+    corrects = last.act.slots and bool({said.predicate for said in last.meaning} & _CORRECTED)
+    again = corrects and last.act.move not in contents.QUESTIONS
+    state.say(repeated(last, Function.CORRECTION) if again else replace(last, text="", joined=False))
 
 
 def _small_talk(

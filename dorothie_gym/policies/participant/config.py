@@ -32,6 +32,7 @@ class ParticipantConfig(GuidanceConfig):
         next_task_delay: pause before the next task where it does not follow at once [s].
         goes_first: probability that a new task on the way is done before the present one.
         announces_ahead: probability that the change of a later task is mentioned at once.
+        tells_message: probability that the sender and the reason of a message are told with the change.
         leaves_route: probability that the choice of the route is left to the car in words.
         unanswered_after: silence after which the car is asked whether it has understood [s].
         guides_at_once: probability that guidance to an unknown place begins right after its description.
@@ -91,6 +92,7 @@ class ParticipantConfig(GuidanceConfig):
     next_task_delay: float = 9.0
     goes_first: float = 0.6
     announces_ahead: float = 0.95
+    tells_message: float = 0.8
     leaves_route: float = 0.06
     unanswered_after: float = 8.0
     guides_at_once: float = 0.12

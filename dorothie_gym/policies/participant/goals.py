@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,18 +15,26 @@ from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import (
     ActionValue,
     GoalStatus,
+    LandmarkName,
     StreetName,
 )
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
-from dorothie_gym.policies.participant.hints import famous_nearby, looks_remark
+from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby, looks_remark
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.tasks.purposes import Purpose, read_purposes
+from dorothie_gym.tasks.purposes import Purpose, ReadMessage, read_message, read_purposes
+from dorothie_gym.tasks.storyboard import Channel
+
+READING_RATE = 4.0
+"""Rate at which a message is read [words/s] (Brysbaert, Journal of Memory and Language 109, 2019: 238 a minute)."""
+
+HEARING_RATE = 2.7
+"""Rate at which the words of a caller are heard [words/s]."""
 
 # --- changes of the tasks -------------------------------------------------------------------------------------------
 
@@ -33,6 +42,10 @@ from dorothie_gym.tasks.purposes import Purpose, read_purposes
 def note_tasks(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Compares the subgoals with those of the last decision, and reports what has changed."""
     before, tasks = state.task, str(view.raw["tasks"])
+    message = _message(view)
+    if message is not None:
+        rate = HEARING_RATE if message.channel is Channel.CALL else READING_RATE
+        state.speech = state.speech.hold(view.time + len(message.text.split()) / rate)
     state.task = state.task.with_subgoals(view.subgoals, tasks)
     for old, new in zip(before.subgoals, view.subgoals, strict=False):
         if new.reached and not old.reached:
@@ -60,7 +73,10 @@ def _report_done(
     landmark = view.landmark(subgoal.landmark)
     named = landmark is not None and rng.random() < 0.4
     finished = contents.errand(None if landmark is None else landmark.name, GoalStatus.COMPLETE)
-    done = intend(Function.INFORM, finished, elided=() if named else ("place",))
+    wording = (
+        _wording_of_meeting(view, subgoal) if landmark is not None and landmark.name is LandmarkName.PERSON else None
+    )
+    done = intend(Function.INFORM, finished, elided=() if named else ("place",), wording=wording)
     # leaves the car time to report its arrival first
     delay = float(rng.uniform(*state.config.report_delay))
     state.speech = state.speech.cleared().hold(view.time + delay).plan(done)
@@ -73,6 +89,13 @@ def _report_done(
         state.task = state.task.with_next_task(same_breath=same_breath, next_at=next_at)
 
 
+def _wording_of_meeting(view: ParticipantView, subgoal: SeenSubgoal) -> Wording:
+    """Returns the wording of the report that somebody was picked up, or only met."""
+    purpose = purpose_of(view, subgoal.index)
+    picks_up = purpose is not None and purpose.action is not None and purpose.action.startswith("pick up")
+    return Wording(topic="picked_up" if picks_up else "met")
+
+
 def _report_added(
     state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, rng: np.random.Generator
 ) -> None:
@@ -81,7 +104,7 @@ def _report_added(
         return
     on_the_way = _is_on_the_way(state, view, subgoal, landmark) and rng.random() < state.config.goes_first
     if on_the_way or _has_to_wait(state, view, subgoal, landmark):
-        _go_first(state, view, subgoal, landmark)
+        _go_first(state, view, subgoal, landmark, rng)
         return
     later = contents.errand(landmark.name, GoalStatus.PENDING)
     news = intend(Function.REQUEST, later, wording=Wording(topic="added"))
@@ -92,7 +115,7 @@ def _report_added(
         stop = intend(Function.REQUEST, contents.action(ActionValue.STOP), urgent=True)
         state.say(stop, replace(news, joined=True))
     else:
-        state.say(news)
+        state.say(news, *message_remark(state, view, landmark, rng))
 
 
 def _has_to_wait(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> bool:
@@ -121,7 +144,10 @@ def route_length(state: ParticipantState, view: ParticipantView, landmark: SeenL
     return route.length if route is not None else math.inf
 
 
-def _go_first(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark) -> None:
+def _go_first(
+    state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark,
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
     """Interrupts the target for a subgoal that was just added."""
     former = state.task.goal
     assert former is not None
@@ -130,6 +156,7 @@ def _go_first(state: ParticipantState, view: ParticipantView, subgoal: SeenSubgo
     now = contents.errand(landmark.name, GoalStatus.ONGOING, street)
     state.say_only(
         intend(Function.REQUEST, now, wording=Wording(topic="added")),
+        *message_remark(state, view, landmark, rng),
         intend(Function.REQUEST, contents.errand(former.name, GoalStatus.PENDING), joined=True),
     )
 
@@ -158,13 +185,20 @@ def _report_dropped(
     landmark = view.landmark(subgoal.landmark)
     if landmark is None:
         return
+    said = {value for item in state.speech.said for value in item.act.slots}
+    known = subgoal.index == state.task.target or subgoal.index in state.task.put_off or landmark.name in said
     state.task = state.task.closed(subgoal.index)
     if subgoal.index == state.task.target:
         state.forget_target()
         state.task = state.task.with_same_breath(True)
         state.speech = state.speech.cleared()
-    function = Function.REQUEST if rng.random() < 0.8 else Function.INFORM
-    state.say(intend(function, contents.errand(landmark.name, GoalStatus.ABANDONED)))
+    dropped = contents.errand(landmark.name, GoalStatus.ABANDONED)
+    if known:
+        function = Function.REQUEST if rng.random() < 0.8 else Function.INFORM
+        news = intend(function, dropped)
+    else:
+        news = intend(Function.INFORM, dropped, wording=Wording(topic="one_less"))
+    state.say(news, *message_remark(state, view, landmark, rng))
 
 
 def _report_changed(
@@ -185,7 +219,9 @@ def _report_changed(
             wording = Wording(topic="changed_later", dropped=former.name)
             dropped = contents.errand(former.name, GoalStatus.ABANDONED)
             instead = contents.errand(landmark.name, GoalStatus.PENDING)
-            state.say(intend(Function.REQUEST, instead, dropped, wording=wording))
+            state.say(
+                intend(Function.REQUEST, instead, dropped, wording=wording), *message_remark(state, view, landmark, rng)
+            )
         return
     was_announced = task.announced
     state.forget_target()
@@ -199,7 +235,8 @@ def _report_changed(
     else:
         dropped = contents.errand(former.name, GoalStatus.ABANDONED)
         instead = contents.errand(landmark.name, GoalStatus.ONGOING)
-        state.say(intend(Function.REQUEST, instead, dropped, wording=Wording(dropped=former.name), urgent=True))
+        change = intend(Function.REQUEST, instead, dropped, wording=Wording(dropped=former.name))
+        state.say(change, *message_remark(state, view, landmark, rng))
 
 
 def _line_of(subgoal: SeenSubgoal, subgoals: Sequence[SeenSubgoal], listed: str) -> str | None:
@@ -283,8 +320,13 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
     return intend(Function.REQUEST, goal)
 
 
+IN_MIND = 15.0
+"""Time for which who was spoken of is understood as "she" [s]."""
+
 LONGEST_REASON = 55
 """Longest purpose or reason that is said [characters]."""
+
+_PRONOUN = re.compile(r"\b(he|she|it|they|him|her|his|its|them|their|theirs|this|that|those|these)\b")
 
 PURPOSES = 0.75
 """Probability that an errand is explained by what it is for rather than by why it matters."""
@@ -300,6 +342,8 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
         for topic, text in (("purpose", told.action), ("reason", told.reason))
         if text is not None and len(text) <= LONGEST_REASON
     }
+    if told.reason is not None and _PRONOUN.search(told.reason) and not _has_told_purpose(state, view, goal):
+        options.pop("reason", None)  # who "she" is has to be said first
     if not options:
         return ()
     prefers = "purpose" if rng.random() < PURPOSES else "reason"
@@ -315,6 +359,35 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
         return ()  # all of it has been told
     state.task = state.task.after_telling(said)
     return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
+
+
+def _has_told_purpose(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> bool:
+    """Returns whether a recent remark has told what the target is for, and thereby who or what is spoken of."""
+    if not state.speech.has_just_spoken(view.time, IN_MIND):
+        return False
+    recent = (said for item in state.speech.said[-3:] for said in item.meaning)
+    purposes = (said for said in recent if said.predicate is Predicate.PURPOSE and said.get("place") is goal.name)
+    return any(said.get("purpose") is not None for said in purposes)
+
+
+def message_remark(
+    state: ParticipantState, view: ParticipantView, landmark: SeenLandmark, rng: np.random.Generator
+) -> tuple[Remark, ...]:
+    """Returns who has just sent a message about an errand, and why; nothing without a reason, or by chance."""
+    read = _message(view)
+    if read is None or read.reason is None or len(read.reason) > LONGEST_REASON:
+        return ()
+    if rng.random() >= state.config.tells_message or (read.sender is None and _PRONOUN.search(read.reason)):
+        return ()
+    said = Proposition.of(Predicate.PURPOSE, place=landmark.name, person=read.sender, reason=read.reason)
+    topic = "reason_after" if read.sender is None else "message"
+    return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
+
+
+def _message(view: ParticipantView) -> ReadMessage | None:
+    """Returns the message that has just arrived; None without one."""
+    text = str(view.raw["message"])
+    return read_message(text) if text else None
 
 
 def _as_afterthought(item: Remark) -> Remark:
@@ -352,7 +425,7 @@ def _say_announcement(
     if named and rng.random() < 0.25:
         state.say(intend(Function.INFORM, contents.errand(named[0].name, GoalStatus.PENDING), joined=True))
     elif rng.random() < state.style.aligns:
-        state.say(intend(Function.FEEDBACK_ELICITATION, joined=True))
+        state.say(intend(Function.FEEDBACK_ELICITATION, wording=Wording(topic="understood"), joined=True))
     elif goal is not None and rng.random() < state.style.verifies:
         known = Proposition.of(Predicate.KNOWS, place=goal.name)
         wording = Wording(topic="knows_it")
@@ -378,7 +451,7 @@ def announce_target(state: ParticipantState, view: ParticipantView, rng: np.rand
         state.guidance = state.guidance.after_reminding()
         state.task = task.after_reminding(view.time)
         if state.guidance.repeats == 1:
-            state.say(intend(Function.FEEDBACK_ELICITATION))
+            state.say(intend(Function.FEEDBACK_ELICITATION, wording=Wording(topic="hearing")))
         else:
             state.say(announcement(state, view, rng))
 
@@ -393,11 +466,27 @@ def describe(state: ParticipantState, view: ParticipantView, function: Function,
     no_street = goal.street is StreetName.UNKNOWN
     state.set_guiding(bool(no_street or state.task.described or rng.random() < state.config.guides_at_once))
     state.task = state.task.after_describing()
+    looks = looks_remark(state, goal, rng) if rng.random() < state.config.describes_looks else ()
+    corner = corner_fact(state, view, goal)
+    named = any(goal.street in item.act.slots for item in state.speech.said)  # the street need not be said again
+    if named and corner is not None and corner not in state.task.told:
+        state.task = state.task.after_telling(corner)
+        elided = () if goal.name is LandmarkName.PERSON else ("place",)
+        state.say_first(intend(function, corner, elided=elided, wording=Wording(topic="located_cross")), *looks)
+        return
+    if goal.name is LandmarkName.PERSON and not no_street and not named:
+        where = contents.located(goal.name, goal.street)
+        state.say_first(intend(function, where, wording=Wording(topic="person_where")), *looks)
+        return
     near = famous_nearby(goal, view, state.config.near_landmark)
     beside = None if near is None else Proposition.of(Predicate.NEAR, place=goal.name, landmark=near.name)
     on_street = None if no_street else contents.located(goal.name, goal.street)
     facts = [fact for fact in (on_street, beside) if fact is not None]
-    looks = looks_remark(state, goal, rng) if rng.random() < state.config.describes_looks else ()
+    if named and beside is None:
+        state.set_guiding(True)
+        known = Proposition.of(Predicate.KNOWS, place=goal.name)
+        state.say_first(intend(Function.INFORM, known, elided=("place",), wording=Wording(topic="guides")), *looks)
+        return
     if not facts:
         state.say_first(intend(Function.UNCERTAIN_ANSWER), *looks)
         return

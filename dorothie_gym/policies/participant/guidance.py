@@ -196,10 +196,9 @@ def _with_addition(
         # the moment must not be missed: the shorter of two wordings
         drawn = [word_act(words.act, Role.PARTICIPANT, rng, words.wording, style=state.speech.style) for _ in range(2)]
         return (replace(words, text=min(drawn, key=speech_seconds)),)
-    if again and rng.random() < 0.25:
-        return words, intend(CommunicativeFunction.FEEDBACK_ELICITATION, joined=True)
-    if draw < state.style.aligns:
-        return words, intend(CommunicativeFunction.FEEDBACK_ELICITATION, joined=True)
+    if (again and rng.random() < 0.25) or draw < state.style.aligns:
+        wording = Wording(topic="understood")
+        return words, intend(CommunicativeFunction.FEEDBACK_ELICITATION, wording=wording, joined=True)
     if draw < state.style.aligns + 0.7 * state.style.reasons:
         return words, *hint(state, view, rng)
     return (words,)
@@ -238,7 +237,10 @@ def _slow_down_early(state: ParticipantState, view: ParticipantView, rng: np.ran
     if not state.route.misses and not _is_easily_missed(state, view):
         return False
     state.guidance = state.guidance.after_slowing_early()
-    wording = Wording(faster=False, speed=float(rng.choice(config.careful_speeds)))
+    speed = float(rng.choice(config.careful_speeds))
+    if 3.6 * view.speed <= speed:
+        return False
+    wording = Wording(faster=False, speed=speed)
     state.say(order(DialogueMove.INSTRUCT, ActionValue.SPEED_CHANGE, wording))
     return True
 

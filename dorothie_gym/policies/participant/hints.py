@@ -38,6 +38,12 @@ _CLOSE, _FAR = 120.0, 220.0
 _MEASURED = 60.0, 350.0
 """Ways to the target whose length is told [m]."""
 
+_PROGRESS = frozenset({Predicate.CLOSE, Predicate.DISTANCE, Predicate.RIGHT_WAY})
+"""What is told to a car that finds the way by itself."""
+
+_IN_MIND = 12.0
+"""Time for which a place that was named is understood as "it" [s]."""
+
 _FEELINGS = 0.25
 """Probability of a remark about a feeling that has a cause, instead of a hint."""
 
@@ -47,10 +53,30 @@ def hint(state: ParticipantState, view: ParticipantView, rng: np.random.Generato
     felt = _feeling(state, view)
     if felt is not None and rng.random() < _FEELINGS:
         return (_said(state, felt),)
-    facts = [fact for fact in _facts(state, view) if fact not in state.task.told]
+    named = _is_in_mind(state, view)
+    helps = state.guidance.guiding  # a car that knows the place needs no description of it
+    facts = [
+        fact
+        for fact in _facts(state, view)
+        if fact not in state.task.told and (named or _can_name(fact)) and (helps or fact.predicate in _PROGRESS)
+    ]
     if not facts:
         return ()
-    return (_said(state, facts[int(rng.integers(len(facts)))]),)
+    return (_said(state, facts[int(rng.integers(len(facts)))], names_place=not named),)
+
+
+def _is_in_mind(state: ParticipantState, view: ParticipantView) -> bool:
+    """Returns whether "it" is understood as the target, because either speaker has just named it."""
+    goal, speech = state.task.goal, state.speech
+    recent = speech.said[-1:] if speech.has_just_spoken(view.time, _IN_MIND) else ()
+    named = {value for item in (*recent, *speech.queue) for value in item.act.slots}
+    person = goal is not None and goal.name is LandmarkName.PERSON  # who is no "it"
+    return goal is not None and goal.name in named | speech.heard and not person
+
+
+def _can_name(fact: Proposition) -> bool:
+    """Returns whether a fact can be said with the name of the place: not with that of another one besides."""
+    return fact.get("landmark") is None
 
 
 def looks_remark(state: ParticipantState, goal: SeenLandmark, rng: np.random.Generator) -> tuple[Remark, ...]:
@@ -69,8 +95,8 @@ def famous_nearby(goal: SeenLandmark, view: ParticipantView, within: float) -> S
     return min(found)[2] if found and min(found)[0] < within else None
 
 
-def _said(state: ParticipantState, content: Proposition) -> Remark:
-    """Returns the remark that states a proposition, and remembers it."""
+def _said(state: ParticipantState, content: Proposition, *, names_place: bool = False) -> Remark:
+    """Returns the remark that states a proposition, and remembers it; `names_place` says the name instead of "it"."""
     state.task = state.task.after_telling(content)
     side, topic = content.get("side"), str(content.predicate)
     if content.predicate is Predicate.LOCATED:
@@ -79,7 +105,8 @@ def _said(state: ParticipantState, content: Proposition) -> Remark:
         topic = f"feels_{content.get('feeling')}"
     topic = f"{'not_' * content.negated}{topic}"
     wording = Wording(topic=topic, direction=side if isinstance(side, Direction) else None)
-    return intend(CommunicativeFunction.INFORM, content, elided=("place", "cause"), wording=wording, joined=True)
+    elided = ("cause",) if names_place and content.predicate is not Predicate.RIGHT_WAY else ("place", "cause")
+    return intend(CommunicativeFunction.INFORM, content, elided=elided, wording=wording, joined=True)
 
 
 def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Proposition]:
@@ -100,11 +127,9 @@ def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Propositi
             yield Proposition.of(Predicate.LOCATED, place=goal.name, side=_side(state, view, goal))
     if goal.street is not StreetName.UNKNOWN and street_of(view.raw, state.town, view.lane) is goal.street:
         yield Proposition.of(Predicate.LOCATED, place=goal.name, street=goal.street)
-    cross = corner_of(state.town, state.town.lanes[goal.lane].street, goal.x, goal.y)
-    names = view.raw["street_names"]
-    crossing = StreetName(int(names[cross])) if cross is not None and cross < len(names) else StreetName.UNKNOWN
-    if StreetName.UNKNOWN not in (crossing, goal.street) and crossing is not goal.street:
-        yield Proposition.of(Predicate.LOCATED, place=goal.name, street=goal.street, cross=crossing)
+    corner = corner_fact(state, view, goal)
+    if corner is not None:
+        yield corner
     near = famous_nearby(goal, view, state.config.near_landmark)
     if near is not None:
         yield Proposition.of(Predicate.NEAR, place=goal.name, landmark=near.name)
@@ -112,6 +137,16 @@ def _facts(state: ParticipantState, view: ParticipantView) -> Iterator[Propositi
     for sign in dict.fromkeys(_SIGNS[kind] for kind in _SIGNS if kind in signs):
         yield Proposition.of(Predicate.NEAR, place=goal.name, object=sign)
     yield from _looks(goal)
+
+
+def corner_fact(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> Proposition | None:
+    """Returns at which corner a place lies; None if it lies at none, or the streets have no names."""
+    cross = corner_of(state.town, state.town.lanes[goal.lane].street, goal.x, goal.y)
+    names = view.raw["street_names"]
+    crossing = StreetName(int(names[cross])) if cross is not None and cross < len(names) else StreetName.UNKNOWN
+    if StreetName.UNKNOWN in (crossing, goal.street) or crossing is goal.street:
+        return None
+    return Proposition.of(Predicate.LOCATED, place=goal.name, street=goal.street, cross=crossing)
 
 
 def _looks(goal: SeenLandmark) -> Iterator[Proposition]:

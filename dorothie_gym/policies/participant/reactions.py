@@ -36,6 +36,9 @@ _HANDLED = frozenset({WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATI
 _HASTE, _HURRIED = 5, 0.75
 """Speed that a hurried participant adds to what suits the sight [km/h], and the trait `hurries` of such a one."""
 
+_SPEEDING_UP = 130.0
+"""Way to the place on which the participant asks for no more speed [m]."""
+
 LIGHTS_INTERVAL = 25.0
 """Time between remarks about the head lights [s]."""
 
@@ -177,7 +180,9 @@ def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.ran
             state.say(said)
     elif conversation.slowed and fog < FOG_LIMIT / 2 and rain < RAIN_LIMIT / 2:
         state.conversation = conversation.with_slowed(False)
-        if rng.random() < 0.5:
+        progress = state.route.progress
+        arrives = progress is not None and progress.left(view.station) < _SPEEDING_UP
+        if not arrives and rng.random() < 0.5:
             speed = round(config.usual_speed)
             content, wording = contents.action(ActionValue.SPEED_CHANGE, speed=speed), Wording(faster=True, speed=speed)
             state.say(intend(Function.REQUEST, content, wording=wording))
@@ -285,8 +290,7 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
     assert goal is not None
     asks, asks_open = Function.PROPOSITIONAL_QUESTION, Function.SET_QUESTION
     found: list[tuple[Remark, ...]] = [
-        *((intend(Function.OTHER),),) * 2,
-        (intend(Function.OTHER), intend(Function.OTHER, joined=True)),
+        *((intend(Function.OTHER),),) * 3,
         (_question(state, view, rng),),
     ]
     if not state.guidance.guiding:
@@ -295,7 +299,6 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
         found.append((intend(asks_open, contents.action(ActionValue.QUERIED)),))
         found.append((intend(Function.CHECK_QUESTION, contents.destination(goal.name)),))
         found.append((intend(asks_open, Proposition.of(Predicate.ON_STREET, street=StreetName.QUERIED)),))
-        found.append((intend(asks, Proposition.of(Predicate.KNOWS, place=goal.name)),))
         may_hurry = not state.conversation.hurried and not state.conversation.slowed and view.speed > 5.0
         if rng.random() < 0.15 and may_hurry and sight(view.raw) >= FAR_SIGHT:
             speed = round(state.config.usual_speed + 5.0) if rng.random() < 0.5 else None

@@ -39,6 +39,7 @@ from dorothie_gym.policies.participant.yes_no_answers import (
     correct_arrival,
     denied,
     deny_arrival,
+    deny_other_place,
     go_first,
     has_just_finished,
     is_elsewhere,
@@ -52,6 +53,8 @@ _ACKNOWLEDGEMENTS = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _REPLIES = frozenset(
     {DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM}
 )
+
+_SHORT_ANSWERS = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U})
 
 _POOR_VIEW = frozenset({Predicate.FAILED, Predicate.VISIBILITY})
 """What a car says that cannot see well."""
@@ -67,6 +70,12 @@ _GARBLED_WHERE = re.compile(r"(so|and|now|well|okay|,| )*where\b")
 
 _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we're at|we are at)\b")
 """Words by which the car says that it has come to a place."""
+
+_LACKS_PLACE = re.compile(
+    r"\b((can't|cannot) find|(is not|isn't|not) on my|doesn't show|don't have|don't know where|no idea where"
+    r"|isn't marked)\b"
+)
+"""Words by which the car says that it does not find the place, even if parts of them are misheard."""
 
 _LACKS_WAY = re.compile(r"\b(know the way|where to turn|which way)\b")
 """Words by which the car says that it stands because it does not know the way."""
@@ -91,6 +100,7 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
     state.speech = state.speech.without_told(heard.words.told)
     if heard.words.told is not None and heard.words.told.predicate in _POOR_VIEW:
         state.conversation = state.conversation.after_talking_about_view()
+        state.speech = state.speech.without_statements(_POOR_VIEW)
     asked = any(act.move is DialogueMove.QUERY_W for act in heard.acts)
     before = state.speech
     for act in heard.acts:
@@ -103,7 +113,8 @@ def listen(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
         _thank(state, view, rng)
     elif state.speech is before and any(act.move is DialogueMove.EXPLAIN for act in heard.acts):
         # an utterance that takes up an instruction needs no acknowledgement of its own
-        _nod(state, view, rng, _nod_to(view, heard), alone=heard.acts[0].move not in _ACKNOWLEDGEMENTS)
+        alone = heard.acts[0].move not in _ACKNOWLEDGEMENTS
+        _nod(state, view, rng, _nod_to(view, heard), heard.words.told, alone=alone)
 
 
 # --- open questions -------------------------------------------------------------------------------------------------
@@ -192,11 +203,14 @@ def _explanation(
     if _correct(state, view, act, words):
         return
     names_goal = state.task.goal is not None and state.task.goal.name in landmarks
-    if GoalStatus.UNKNOWN in statuses and names_goal:
+    if names_goal and (GoalStatus.UNKNOWN in statuses or _LACKS_PLACE.search(words.text.lower())):
         describe(state, view, Function.INFORM, rng)
         return
-    claims = names_goal and not statuses and _CLAIMS_ARRIVAL.search(words.text.lower()) is not None
-    if claims and is_elsewhere(state, view) and not has_just_finished(state, view, landmarks):
+    claims = bool(landmarks) and not statuses and _CLAIMS_ARRIVAL.search(words.text.lower()) is not None
+    if claims and not names_goal and view.standing and not has_just_finished(state, view, landmarks):
+        deny_other_place(state, landmarks)
+        return
+    if claims and names_goal and is_elsewhere(state, view) and not has_just_finished(state, view, landmarks):
         deny_arrival(state)
         return
     if act.values(Slot.OBJECT):
@@ -256,7 +270,8 @@ def _thank(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
 
 
 def _nod(
-    state: ParticipantState, view: ParticipantView, rng: np.random.Generator, nod: Remark, *, alone: bool
+    state: ParticipantState, view: ParticipantView, rng: np.random.Generator, nod: Remark, told: Proposition | None,
+    *, alone: bool,
 ) -> None:  # fmt: skip
     """Acknowledges an explanation: before the next remark, or, where `alone` allows it, by itself."""
     waiting = state.speech.queue
@@ -264,10 +279,22 @@ def _nod(
         done = GoalStatus.COMPLETE in waiting[0].act.slots
         if waiting[0].act.move in _AFTER_A_NOD and not done and rng.random() < state.config.nods_first:
             state.speech = state.speech.led_by(nod)
-    elif not alone or not state.speech.idle or (state.guidance.guiding and about_to_arrive(state, view)):
+    elif (
+        not alone
+        or not state.speech.idle
+        or _has_just_said(state, view, told)
+        or (state.guidance.guiding and about_to_arrive(state, view))
+    ):
         return
     elif rng.random() < state.style.nods:
         state.say(nod, *addition(state, view, rng))
+
+
+def _has_just_said(state: ParticipantState, view: ParticipantView, told: Proposition | None) -> bool:
+    """Returns whether the participant has just made the same statement as the car."""
+    if told is None or not state.speech.has_just_spoken(view.time, state.config.checked_within):
+        return False
+    return any(said.contains(told) for item in state.speech.said[-2:] for said in item.meaning)
 
 
 def _correct(state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:
@@ -300,8 +327,8 @@ def _confusion(
 
 
 def _is_of_the_moment(said: Remark) -> bool:
-    """Returns whether a remark is repeated as it was: a question, one beside the task, or an action no step names."""
-    if said.act.move in contents.QUESTIONS or said.act.move is DialogueMove.IRRELEVANT:
+    """Returns whether a remark is repeated as it was: a question, a yes or no, small talk, an action no step names."""
+    if said.act.move in contents.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
         return True
     return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)
 
@@ -319,7 +346,8 @@ def _acknowledgement(
 def _alignment(
     state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    state.say_first(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="align")))
+    topic = "hears" if words.about_hearing else "align"
+    state.say_first(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic=topic)))
 
 
 def _request(

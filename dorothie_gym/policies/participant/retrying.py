@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
 from dorothie_gym.maps.routing import LaneEntry
-from dorothie_gym.ontology import ActionValue
+from dorothie_gym.ontology import ActionValue, MoveGroup
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
@@ -13,6 +13,8 @@ from dorothie_gym.policies.speech import Remark, intend
 
 IN_VAIN = 2
 """Number of failures after which something else is tried."""
+
+_ANSWERS = MoveGroup.REPLY.moves
 
 REMARK_EXPIRES = 8.0
 """Time after which a remark about a failure is no longer said [s]."""
@@ -58,6 +60,8 @@ def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
     """Chooses another way after U-turns or lane changes that did not bring the car on its way."""
     progress, guidance = state.route.progress, state.guidance
     assert progress is not None
+    if any(item.act.move in _ANSWERS for item in state.speech.queue):
+        return  # what the car has asked is answered first
     manoeuvre = progress.next_manoeuvre(view.station)
     if manoeuvre is None or (guidance.step is None and not guidance.u_turns):
         return

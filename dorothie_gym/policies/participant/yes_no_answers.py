@@ -273,6 +273,16 @@ def correct_arrival(state: ParticipantState, view: ParticipantView, said: Propos
     state.say_only(denied(said or arrived), replace(creep_instruction(state, view), joined=True))
 
 
+def deny_other_place(state: ParticipantState, places: Collection[SlotValue]) -> None:
+    """Corrects a car that says it has come to another place, and names the target again."""
+    if state.task.goal is None or not state.task.announced:
+        return
+    state.set_guiding(True)
+    other = Proposition.of(Predicate.GOAL, negated=True, place=contents.first_name(places))
+    again = intend(Function.REQUEST, contents.destination(state.task.goal.name), joined=True)
+    state.say_only(intend(Function.NEGATIVE_ANSWER, other, elided=("place",)), again)
+
+
 def deny_arrival(state: ParticipantState) -> None:
     """Corrects a car that has mistaken another place for the target."""
     if state.task.goal is None:
