@@ -175,7 +175,7 @@ def _say_arrived(state: CoWizardState, view: CoWizardView, rng: np.random.Genera
         return
     state.dialogue = state.dialogue.after_asking(view.time)
     arrived = Proposition.of(Predicate.ARRIVED, place=goal)
-    if state.beliefs.exact and rng.random() < state.style.echoes + 0.35:
+    if state.beliefs.exact and rng.random() < state.style.echoes + 0.5:
         state.say(intend(Function.INFORM, arrived), *arrival_reminder(state, rng))
     elif not state.beliefs.exact:
         state.say(intend(Function.PROPOSITIONAL_QUESTION, arrived, elided=("place",)))

@@ -17,6 +17,9 @@ from dorothie_gym.policies.route_progress import first_new_street, lanes_ahead
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.spaces import Motion
 
+_JUST_TOLD = 8.0
+"""Time for which an obstacle that the participant has reported needs no report of the car [s]."""
+
 
 def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
     """Looks for obstacles on the path, announces a new one, and asks about a detour or takes it."""
@@ -35,16 +38,17 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
     state.route = state.route.with_roadblock(state.town, place)
     state.dialogue = state.dialogue.after_finding_obstacle(view.time)
     obstacle = Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC, prop=thing.prop)
-    blocked = intend(CommunicativeFunction.INFORM, obstacle, urgent=True)
-    state.speech = state.speech.cleared().plan(blocked)
+    told = ObjectClass.STATIC in state.speech.heard and view.time - state.dialogue.heard_at < _JUST_TOLD
+    blocked = () if told else (intend(CommunicativeFunction.INFORM, obstacle, urgent=True),)
+    state.speech = state.speech.cleared().plan(*blocked)
     if state.route.progress is not None:
         state.dialogue = state.dialogue.with_detour_question(view.time)
         detour = _proposed_detour(state, view, rng)
-        state.say(intend(CommunicativeFunction.OFFER, detour, wording=Wording(topic="detour"), joined=True))
+        state.say(intend(CommunicativeFunction.OFFER, detour, wording=Wording(topic="detour"), joined=not told))
     else:
         state.dialogue = state.dialogue.after_asking(view.time)
         way = contents.action(ActionValue.QUERIED)
-        state.say(intend(CommunicativeFunction.SET_QUESTION, way, joined=True))
+        state.say(intend(CommunicativeFunction.SET_QUESTION, way, joined=not told))
     state.intentions = state.intentions.blocked()
 
 

@@ -21,7 +21,8 @@ _CLAUSE = re.compile(
 )
 _OF_SPEAKER = re.compile(r"^(my|our) ")
 _OWNER = re.compile(
-    r"\b(?P<owner>(?:(?:Mr|Mrs|Ms|Dr|Se.ora)\.? )?(?:[A-Z]\w+ ){0,2}[A-Z]\w+|my \w+)'s (?:house|home|place)\b"
+    r"\b(?P<owner>(?:(?:Mr|Mrs|Ms|Dr|Se.ora)\.? )?(?:[A-Z]\w+ ){0,2}[A-Z]\w+(?:'s [a-z]+)?|my \w+)'s "
+    r"(?:house|home|place)\b"
 )
 _BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})
 _OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
@@ -47,16 +48,16 @@ def remember(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generat
 
 def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
     """Keeps whose house the participant wants to go to: "Mateo" of "go to Mateo's house"."""
-    named = {value for act in heard.acts for value in act.values(Slot.LANDMARK)}
-    later = any(GoalStatus.PENDING in act.slots or _OVER & act.slots for act in heard.acts)
-    if LandmarkName.HOUSE not in named or later:
+    about = [act.slots for act in heard.acts if LandmarkName.HOUSE in act.slots]
+    if not any(GoalStatus.PENDING not in slots and not _OVER & slots for slots in about):
         return
+    done = any(_OVER & act.slots for act in heard.acts)
     found = _OWNER.search(heard.words.text)
     if found is not None:
         first, _, rest = found["owner"].partition(" ")
         name = rest if rest and first.lower() in _BEFORE_NAMES else found["owner"]
         state.beliefs = state.beliefs.with_owner(_OF_SPEAKER.sub("your ", name))
-    elif state.beliefs.goal is not LandmarkName.HOUSE:
+    elif done or state.beliefs.goal is not LandmarkName.HOUSE:
         state.beliefs = state.beliefs.with_owner(None)  # another house than the last one
 
 
@@ -83,7 +84,8 @@ def told_of(state: CoWizardState, place: LandmarkName | None) -> Proposition | N
 def arrival_reminder(state: CoWizardState, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns a remark about what the car has come for, or nothing, by chance."""
     told = told_of(state, state.beliefs.goal)
-    if told is None or rng.random() >= state.style.recalls:
+    stands_for_person = state.beliefs.goal is LandmarkName.PERSON and told is not None and told.get("item") is None
+    if told is None or stands_for_person or rng.random() >= state.style.recalls:
         return ()
     return (intend(Function.INFORM, told, elided=("place",), wording=Wording(topic="come_for"), joined=True),)
 

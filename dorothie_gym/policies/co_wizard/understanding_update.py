@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -70,7 +71,6 @@ _WITHOUT_CONTENT = frozenset(
 _CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predicate.KNOWS})
 """What is repeated as "I said ..."; other statements are made again as they were."""
 
-_SIGNS_OF_HEARING = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM})
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 
@@ -103,8 +103,9 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
             react(state, view, act, heard.words, rng)
     remember(state, heard, rng)
     answer = _in_one_breath(state.speech.queue)
-    if answer and answer[0].act.move in _SIGNS_OF_HEARING and all(map(_is_plain_sign, before)):
-        before = ()  # one sign of hearing is enough
+    before = tuple(itertools.dropwhile(_is_plain_sign, before))  # the "okay" to what was said before comes too late
+    if before:
+        before = (replace(before[0], joined=False), *before[1:])
     state.speech = state.speech.cleared().plan(*before, *answer)
 
 
@@ -147,7 +148,8 @@ def _is_plain_sign(item: Remark) -> bool:
 
 def _tells_plan(item: Remark) -> bool:
     """Returns whether a remark tells a plan that nobody has asked for."""
-    return item.act.move is DialogueMove.EXPLAIN and any(said.predicate in _PLANS for said in item.meaning)
+    plan = any(said.predicate in _PLANS for said in item.meaning)
+    return item.act.move is DialogueMove.EXPLAIN and plan and GoalStatus.UNKNOWN not in item.act.slots
 
 
 def _mishears(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> bool:

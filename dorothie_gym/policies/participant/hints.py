@@ -53,7 +53,7 @@ def hint(state: ParticipantState, view: ParticipantView, rng: np.random.Generato
     felt = _feeling(state, view)
     if felt is not None and rng.random() < _FEELINGS:
         return (_said(state, felt),)
-    named = _is_in_mind(state, view)
+    named = is_in_mind(state, view)
     helps = state.guidance.guiding  # a car that knows the place needs no description of it
     facts = [
         fact
@@ -65,7 +65,7 @@ def hint(state: ParticipantState, view: ParticipantView, rng: np.random.Generato
     return (_said(state, facts[int(rng.integers(len(facts)))], names_place=not named),)
 
 
-def _is_in_mind(state: ParticipantState, view: ParticipantView) -> bool:
+def is_in_mind(state: ParticipantState, view: ParticipantView) -> bool:
     """Returns whether "it" is understood as the target, because either speaker has just named it."""
     goal, speech = state.task.goal, state.speech
     recent = speech.said[-1:] if speech.has_just_spoken(view.time, _IN_MIND) else ()

@@ -50,7 +50,7 @@ WHY_DISTANCE = 45.0
 
 _ROADSIDE_OBJECTS = (
     ObjectClass.BRIDGE, ObjectClass.BUILDING, ObjectClass.DYNAMIC, ObjectClass.FENCE, ObjectClass.POLE,
-    ObjectClass.ROAD, ObjectClass.SIDE_WALK, ObjectClass.UNLABELED, ObjectClass.VEGETATION, ObjectClass.WALL,
+    ObjectClass.ROAD, ObjectClass.SIDE_WALK, ObjectClass.VEGETATION, ObjectClass.WALL,
     ObjectClass.TRAFFIC_SIGN, ObjectClass.STATIC,
 )  # fmt: skip
 """Objects that the participant may ask about."""

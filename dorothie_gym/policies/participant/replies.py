@@ -72,7 +72,7 @@ _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we'
 """Words by which the car says that it has come to a place."""
 
 _LACKS_PLACE = re.compile(
-    r"\b((can't|cannot) find|(is not|isn't|not) on my|doesn't show|don't have|don't know where|no idea where"
+    r"\b((can't|cannot) find|(is not|isn't|not) on my|doesn't show|don't have|(don't know|no idea) where (?!we|i\b)"
     r"|isn't marked)\b"
 )
 """Words by which the car says that it does not find the place, even if parts of them are misheard."""
@@ -203,7 +203,8 @@ def _explanation(
     if _correct(state, view, act, words):
         return
     names_goal = state.task.goal is not None and state.task.goal.name in landmarks
-    if names_goal and (GoalStatus.UNKNOWN in statuses or _LACKS_PLACE.search(words.text.lower())):
+    lost = GoalStatus.UNKNOWN in statuses or _LACKS_PLACE.search(words.text.lower()) is not None
+    if lost and state.task.goal is not None and (names_goal or not landmarks):
         describe(state, view, Function.INFORM, rng)
         return
     claims = bool(landmarks) and not statuses and _CLAIMS_ARRIVAL.search(words.text.lower()) is not None
@@ -316,7 +317,8 @@ def _confusion(
     state.feel(Happening.MISUNDERSTOOD, view.time)
     last, goal = state.speech.last, state.task.goal
     lately = state.speech.has_just_spoken(view.time, state.config.checked_within)
-    if last is not None and lately and _is_of_the_moment(last):
+    ordered = last is not None and last.act.move is DialogueMove.INSTRUCT and bool(last.act.slots)
+    if last is not None and lately and (not ordered or _is_of_the_moment(last)):
         state.say_first(replace(last, text="", joined=False))
     elif state.guidance.guiding and state.guidance.step is not None:
         _name_step(state, view, DialogueMove.CLARIFY, rng)

@@ -23,7 +23,7 @@ from dorothie_gym.policies.observation_parser import SeenSubgoal
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, route_length, story_remark, switch_target
 from dorothie_gym.policies.participant.guidance import next_step, note_step
-from dorothie_gym.policies.participant.hints import hint
+from dorothie_gym.policies.participant.hints import hint, is_in_mind
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
@@ -108,7 +108,7 @@ def addition(state: ParticipantState, view: ParticipantView, rng: np.random.Gene
     """Returns a hint or reason to add to an answer, or nothing, by chance."""
     if rng.random() >= state.style.reasons:
         return ()
-    if state.guidance.guiding or rng.random() < 0.5:
+    if state.guidance.guiding or not is_in_mind(state, view) or rng.random() < 0.5:
         return hint(state, view, rng)
     return story_remark(state, view, rng)
 
