@@ -5,7 +5,8 @@ The rules use utterances and arrivals only, so that a live session and its recor
 1. An act targets a landmark if the landmark is a goal and the act commands, asks, checks, or mentions a status. Among
    several targets in one utterance, the last one without a finished or pending status counts.
 2. An act with a target continues the transaction of that landmark, or starts one. This includes pending goals (Pending)
-   and finished goals (Complete, Abandoned), which do not replace the current transaction.
+   and finished goals (Complete, Abandoned), which do not replace the current transaction. Where several goals bear the
+   name of the landmark, such as two houses, one that is named after the last one is over is the next of them.
 3. An act without a target belongs to the transaction of its exchange, otherwise to the current transaction.
 4. A transaction ends when its landmark is reached or abandoned. The next command, or question for the next goal, starts
    another transaction, whose landmark is None until one is named.
@@ -13,6 +14,7 @@ The rules use utterances and arrivals only, so that a live session and its recor
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -53,7 +55,7 @@ class TransactionTracker:
             goals: landmarks of the subgoals, including those that may be added later.
         """
         self.transactions: list[Transaction] = []
-        self._goals = set(goals) - _NO_GOALS
+        self._goals = Counter(goal for goal in goals if goal not in _NO_GOALS)
         self._current: Transaction | None = None
         self._by_exchange: dict[int, Transaction] = {}
 
@@ -81,7 +83,7 @@ class TransactionTracker:
         """Processes a change of a subgoal: adds its landmark to the goals, or ends its transaction."""
         if landmark in _NO_GOALS:
             return
-        self._goals.add(landmark)
+        self._goals[landmark] = max(self._goals[landmark], 1)
         found = self._of(landmark)
         if found is not None and status in _OVER:
             found.over = True
@@ -100,7 +102,7 @@ class TransactionTracker:
                 continue
             goals = [name for name in named if name in self._goals]
             # "Not this one but that one" names two goals: the one without a transaction is the new one.
-            fresh = [name for name in goals if self._of(name) is None]
+            fresh = [name for name in goals if self._of(name) is None or self._is_next_of_its_name(name)]
             if goals:
                 status = next((status for status in statuses if status not in _ASIDE), None)
                 if status is None and statuses and len(goals) == 1:
@@ -115,7 +117,8 @@ class TransactionTracker:
         return move in _AIMING
 
     def _aimed(self, landmark: LandmarkName, status: GoalStatus | None) -> Transaction:
-        transaction = self._of(landmark)
+        again = status not in _OVER and self._is_next_of_its_name(landmark)
+        transaction = None if again else self._of(landmark)
         current = self._current
         if transaction is None and self._is_anonymous(current) and status not in _ASIDE:
             assert current is not None
@@ -140,7 +143,13 @@ class TransactionTracker:
         return current
 
     def _of(self, landmark: LandmarkName) -> Transaction | None:
-        return next((each for each in self.transactions if each.landmark is landmark), None)
+        """Returns the latest transaction of a landmark."""
+        return next((each for each in reversed(self.transactions) if each.landmark is landmark), None)
+
+    def _is_next_of_its_name(self, landmark: LandmarkName) -> bool:
+        """Returns whether the goals of a name talked about so far are over, and there is another one."""
+        known = [each for each in self.transactions if each.landmark is landmark]
+        return bool(known) and all(each.over for each in known) and len(known) < self._goals[landmark]
 
     def _begin(self, landmark: LandmarkName | None) -> Transaction:
         self.transactions.append(Transaction(len(self.transactions), landmark))

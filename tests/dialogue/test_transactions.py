@@ -89,3 +89,16 @@ def test_current_goal_precedes_pending_goal_in_one_utterance() -> None:
         utterance = Utterance(Role.PARTICIPANT, tuple(Span("words", act) for act in acts), float(k), k + 0.5)
         assert tracker.update(utterance, (k, k)) == 0
     assert [each.landmark for each in tracker.transactions] == [KFC]
+
+
+def test_two_houses_are_two_transactions() -> None:
+    house = LandmarkName.HOUSE
+    drive = Drive(house, house, KFC)
+    assert drive.say(0, M.INSTRUCT, house) == 0
+    assert drive.say(1, M.CHECK, house, speaker=Role.CO_WIZARD) == 0
+    drive.tracker.note(house, S.COMPLETE)
+    assert drive.say(2, M.EXPLAIN, house, S.COMPLETE) == 0
+    assert drive.say(3, M.INSTRUCT, house) == 1
+    drive.tracker.note(house, S.COMPLETE)
+    assert drive.say(4, M.INSTRUCT, house) == 1  # there is no third one
+    assert drive.say(5, M.INSTRUCT, KFC) == 2
