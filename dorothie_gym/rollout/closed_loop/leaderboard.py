@@ -42,7 +42,7 @@ PART_TITLES: Final[Mapping[str, str]] = {
 ENOUGH: Final = 100
 """Number of sessions of a row from which on it is compared; as `submission.Protocol`."""
 
-_KINDS: Final = (*(kind.name.lower() for kind in ExceptionKind), NO_EXCEPTION)
+_KINDS: Final = (*(kind.name.lower() for kind in ExceptionKind if kind is not ExceptionKind.NONE), NO_EXCEPTION)
 
 PAGE_METRICS: Final = (
     "success", "goal_condition_success", "spl", "route_completion", "infraction_score", "driving_score", "seconds",

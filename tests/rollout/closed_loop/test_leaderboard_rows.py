@@ -37,6 +37,8 @@ def test_one_command_plays_and_ranks_and_makes_the_same_figures_elsewhere(tmp_pa
     assert one["sha256"] == two["sha256"]
     page = (tmp_path / "one" / "board.md").read_text()
     assert one["sha256"] in page and "### Unseen towns, by exception" in page
+    heads = [line for line in page.splitlines() if line.startswith("| Co-Wizard |") and "| none |" in line]
+    assert heads and all(line.count("none") == 1 for line in heads)
     assert f"Rows of fewer than {ENOUGH} sessions" in page
     assert board(tmp_path / "one")["sha256"] == one["sha256"]  # from the folder, without playing
     rollout = tmp_path / "one" / "runs" / "unseen-silent" / "rollout.json"
