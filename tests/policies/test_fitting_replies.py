@@ -16,8 +16,10 @@ from dorothie_gym.policies.co_wizard.initiative import take_initiative
 from dorothie_gym.policies.co_wizard.judgement import believes
 from dorothie_gym.policies.participant.goals import message_remark
 from dorothie_gym.policies.participant.hints import hint, is_in_mind
+from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.speech import remark
 from dorothie_gym.spaces import Motion
+from tests.policies.said import with_words
 from tests.policies.test_co_wizard import Talk
 from tests.policies.test_reasons import DRIVING, on_the_way, view_of
 from tests.policies.test_repairs import Human
@@ -98,9 +100,8 @@ def test_question_whether_one_is_heard_has_another_answer_than_whether_it_was_un
     topics = []
     for words in ("Are you still there?", "did you get that?"):
         human = Human()
-        said = understand(words)
-        assert said.question
-        human.hears(M.ALIGN, wording=Wording(topic="hearing" if said.about_hearing else "understood"))
+        human.observation = with_words(human.observation, Role.CO_WIZARD, words, DialogueAct.of(M.ALIGN))
+        listen(human.state, human.view, human.rng)
         topics.append(human.state.speech.queue[0].wording.topic)
     assert topics == ["hears", "align"]
 
