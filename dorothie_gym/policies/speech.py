@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, Self, TypeVar
@@ -207,22 +207,21 @@ class SpeechState:
         """Drops the queued statements of what the other speaker has just said; what is joined to them stays."""
         if told is None:
             return self
-        kept, dropped = [], False
-        for item in self.queue:
-            same = item.act.move is DialogueMove.EXPLAIN and any(said.contains(told) for said in item.meaning)
-            if not same:
-                kept.append(replace(item, joined=False) if dropped and item.joined else item)
-            dropped = same
-        return replace(self, queue=tuple(kept))
+        return self._without(
+            lambda item: item.act.move is DialogueMove.EXPLAIN and any(said.contains(told) for said in item.meaning)
+        )
 
     def without_statements(self, predicates: Collection[Predicate]) -> SpeechState:
         """Drops the queued remarks about some predicates; what is joined to them stays."""
+        return self._without(lambda item: any(said.predicate in predicates for said in item.meaning))
+
+    def _without(self, drops: Callable[[Remark], bool]) -> SpeechState:
+        """Drops queued remarks; a remark that was joined to one of them begins an utterance of its own."""
         kept, dropped = [], False
         for item in self.queue:
-            about = any(said.predicate in predicates for said in item.meaning)
-            if not about:
-                kept.append(replace(item, joined=False) if dropped and item.joined else item)
-            dropped = about
+            former, dropped = dropped, drops(item)
+            if not dropped:
+                kept.append(replace(item, joined=False) if former and item.joined else item)
         return replace(self, queue=tuple(kept))
 
     def hold(self, until: float) -> SpeechState:

@@ -4,16 +4,32 @@ from __future__ import annotations
 
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, is_partly_inaudible
-from dorothie_gym.ontology import ActionValue, Slot
+from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Slot
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.goals import doubt
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import HeardUtterance
-from dorothie_gym.policies.speech import intend
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.speech import intend, repeated
 
 FRAGMENT = 3
 """Largest number of words that are taken for the rest of a misheard utterance if they make no sense."""
+
+
+_REPEATABLE = contents.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
+"""Moves that are worth saying again."""
+
+_WITHOUT_CONTENT = frozenset(
+    {
+        DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT, DialogueMove.REPLY_Y,
+        DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFUSE,
+    }
+)  # fmt: skip
+"""Moves that may be said without any content."""
+
+_CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predicate.KNOWS})
+"""What is repeated as "I said ..."; other statements are made again as they were."""
 
 
 def is_garbled(words: ParsedText) -> bool:
@@ -27,10 +43,38 @@ def is_unclear(state: CoWizardState, view: CoWizardView, heard: HeardUtterance) 
     return is_partly_inaudible(heard.words.text) and not stops and state.speech.may_ask_back(view.time)
 
 
+def is_unclear_reply(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> bool:
+    """Returns whether a reply answers neither the question nor what the Co-Wizard has just asked back."""
+    if words.order is not None or act.slots:
+        return False
+    asked_back = act.move is DialogueMove.CLARIFY and state.speech.has_just_asked_back
+    asked = view.time - state.dialogue.asked_at < state.config.answer_time
+    return asked or (asked_back and state.speech.may_ask_back(view.time))
+
+
 def expects_stop(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
     """Returns whether words without sense probably ask to stop: the car is being guided to a place, and it is near."""
     guided = state.beliefs.goal is not None and not state.beliefs.exact and state.route.progress is None
     return guided and not view.standing and (state.intentions.creeping or "here" in words.text.lower().split())
+
+
+def repeat_last(state: CoWizardState) -> None:
+    """Repeats the last remark, or the last of some content in its utterance."""
+    latest = state.speech.last
+    if latest is not None and latest.act.move in _WITHOUT_CONTENT and not latest.act.slots and not latest.joined:
+        state.say(replace(latest, text=""))
+        return
+    said = [
+        item
+        for place, item in enumerate(state.speech.said, start=1)
+        if item.act.move in _REPEATABLE or (place == len(state.speech.said) and item.act.slots)
+    ]
+    if not said:
+        return
+    last = said[-1]
+    corrects = last.act.slots and bool({said.predicate for said in last.meaning} & _CORRECTED)
+    again = corrects and last.act.move not in contents.QUESTIONS
+    state.say(repeated(last, Function.CORRECTION) if again else replace(last, text="", joined=False))
 
 
 def note_contradiction(state: CoWizardState, view: CoWizardView, action: ActionValue, words: ParsedText) -> bool:

@@ -37,7 +37,15 @@ from dorothie_gym.policies.co_wizard.goals import (
 from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, do_turn
 from dorothie_gym.policies.co_wizard.judgement import believes
 from dorothie_gym.policies.co_wizard.obstacles import take_detour
-from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, is_garbled, is_unclear, note_contradiction
+from dorothie_gym.policies.co_wizard.repairs import (
+    check_goal,
+    expects_stop,
+    is_garbled,
+    is_unclear,
+    is_unclear_reply,
+    note_contradiction,
+    repeat_last,
+)
 from dorothie_gym.policies.co_wizard.repetition import note_order
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive
 from dorothie_gym.policies.co_wizard.story import note_owner, remember
@@ -46,7 +54,7 @@ from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.sight import camera_fault
-from dorothie_gym.policies.speech import Remark, intend, repeated
+from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.turn_lanes import junction_meant
 
 NEAR = 100
@@ -59,18 +67,6 @@ _COMMANDS = _STEERING | {ActionValue.STOP}
 _STOP_AHEAD = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
 _SETTLED = contents.QUESTIONS | {DialogueMove.ALIGN}
 _PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
-_REPEATABLE = contents.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
-_WITHOUT_CONTENT = frozenset(
-    {
-        DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT, DialogueMove.REPLY_Y,
-        DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFUSE,
-    }
-)  # fmt: skip
-"""Moves that may be said without any content."""
-
-_CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predicate.KNOWS})
-"""What is repeated as "I said ..."; other statements are made again as they were."""
-
 _UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
 
 
@@ -378,19 +374,10 @@ def _reply(
         acknowledge(state, view, ActionValue.J_TURN, words, rng)
     elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
         _reply_with_place(state, view, act, rng)
-    elif _is_unclear_reply(state, view, act, words):
+    elif is_unclear_reply(state, view, act, words):
         state.say(intend(Function.NEGATIVE_FEEDBACK))
     elif rng.random() < 0.5:
         state.say(sign_of_hearing("answered"))
-
-
-def _is_unclear_reply(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> bool:
-    """Returns whether a reply answers neither the question nor what the Co-Wizard has just asked back."""
-    if words.order is not None or act.slots:
-        return False
-    asked_back = act.move is DialogueMove.CLARIFY and state.speech.has_just_asked_back
-    asked = view.time - state.dialogue.asked_at < state.config.answer_time
-    return asked or (asked_back and state.speech.may_ask_back(view.time))
 
 
 def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
@@ -475,23 +462,9 @@ def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Propo
 def _confusion(
     state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
 ) -> None:
-    """Repeats the last remark, or the last of some content in its utterance."""
+    """Says again what was not understood."""
     state.feel(Happening.MISUNDERSTOOD, view.time)
-    latest = state.speech.last
-    if latest is not None and latest.act.move in _WITHOUT_CONTENT and not latest.act.slots and not latest.joined:
-        state.say(replace(latest, text=""))
-        return
-    said = [
-        item
-        for place, item in enumerate(state.speech.said, start=1)
-        if item.act.move in _REPEATABLE or (place == len(state.speech.said) and item.act.slots)
-    ]
-    if not said:
-        return
-    last = said[-1]
-    corrects = last.act.slots and bool({said.predicate for said in last.meaning} & _CORRECTED)
-    again = corrects and last.act.move not in contents.QUESTIONS
-    state.say(repeated(last, Function.CORRECTION) if again else replace(last, text="", joined=False))
+    repeat_last(state)
 
 
 def _small_talk(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,19 +21,18 @@ from dorothie_gym.policies import contents
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby, looks_remark
+from dorothie_gym.policies.participant.messages import (
+    LONGEST_REASON,
+    message_remark,
+    refers_back,
+    seconds_to_take_in,
+)
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.tasks.purposes import Purpose, ReadMessage, read_message, read_purposes
-from dorothie_gym.tasks.storyboard import Channel
-
-READING_RATE = 4.0
-"""Rate at which a message is read [words/s] (Brysbaert, Journal of Memory and Language 109, 2019: 238 a minute)."""
-
-HEARING_RATE = 2.7
-"""Rate at which the words of a caller are heard [words/s]."""
+from dorothie_gym.tasks.purposes import Purpose, read_purposes
 
 # --- changes of the tasks -------------------------------------------------------------------------------------------
 
@@ -42,10 +40,7 @@ HEARING_RATE = 2.7
 def note_tasks(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
     """Compares the subgoals with those of the last decision, and reports what has changed."""
     before, tasks = state.task, str(view.raw["tasks"])
-    message = _message(view)
-    if message is not None:
-        rate = HEARING_RATE if message.channel is Channel.CALL else READING_RATE
-        state.speech = state.speech.hold(view.time + len(message.text.split()) / rate)
+    state.speech = state.speech.hold(view.time + seconds_to_take_in(view))
     state.task = state.task.with_subgoals(view.subgoals, tasks)
     for old, new in zip(before.subgoals, view.subgoals, strict=False):
         if new.reached and not old.reached:
@@ -320,13 +315,9 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
     return intend(Function.REQUEST, goal)
 
 
-IN_MIND = 15.0
+_SPOKEN_OF = 15.0
 """Time for which who was spoken of is understood as "she" [s]."""
 
-LONGEST_REASON = 55
-"""Longest purpose or reason that is said [characters]."""
-
-_PRONOUN = re.compile(r"\b(he|she|it|they|him|her|his|its|them|their|theirs|this|that|those|these)\b")
 
 PURPOSES = 0.75
 """Probability that an errand is explained by what it is for rather than by why it matters."""
@@ -342,7 +333,7 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
         for topic, text in (("purpose", told.action), ("reason", told.reason))
         if text is not None and len(text) <= LONGEST_REASON
     }
-    if told.reason is not None and _PRONOUN.search(told.reason) and not _has_told_purpose(state, view, goal):
+    if told.reason is not None and refers_back(told.reason) and not _has_told_purpose(state, view, goal):
         options.pop("reason", None)  # who "she" is has to be said first
     if not options:
         return ()
@@ -363,31 +354,11 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 def _has_told_purpose(state: ParticipantState, view: ParticipantView, goal: SeenLandmark) -> bool:
     """Returns whether a recent remark has told what the target is for, and thereby who or what is spoken of."""
-    if not state.speech.has_just_spoken(view.time, IN_MIND):
+    if not state.speech.has_just_spoken(view.time, _SPOKEN_OF):
         return False
     recent = (said for item in state.speech.said[-3:] for said in item.meaning)
     purposes = (said for said in recent if said.predicate is Predicate.PURPOSE and said.get("place") is goal.name)
     return any(said.get("purpose") is not None for said in purposes)
-
-
-def message_remark(
-    state: ParticipantState, view: ParticipantView, landmark: SeenLandmark, rng: np.random.Generator
-) -> tuple[Remark, ...]:
-    """Returns who has just sent a message about an errand, and why; nothing without a reason, or by chance."""
-    read = _message(view)
-    if read is None or read.reason is None or len(read.reason) > LONGEST_REASON:
-        return ()
-    if rng.random() >= state.config.tells_message or (read.sender is None and _PRONOUN.search(read.reason)):
-        return ()
-    said = Proposition.of(Predicate.PURPOSE, place=landmark.name, person=read.sender, reason=read.reason)
-    topic = "reason_after" if read.sender is None else "message"
-    return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
-
-
-def _message(view: ParticipantView) -> ReadMessage | None:
-    """Returns the message that has just arrived; None without one."""
-    text = str(view.raw["message"])
-    return read_message(text) if text else None
 
 
 def _as_afterthought(item: Remark) -> Remark:

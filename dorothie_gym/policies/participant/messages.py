@@ -1,0 +1,59 @@
+"""Messages to the participant: the time to read them or to hear them out, and what is told of them."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue import Predicate, Proposition, Wording
+from dorothie_gym.dialogue.conversation import WORDS_PER_SECOND
+from dorothie_gym.policies.observation_parser import SeenLandmark
+from dorothie_gym.policies.participant.state import ParticipantState
+from dorothie_gym.policies.participant.view import ParticipantView
+from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.tasks.purposes import ReadMessage, read_message
+from dorothie_gym.tasks.storyboard import Channel
+
+READING_RATE = 4.0
+"""Rate at which a message is read [words/s] (Brysbaert, Journal of Memory and Language 109, 2019: 238 a minute)."""
+
+LONGEST_REASON = 55
+"""Longest purpose or reason that is said [characters]."""
+
+_PRONOUN = re.compile(r"\b(he|she|it|they|him|her|his|its|them|their|theirs|this|that|those|these)\b")
+
+
+def refers_back(text: str) -> bool:
+    """Returns whether a text has a pronoun, so that who or what is meant has to be said before."""
+    return _PRONOUN.search(text) is not None
+
+
+def seconds_to_take_in(view: ParticipantView) -> float:
+    """Returns the time to read the message that has just arrived, or to hear a caller out [s]; 0 without one."""
+    message = _message(view)
+    if message is None:
+        return 0.0
+    rate = WORDS_PER_SECOND if message.channel is Channel.CALL else READING_RATE
+    return len(message.text.split()) / rate
+
+
+def message_remark(
+    state: ParticipantState, view: ParticipantView, landmark: SeenLandmark, rng: np.random.Generator
+) -> tuple[Remark, ...]:
+    """Returns who has just sent a message about an errand, and why; nothing without a reason, or by chance."""
+    read = _message(view)
+    if read is None or read.reason is None or len(read.reason) > LONGEST_REASON:
+        return ()
+    if rng.random() >= state.config.tells_message or (read.sender is None and refers_back(read.reason)):
+        return ()
+    said = Proposition.of(Predicate.PURPOSE, place=landmark.name, person=read.sender, reason=read.reason)
+    topic = "reason_after" if read.sender is None else "message"
+    return (intend(Function.INFORM, said, elided=("place",), wording=Wording(topic=topic), joined=True),)
+
+
+def _message(view: ParticipantView) -> ReadMessage | None:
+    """Returns the message that has just arrived; None without one."""
+    text = str(view.raw["message"])
+    return read_message(text) if text else None
