@@ -99,7 +99,8 @@ def train_rl(
 
     The folder receives the model (weights in safetensors, the rest in JSON), the best model so far, a line of JSON per
     evaluation, and the learning curve. Ctrl-C saves the run; the same command resumes it. selfplay trains all three
-    roles at once, each in its own folder that rollout can play; --set shared=true gives them one network.
+    roles at once, each in its own folder that rollout can play; --set shared=true gives them one network, and
+    --set co_wizard=POLICY --set participant=POLICY trains an Ad-Wizard against these.
     """
     given = _read_settings(setting or []) | ({} if observation is None else {"observation": observation})
     changes: Given = {
@@ -252,7 +253,7 @@ def _train_selfplay(out: Path, given: Given, changes: Given, *, ray: str | None,
     if as_json:
         print_json(_facts(result, settings))
     else:
-        _show_selfplay(result)
+        _show_selfplay(result, settings)
     if not result.finished:
         command = _command(["selfplay", "--out", str(out)], given, settings, ray)
         _exit_interrupted(result.steps, settings, out, command)
@@ -266,7 +267,7 @@ def _selfplay_line(row: SelfPlayEvaluation) -> str:
     )
 
 
-def _show_selfplay(result: TrainingResult[SelfPlayEvaluation]) -> None:
+def _show_selfplay(result: TrainingResult[SelfPlayEvaluation], settings: SelfPlaySettings) -> None:
     from dorothie_gym.baselines.rl.run import CURVE
 
     console = stdout()
@@ -274,7 +275,8 @@ def _show_selfplay(result: TrainingResult[SelfPlayEvaluation]) -> None:
     if result.rows:
         console.print(f"Curve: {result.folder / CURVE}", markup=False, soft_wrap=True)
     if result.steps:
-        roles = " ".join(f"--{role.replace('_', '-')} {shlex.quote(str(result.folder / role))}" for role in AGENT_ROLES)
+        players = {role: settings.partners.get(role, str(result.folder / role)) for role in AGENT_ROLES}
+        roles = " ".join(f"--{role.replace('_', '-')} {shlex.quote(name)}" for role, name in players.items())
         console.print(f"Play: dorothie-gym rollout {roles}", markup=False, soft_wrap=True)
 
 

@@ -11,6 +11,7 @@ from typing import Any, Final, Self, TypeAlias
 import yaml
 
 from dorothie_gym.errors import SettingsError, did_you_mean, short_repr
+from dorothie_gym.ontology import Role
 
 Arguments: TypeAlias = Mapping[str, Any]
 """Keyword arguments of an environment or an algorithm, of any type; both check them."""
@@ -250,7 +251,10 @@ def _given(changes: Arguments) -> Page:
 SELFPLAY: Final = "selfplay"
 """Name of the algorithm at the command line, and kind of its models in `model.json`."""
 
-ENV_FIELDS: Final = ("town", "storyboard", "traffic", "max_seconds", "progress")
+PARTNERS: Final = ("participant", "co_wizard")
+"""Settings of self-play: roles that a policy can play instead of a network that learns."""
+
+ENV_FIELDS: Final = ("town", "storyboard", "traffic", "max_seconds", "progress", *PARTNERS)
 """Settings of self-play that are arguments of `SelfPlayEnv`."""
 
 PARTIAL_FIELDS: Final = ("past_environments", "coached_environments")
@@ -264,6 +268,8 @@ class SelfPlaySettings(RunSettings):
     Attributes:
         shared: whether one network plays all roles; otherwise each role has its own.
         town, storyboard, traffic, max_seconds, progress: see `SelfPlayEnv`.
+        participant, co_wizard: name or path of the policy that plays the role in all sessions; None for a network that
+            learns. With both, only the Ad-Wizard learns.
         coached_environments: number of environments in which Co-Wizard and participant take turns to learn while the
             other roles are scripted. Agents that learn only from each other have to invent a language, which may
             differ from that of the corpus (Lowe et al. 2020, "On the interaction between supervision and self-play in
@@ -281,12 +287,17 @@ class SelfPlaySettings(RunSettings):
     traffic: str = "light"
     max_seconds: float = 600.0
     progress: float = 0.02
+    participant: str | None = None
+    co_wizard: str | None = None
     coached_environments: int = 0
     past_environments: int = 0
 
     def __post_init__(self) -> None:
         if not isinstance(self.shared, bool):
             raise SettingsError(f"shared is {self.shared!r}; it must be true or false")
+        for name in PARTNERS:
+            if not isinstance(getattr(self, name), str | None):
+                raise SettingsError(f"{name} is {getattr(self, name)!r}; it must be the name or path of a policy")
         super().__post_init__()
         left = self.environments - 1
         for name in PARTIAL_FIELDS:
@@ -294,6 +305,17 @@ class SelfPlaySettings(RunSettings):
             if not isinstance(value, int) or not 0 <= value <= left:
                 raise SettingsError(f"{name} is {value!r}; it must be in 0..{left}: all roles learn in at least one")
             left -= value
+        if self.partners and self.coached_environments:
+            raise SettingsError(
+                f"coached_environments is {self.coached_environments}; it must be 0 where a policy plays "
+                f"{' and '.join(self.partners)}"
+            )
+
+    @property
+    def partners(self) -> Mapping[Role, str]:
+        """Names or paths of the policies that play roles in all sessions."""
+        found = {Role(name): getattr(self, name) for name in PARTNERS}
+        return {role: name for role, name in found.items() if name is not None}
 
     @property
     def env_settings(self) -> Page:
@@ -328,5 +350,7 @@ def selfplay_settings(given: Arguments | None = None, **changes: object) -> Self
     found = {**tuned, **_given(changes), **given}
     for name in set(PARTIAL_FIELDS) - set(given):  # in proportion, where there are fewer environments
         found[name] = tuned[name] * min(found["environments"], tuned["environments"]) // tuned["environments"]
+    if "coached_environments" not in given and any(found.get(name) is not None for name in PARTNERS):
+        found["coached_environments"] = 0  # nobody is coached where a role does not learn
     assert set(found) <= {each.name for each in fields(SelfPlaySettings)}
     return SelfPlaySettings(**found)

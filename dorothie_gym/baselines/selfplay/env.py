@@ -26,13 +26,13 @@ from dorothie_gym.envs.navigation_config import TRAFFIC
 from dorothie_gym.errors import SettingsError, StoryboardError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import make_policy
+from dorothie_gym.policies import find_player, make_policy
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.policies.policy import AnyPolicy, policy_seed
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.ego.planner import LocalPlanner
-from dorothie_gym.spaces import ActionDict, Observation, SpaceLimits, StepInfo
+from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, SpaceLimits, StepInfo
 
 _PARTICIPANT = AGENT_ROLES.index(Role.PARTICIPANT)
 
@@ -137,7 +137,8 @@ class RolePlayers:
     Attributes:
         scripted: roles that the built-in policies play; a change takes effect at the next session.
         memories: memories of the roles, each of the type that its interface uses.
-        policy_states: states of the scripted roles.
+        policies: policies that play roles in this session.
+        policy_states: their states.
         render_mode: None, which stable-baselines3 asks for.
     """
 
@@ -146,6 +147,7 @@ class RolePlayers:
     def __init__(self, town: Town, scripted: Collection[Role]) -> None:
         self.scripted = scripted
         self.memories: list[Any] = []
+        self.policies: Mapping[Role, AnyPolicy] = {}
         self.policy_states: dict[Role, object] = {}
         self._cost_to_go = CostToGo(town)
         self._distance = math.inf  # to the current subgoal [m]
@@ -188,6 +190,8 @@ class SelfPlaySessions:
         traffic: str = "light",
         max_seconds: float = 600.0,
         progress: float = 0.02,
+        participant: str | None = None,
+        co_wizard: str | None = None,
         scripted: Collection[Role] = (),
         threads: int | None = None,
     ) -> None:
@@ -200,7 +204,9 @@ class SelfPlaySessions:
             traffic: "none", "light", "medium" or "heavy".
             max_seconds: length of a session [s].
             progress: reward per metre; a potential difference, which does not change the optimal policies.
-            scripted: roles that the built-in policies play; actions for these roles are ignored.
+            participant: name or path of the policy that plays the participant; None for numbers of actions.
+            co_wizard: the same for the Co-Wizard.
+            scripted: roles that the built-in policies play; actions for roles that a policy plays are ignored.
             threads: number of threads; None for one per processor.
 
         Raises:
@@ -219,11 +225,13 @@ class SelfPlaySessions:
             raise SettingsError(f"selfplay: {error}") from error
         limits, self.town = self.duo.limits, self.duo.towns[0]
         self._policies = {role: make_policy("scripted", role, limits) for role in AGENT_ROLES}
+        self._partners = _partners({Role.PARTICIPANT: participant, Role.CO_WIZARD: co_wizard}, limits)
         self.interfaces = [make_interface(role, self.town, limits) for role in AGENT_ROLES]
         self.layout = RoleLayout.of(limits)
         self.players = [RolePlayers(self.town, scripted) for _ in range(count)]
         self.rows: Vector = np.zeros((count, self.layout.width), dtype=np.float32)
         self._seen: dict[str, list[Observation]] = {str(role): [{}] * count for role in AGENT_ROLES}
+        self._masks: dict[str, list[ActionMapping]] = {str(role): [{}] * count for role in AGENT_ROLES}
 
     def observation(self, role: Role, number: int) -> Observation:
         """Returns the present observation of a role in a session."""
@@ -242,9 +250,10 @@ class SelfPlaySessions:
         for number in seeds:
             player, scenario = self.players[number], self.duo.engines[number].scenario
             player.memories = [interface.initial_memory() for interface in self.interfaces]
+            player.policies = {**{role: self._policies[role] for role in player.scripted}, **self._partners}
             player.policy_states = {
-                role: self._policies[role].initial_state(policy_seed(scenario.seed, role), self.town)
-                for role in player.scripted
+                role: policy.initial_state(policy_seed(scenario.seed, role), self.town)
+                for role, policy in player.policies.items()
             }
         self._look(sorted(seeds), observations, infos)
 
@@ -291,10 +300,10 @@ class SelfPlaySessions:
         player, actions = self.players[number], {}
         for k, (role, choice) in enumerate(zip(AGENT_ROLES, choices, strict=True)):
             seen = self._seen[role][number]
-            if role in player.policy_states:
-                actions[str(role)], player.policy_states[role] = self._policies[role].step(
-                    seen, player.policy_states[role]
-                )
+            policy = player.policies.get(role)
+            if policy is not None:
+                given = {**seen, "action_mask": self._masks[role][number]} if policy.reads_mask else seen
+                actions[str(role)], player.policy_states[role] = policy.step(given, player.policy_states[role])
                 continue
             own, player.memories[k] = self.interfaces[k].act(choice, seen, player.memories[k])
             actions[str(role)] = own.encode(self.duo.limits)
@@ -312,13 +321,21 @@ class SelfPlaySessions:
                 permitted = {name: None if mask is None else mask[number] for name, mask in allowed.items()}
                 own.append(interface.mask(seen, memory) & interface.permitted(seen, memory, permitted))
                 memories.append(memory)
-                self._seen[role][number] = seen
+                self._seen[role][number], self._masks[role][number] = seen, permitted
             masks.append(own)
             chosen = {name: stacked[name][numbers] for name in (*interface.fields, "pose")}
             vectors.append(interface.vectors(chosen, [self._seen[role][number] for number in numbers], memories))
         self.rows[numbers] = np.concatenate([*vectors, *masks], axis=1)
         for number in numbers:
             self.players[number].set_target(self._planner(number))
+
+
+def _partners(names: Mapping[Role, str | None], limits: SpaceLimits) -> dict[Role, AnyPolicy]:
+    """Returns the policies that play roles in all sessions; raises `SettingsError` if one cannot be found or read."""
+    try:
+        return {role: find_player(name, role).make(role, limits) for role, name in names.items() if name is not None}
+    except ValueError as error:
+        raise SettingsError(f"selfplay: {error}") from error
 
 
 # --- Environment ------------------------------------------------------------------------------------------------------
@@ -330,7 +347,7 @@ class SelfPlayEnv(gym.Env[Vector, NDArray[np.int64]]):
     `info["rewards"]` holds the three rewards; the returned reward is that of the team.
 
     Args:
-        town, storyboard, traffic, max_seconds, progress, scripted: see `SelfPlaySessions`.
+        town, storyboard, traffic, max_seconds, progress, participant, co_wizard, scripted: see `SelfPlaySessions`.
 
     Raises:
         SettingsError: an argument is invalid.
@@ -343,9 +360,13 @@ class SelfPlayEnv(gym.Env[Vector, NDArray[np.int64]]):
         traffic: str = "light",
         max_seconds: float = 600.0,
         progress: float = 0.02,
+        participant: str | None = None,
+        co_wizard: str | None = None,
         scripted: Collection[Role] = (),
     ) -> None:
-        self.sessions = SelfPlaySessions(1, town, storyboard, traffic, max_seconds, progress, scripted, threads=1)
+        self.sessions = SelfPlaySessions(
+            1, town, storyboard, traffic, max_seconds, progress, participant, co_wizard, scripted, threads=1
+        )
         self.layout = self.sessions.layout
         self.observation_space = self.layout.observation_space
         self.action_space = self.layout.action_space

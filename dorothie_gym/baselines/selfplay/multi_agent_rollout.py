@@ -70,9 +70,9 @@ class MultiAgentRollout:
 
     Attributes:
         layout: layout of the rows.
-        learners: one for each role, or one for all.
+        learners: one for each role that learns, the Ad-Wizard's last, or one for all.
         opponents: past Ad-Wizards, which play in the last few environments.
-        returns: sums of rewards of the sessions without scripted roles that ended since `reset`, by role (n, 3).
+        returns: sums of rewards of the sessions without coaching that ended since `reset`, by role (n, 3).
     """
 
     def __init__(
@@ -92,7 +92,9 @@ class MultiAgentRollout:
         coached = _coached(settings)
         self._unscripted = np.array([env not in coached for env in range(count)])
         environments = {
-            k: [env for env in range(count) if role not in coached.get(env, ())] for k, role in enumerate(AGENT_ROLES)
+            k: [env for env in range(count) if role not in coached.get(env, ())]
+            for k, role in enumerate(AGENT_ROLES)
+            if role not in settings.partners
         }
         del environments[AD_WIZARD][len(environments[AD_WIZARD]) - settings.past_environments :]
         by_learner = (
@@ -101,8 +103,8 @@ class MultiAgentRollout:
             else {str(AGENT_ROLES[k]): {k: envs} for k, envs in environments.items()}
         )
         self.learners = [
-            Learner(name, settings.learner(settings.seed + k), self.layout, own, make_logger(name))
-            for k, (name, own) in enumerate(by_learner.items())
+            Learner(name, settings.learner(settings.seed + min(own)), self.layout, own, make_logger(name))
+            for name, own in by_learner.items()
         ]
         for learner in self.learners:
             learner.cloned = settings.warm_start is not None
@@ -154,7 +156,7 @@ class MultiAgentRollout:
         self._vector.close()
 
     def learner_of(self, role: int) -> Learner:
-        """Returns the learner of a role, given by its index in `AGENT_ROLES`."""
+        """Returns the learner of a role that learns, given by its index in `AGENT_ROLES`."""
         return next(learner for learner in self.learners if role in learner.roles)
 
     def _step(self) -> None:
@@ -183,7 +185,7 @@ class MultiAgentRollout:
 
     def _opponent_actions(self) -> NDArray[np.int64]:
         """Returns the actions of past Ad-Wizards; those of an untrained network while the pool is empty."""
-        padded = self._settings.shared
+        padded = self.learner_of(AD_WIZARD).padded
         rows = self._rows[self._opponent_envs]
         vectors = self.layout.vectors(rows, AD_WIZARD, padded=padded)
         return sample_actions(self._opponent, vectors, self.layout.masks(rows, AD_WIZARD, padded=padded), self._rng)

@@ -54,7 +54,7 @@ class SelfPlayEvaluation(RunEvaluation):
     Attributes:
         scripted: statistics of the team against the scripted Ad-Wizard.
         learned: statistics of the team against the learned Ad-Wizard.
-        returns: mean sum of rewards of each role in the training sessions without scripted roles that ended since the
+        returns: mean sum of rewards of each role in the training sessions without coaching that ended since the
             previous evaluation; None if there were none.
     """
 
@@ -75,7 +75,7 @@ class SelfPlayEvaluation(RunEvaluation):
 class SelfPlayTraining(Run[SelfPlayEvaluation]):
     """Training of all three roles; `run` trains until all steps are done or Ctrl-C is pressed.
 
-    The folder of the run holds a folder with the model of each role.
+    The folder of the run holds a folder with the model of each role that learns.
 
     Attributes:
         settings: settings of the training.
@@ -195,20 +195,25 @@ class SelfPlayTraining(Run[SelfPlayEvaluation]):
         return evaluate_policy(make, self.sampling_policy(FIRST_SEED), self.settings.episodes)
 
     def sampling_policy(self, seed: int) -> Act:
-        """Returns the present policy of all roles on rows of the layout; it samples with a seed."""
+        """Returns the present policy of the roles that learn, on rows of the layout; it samples with a seed."""
         rollout, rng = self.rollout, np.random.default_rng(seed)
-        layout = rollout.layout
+        layout, learning = rollout.layout, self._learning
 
         def act(rows: Vector, masks: NDArray[np.bool_] | None) -> Sequence[NDArray[np.int64]]:
-            chosen = []
-            for role in range(len(AGENT_ROLES)):
+            chosen = np.zeros((len(rows), len(AGENT_ROLES)), dtype=np.int64)
+            for role in learning:
                 learner = rollout.learner_of(role)
                 vectors = layout.vectors(rows, role, padded=learner.padded)
                 role_masks = layout.masks(rows, role, padded=learner.padded)
-                chosen.append(sample_actions(learner.model, vectors, role_masks, rng))
-            return list(np.stack(chosen, axis=1))
+                chosen[:, role] = sample_actions(learner.model, vectors, role_masks, rng)
+            return list(chosen)
 
         return act
+
+    @property
+    def _learning(self) -> list[int]:
+        """Roles that learn, by their index in `AGENT_ROLES`."""
+        return [k for k, role in enumerate(AGENT_ROLES) if role not in self.settings.partners]
 
     def _log(self, row: SelfPlayEvaluation) -> None:
         logger = self.rollout.learners[0].model.logger
@@ -220,8 +225,8 @@ class SelfPlayTraining(Run[SelfPlayEvaluation]):
 
     def _save(self, steps: int) -> None:
         layout = self.rollout.layout
-        for k, role in enumerate(AGENT_ROLES):
-            learner = self.rollout.learner_of(k)
+        for k in self._learning:
+            role, learner = AGENT_ROLES[k], self.rollout.learner_of(k)
             fields = {
                 "kind": SELFPLAY, "role": str(role), "size": layout.sizes[k], "actions": layout.actions[k],
                 "padded": [learner.size, learner.actions] if learner.padded else None,

@@ -65,3 +65,21 @@ def test_models_of_another_role_or_version_are_refused(folder: Path) -> None:
     (folder / "participant" / "model.json").write_text('{"format": 1, "kind": "selfplay"}', encoding="utf-8")
     with pytest.raises(ValueError, match="no model of self-play"):
         read_policy(folder / "participant", Role.PARTICIPANT, DuoWizardEnv().limits)
+
+
+@pytest.mark.parametrize("co_wizard", ["scripted", "pretrained:co-wizard"])
+def test_partners_play_as_in_any_other_session(co_wizard: str) -> None:
+    adversary = SelfPlayEnv("midtown", traffic="none", max_seconds=60.0, participant="scripted", co_wizard=co_wizard)
+    adversary.reset(seed=5)
+    engine, events, over = adversary.sessions.duo.engines[0], list[object](), False
+    while not over:
+        _, _, _, over, _ = adversary.step(np.zeros(3, dtype=np.int64))  # the Ad-Wizard does nothing
+        events.extend(engine.last_events)
+
+    env = DuoWizardEnv("midtown", config=adversary.sessions.duo.config)
+    names = {Role.PARTICIPANT: "scripted", Role.CO_WIZARD: co_wizard, Role.AD_WIZARD: "silent"}
+    cast = {role: find_player(name, role).make(role, env.limits) for role, name in names.items()}
+    played: list[object] = []
+    play_session(env, cast, seed=5, on_step=lambda env: played.extend(env.last_events))
+    assert len(events) > 5 and events == played
+    adversary.close()

@@ -147,6 +147,32 @@ def test_coached_roles_learn_beside_scripted_ones(shared: bool, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("shared", [False, True])
+def test_only_the_ad_wizard_learns_against_two_partners(shared: bool, tmp_path: Path) -> None:
+    settings = settings_for(shared=shared, participant="scripted", co_wizard="lane-follow", max_seconds=30.0)
+    play = SelfPlayTraining(settings, tmp_path / "whole")
+    (learner,) = play.rollout.learners
+    before = {name: value.clone() for name, value in learner.model.policy.state_dict().items()}
+    assert play.run().finished
+    assert any(not torch.equal(value, before[name]) for name, value in learner.model.policy.state_dict().items())
+    assert {path.name for path in (tmp_path / "whole").iterdir() if path.name in AGENT_ROLES} == {"ad_wizard"}
+
+    def press_ctrl_c(done: int, total: int, row: Any) -> None:
+        if done == 80:
+            raise KeyboardInterrupt
+
+    assert not SelfPlayTraining(settings, tmp_path / "cut", press_ctrl_c).run().finished
+    assert SelfPlayTraining(settings, tmp_path / "cut").run().finished
+    one, two = (load_file(tmp_path / run / "ad_wizard" / "model.safetensors") for run in ("whole", "cut"))
+    assert one.keys() == two.keys() and all(torch.equal(value, two[name]) for name, value in one.items())
+
+
+def test_role_without_partner_learns_beside_one(tmp_path: Path) -> None:
+    rollout = SelfPlayTraining(settings_for(co_wizard="scripted"), tmp_path).rollout
+    assert [learner.name for learner in rollout.learners] == ["participant", "ad_wizard"]
+    rollout.close()
+
+
+@pytest.mark.parametrize("shared", [False, True])
 def test_masked_actions_are_never_chosen(shared: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     step, seen = SelfPlaySessions.step, []
 
@@ -193,11 +219,20 @@ def test_runs_with_other_settings_and_damaged_runs_are_refused(tmp_path: Path) -
         ({"shared": "maybe"}, "shared"),
         ({"past_environments": 99}, "past_environments"),
         ({"past_environments": 4, "coached_environments": 12}, "coached_environments"),
+        ({"participant": "scripted", "coached_environments": 2}, "coached_environments"),
+        ({"co_wizard": 7}, "co_wizard"),
     ],
 )
 def test_invalid_settings_are_named(given: dict[str, Any], named: str) -> None:
     with pytest.raises(SettingsError, match=named):
         selfplay_settings(given)
+
+
+def test_partner_that_cannot_be_found_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match=r"nobody.*lane-follow"):
+        SelfPlayTraining(settings_for(co_wizard="nobody"), tmp_path)
+    with pytest.raises(SettingsError, match="participant"):
+        SelfPlayTraining(settings_for(participant="lane-follow"), tmp_path)
 
 
 def test_numbers_of_partial_environments_scale_with_environments() -> None:
