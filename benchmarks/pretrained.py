@@ -44,8 +44,8 @@ GENERATE_TALKS: Final = "generate --sessions 160 --seed 2300 --out talks"
 """Corpus of the learned Co-Wizard."""
 
 _DRIVER: Final = (
-    "train-rl {algorithm} --out {algorithm} --warm-start corpus --steps 100000 --workers 0 --evaluate-every 25000 "
-    f"--episodes 30 --seed {SEED} --set town=midtown --set guidance=goals --set exceptions=2"
+    "train-rl {algorithm} --out {algorithm} --warm-start corpus --steps 1000000 --workers 0 --evaluate-every 100000 "
+    f"--episodes 50 --seed {SEED} --set town=midtown --set guidance=goals --set exceptions=2"
 )
 _READER: Final = "train {row} --corpus corpus --encoder hashing --seeds 1 --workers 1 --out models"
 

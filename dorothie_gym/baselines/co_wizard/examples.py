@@ -87,6 +87,10 @@ def make_example(
 def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Memory, lesson: Lesson) -> Example | None:
     """Returns an example of how a memory that differs from the teacher's gets back to it; None if it does not differ.
 
+    Where the own goal is another place than the teacher's, and the utterance does not say which, the player is to
+    doubt it (a place of the same name) or to give it up: it cannot know the right one, but it no longer plans a route
+    against the directions that it is given.
+
     Args:
         scene: what the player perceived, with its own memory.
         listening: inputs of the first step.
@@ -104,6 +108,8 @@ def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Mem
         goal = int(GoalEvent.KEEP)
     elif led.goal is None:
         goal = int(GoalEvent.CLEAR)
+    elif own.goal_mark >= 0 and (latest is None or led.goal not in latest.places):
+        goal = int(GoalEvent.DOUBT if own.goal is led.goal else GoalEvent.CLEAR)
     elif led.goal_mark in listening.rows:
         goal = len(GoalEvent) + listening.rows.index(led.goal_mark)
     elif led.goal_mark < 0 and latest is not None and led.goal in latest.places[:2]:

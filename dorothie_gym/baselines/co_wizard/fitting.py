@@ -16,8 +16,9 @@ def loss_of(network: CoWizardNetwork, batch: Batch) -> Tensor:
     weight, words = batch.weight, batch.words.long()
     before, values = batch.before.long(), batch.values.long()
     heard = network.listen(batch.listening.float(), words, batch.places.float(), batch.place_count.long(), before)
+    goal_changed = changed_weights(torch.zeros_like(batch.goal), batch.goal)
     losses = [
-        weighted_mean(entropy(heard.goal, batch.goal), weight),
+        weighted_mean(entropy(heard.goal, batch.goal), weight * goal_changed),
         weighted_mean(entropy(heard.status, batch.status), weight),
     ]
     for k, logits in enumerate(heard.values):

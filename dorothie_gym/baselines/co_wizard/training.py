@@ -51,11 +51,15 @@ class CoWizardTraining(RoundSettings):
     Attributes:
         rounds: number of rounds of practice.
         sessions: sessions of practice in a round.
+        max_seconds: time limit of a session of practice [s]; shorter ones would lack the last errands.
+        last_epochs: passes of the last fit.
         talking: share of the time in which the player drives in which it also talks.
     """
 
-    rounds: int = 5
-    sessions: int = 30
+    rounds: int = 8
+    sessions: int = 45
+    max_seconds: float = 600.0
+    last_epochs: int = 16
     talking: float = 0.5
 
 
