@@ -66,44 +66,41 @@ class Recipe:
     """Training of a shipped model: the commands, the folders of the results within the work folder, and the role."""
 
     description: str
-    command: str
+    commands: tuple[str, ...]
     folders: tuple[str, ...]
-    generate: str = GENERATE
     role: Role = Role.CO_WIZARD
 
 
 RECIPES: Final[Mapping[str, Recipe]] = {
     "co-wizard": Recipe(
         description="The learned Co-Wizard understands, remembers, talks and drives",
-        command="train co-wizard --corpus talks --workers 1 --out models",
+        commands=(GENERATE_TALKS, "train co-wizard --corpus talks --workers 2 --out models"),
         folders=(f"models/co-wizard/seed-{SEED}",),
-        generate=GENERATE_TALKS,
     ),
     "participant": Recipe(
         description="The learned participant chooses the next errand, guides and talks",
-        command="train participant --corpus talks --workers 1 --out models",
+        commands=(GENERATE_TALKS, "train participant --corpus talks --workers 2 --out models"),
         folders=(f"models/participant/seed-{SEED}",),
-        generate=GENERATE_TALKS,
         role=Role.PARTICIPANT,
     ),
     "maskable-ppo": Recipe(
         description="MaskablePPO drives; understanding and speech are scripted",
-        command=_DRIVER.format(algorithm="maskable_ppo"),
+        commands=(GENERATE, _DRIVER.format(algorithm="maskable_ppo")),
         folders=("maskable_ppo", f"maskable_ppo/{BEST}"),
     ),
     "ppo": Recipe(
         description="PPO drives; understanding and speech are scripted",
-        command=_DRIVER.format(algorithm="ppo"),
+        commands=(GENERATE, _DRIVER.format(algorithm="ppo")),
         folders=("ppo", f"ppo/{BEST}"),
     ),
     "reader": Recipe(
         description="The Junction Reader understands, answers and drives",
-        command=_READER.format(row="reader"),
+        commands=(GENERATE, _READER.format(row="reader")),
         folders=(f"models/reader/small/seed-{SEED}",),
     ),
     "toto": Recipe(
         description="TOTO (small) understands, answers and drives",
-        command=_READER.format(row="toto"),
+        commands=(GENERATE, _READER.format(row="toto")),
         folders=(f"models/toto/small/seed-{SEED}",),
     ),
 }
@@ -114,7 +111,7 @@ def main(
     names: Annotated[list[str] | None, typer.Argument(help="names of models; by default all")] = None,
     work: Annotated[Path, typer.Option(help="folder of corpus, trainings and rollouts")] = Path("runs/pretrained"),
 ) -> None:
-    """Makes shipped models; all take some 40 minutes of processor time."""
+    """Makes shipped models; all take some hour and a half of processor time."""
     torch.set_num_threads(1)
     chosen = names or list(RECIPES)
     unknown = [name for name in chosen if name not in RECIPES]
@@ -124,8 +121,8 @@ def main(
     work = work.resolve()  # rollouts keep the paths of their models
     for name in chosen:
         recipe = RECIPES[name]
-        _call(recipe.generate, work)
-        _call(recipe.command, work)
+        for command in recipe.commands:
+            _call(command, work)
         card = _export(name, recipe, work, *_choose(recipe, work))
         mean, low, high = (100 * value for value in asdict(card.figures["success"]).values())
         print(f"{PREFIX}{name}: success {mean:.0f} % ({low:.0f} to {high:.0f})", flush=True)
@@ -160,7 +157,7 @@ def _export(name: str, recipe: Recipe, work: Path, trained: Path, result: Rollou
     _check_same_actions(trained, shipped, recipe.role, work / "checks" / name)
     card = PretrainedCard(
         description=recipe.description,
-        commands=tuple(f"dorothie-gym {command}" for command in (recipe.generate, recipe.command)),
+        commands=tuple(f"dorothie-gym {command}" for command in recipe.commands),
         version=__version__,
         licence="MIT",
         seed=SEED,
