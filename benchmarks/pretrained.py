@@ -111,7 +111,7 @@ def main(
     names: Annotated[list[str] | None, typer.Argument(help="names of models; by default all")] = None,
     work: Annotated[Path, typer.Option(help="folder of corpus, trainings and rollouts")] = Path("runs/pretrained"),
 ) -> None:
-    """Makes shipped models; all take some hour and a half of processor time."""
+    """Makes shipped models; all take about an hour and a half of processor time."""
     torch.set_num_threads(1)
     chosen = names or list(RECIPES)
     unknown = [name for name in chosen if name not in RECIPES]

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from dorothie_gym.baselines.co_wizard.features import COMMAND_SIZE, PLACE_SIZE, STATE_SIZE
 from dorothie_gym.baselines.co_wizard.hearing import KEPT, UTTERANCE_SIZE, WORD_BUCKETS
 from dorothie_gym.baselines.co_wizard.memory import FRESH, STATUSES, VARIABLES, GoalEvent
+from dorothie_gym.baselines.imitation.layers import hidden_layers
 
 SIZES: Final = tuple(VARIABLES.values())
 WORD_WIDTH, WIDTH, OPTION_WIDTH, REMARK_WIDTH = 24, 256, 96, 48
@@ -19,7 +20,7 @@ WORD_WIDTH, WIDTH, OPTION_WIDTH, REMARK_WIDTH = 24, 256, 96, 48
 DROPOUT: Final = 0.3
 """Share of the hidden units that are left out in training (Srivastava et al., JMLR 2014).
 
-In the sessions of another training, the loss was 0.42 nats with it and 0.53 without.
+In the sessions of another training, a fit of 20 passes had a loss of 0.42 nats with it; a training without it, 0.53.
 """
 
 
@@ -63,7 +64,7 @@ class CoWizardNetwork(nn.Module):
         self.layout = layout
         hot = sum(SIZES)
         self.words = nn.EmbeddingBag(WORD_BUCKETS, WORD_WIDTH, mode="mean", padding_idx=0)
-        self.listening = _layers(layout.state + WORD_WIDTH, WIDTH)
+        self.listening = hidden_layers(layout.state + WORD_WIDTH, WIDTH, DROPOUT)
         self.values = nn.Linear(WIDTH, hot)
         self.kept = nn.Parameter(torch.full((hot,), 2.0))
         starts = torch.tensor([0, *SIZES[:-1]]).cumsum(0)
@@ -73,7 +74,7 @@ class CoWizardNetwork(nn.Module):
         self.goal = nn.Linear(WIDTH, len(GoalEvent))
         self.place = _Scorer(layout.place)
         self.status = nn.Linear(WIDTH, len(STATUSES))
-        self.acting = _layers(layout.state + WORD_WIDTH, WIDTH)
+        self.acting = hidden_layers(layout.state + WORD_WIDTH, WIDTH, DROPOUT)
         self.command = _Scorer(layout.command)
         self.first = nn.Linear(WIDTH, layout.remarks)
         self.remarks = nn.Embedding(layout.remarks, REMARK_WIDTH)
@@ -105,14 +106,6 @@ class CoWizardNetwork(nn.Module):
     def then(self, hidden: Tensor, first: Tensor) -> Tensor:
         """Returns the logits of the second remark (b, r) behind a first one (b,)."""
         return self.second(torch.cat([hidden, self.remarks(first)], dim=1))  # type: ignore[no-any-return]
-
-
-def _layers(inputs: int, width: int) -> nn.Sequential:
-    return nn.Sequential(nn.Linear(inputs, width), _activation(), nn.Linear(width, width), _activation())
-
-
-def _activation() -> nn.Sequential:
-    return nn.Sequential(nn.ReLU(), nn.Dropout(DROPOUT))
 
 
 class _Scorer(nn.Module):

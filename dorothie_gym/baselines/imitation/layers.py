@@ -6,9 +6,19 @@ import torch
 from torch import Tensor, nn
 
 
-def hidden_layers(inputs: int, width: int) -> nn.Sequential:
-    """Returns two hidden layers (b, inputs) -> (b, width)."""
-    return nn.Sequential(nn.Linear(inputs, width), nn.ReLU(), nn.Linear(width, width), nn.ReLU())
+def hidden_layers(inputs: int, width: int, dropout: float = 0.0) -> nn.Sequential:
+    """Returns two hidden layers (b, inputs) -> (b, width).
+
+    Args:
+        inputs: length of the input.
+        width: number of units of a layer.
+        dropout: share of the units that are left out in training.
+    """
+
+    def activation() -> nn.Sequential:
+        return nn.Sequential(nn.ReLU(), nn.Dropout(dropout))
+
+    return nn.Sequential(nn.Linear(inputs, width), activation(), nn.Linear(width, width), activation())
 
 
 def option_scorer(inputs: int, width: int) -> nn.Sequential:

@@ -271,4 +271,6 @@ def _means(totals: NDArray[np.float64]) -> dict[str, float | None]:
 
 
 def _title(settings: SelfPlaySettings) -> str:
+    if settings.partners:
+        return f"self-play in {settings.town}, with {' and '.join(settings.partners.values())}"
     return f"self-play in {settings.town}, {'one network' if settings.shared else 'a network for each role'}"

@@ -37,7 +37,7 @@ def goal_to_learn(
 
 
 def two_places(scene: Scene) -> tuple[LandmarkName, LandmarkName]:
-    one, two, *_ = (mark.name for mark in scene.view.landmarks if mark.name not in (LandmarkName.HOUSE,))
+    one, two, *_ = (mark.name for mark in scene.view.landmarks if mark.name is not LandmarkName.HOUSE)
     return one, two
 
 
