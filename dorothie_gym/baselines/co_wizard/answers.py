@@ -1,7 +1,8 @@
 """Answers of the learned Co-Wizard that follow from its evidence, and which of its remarks the evidence rules out.
 
 Whether a question is answered is chosen by the network. What a yes/no question is answered follows from the evidence
-for what it asks (`beliefs.evidence`), and what was not understood is said again from memory.
+for what it asks (`beliefs.evidence`); why the car stands or turns round, from its state and memory (`reasons`); when it
+arrives, from its route. What was not understood is said again from memory.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.baselines.co_wizard.beliefs import evidence
+from dorothie_gym.baselines.co_wizard.beliefs import evidence, seconds_to_goal
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import Memory, seconds_since
+from dorothie_gym.baselines.co_wizard.reasons import why_standing, why_turning_round
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition
 from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, Slot, SlotValue, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -38,6 +40,7 @@ SAID_AGAIN_AFTER: Final = 8.0
 """Time after which the same is said again although the participant has said nothing since [s]."""
 
 _ANSWERS: Final = (DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM)
+_REASONS_AND_TIMES: Final = (Predicate.BECAUSE, Predicate.STANDS, Predicate.ARRIVES_IN)
 _STATEMENTS: Final = (*_ANSWERS, DialogueMove.REPLY_W, DialogueMove.EXPLAIN)
 _ABOUT_THE_GOAL: Final = (
     Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY, Predicate.ARRIVED, Predicate.KNOWS,
@@ -45,20 +48,20 @@ _ABOUT_THE_GOAL: Final = (
 
 
 def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -> Remark | None:
-    """Returns the answer to a question that yes or no answers; None if none has just been asked.
+    """Returns the answer to a question whose answer follows from the evidence; None if none has just been asked.
+
+    These are questions that yes or no answers, why the car stands or turns round, and when it arrives.
 
     Args:
         utterance: latest utterance of the participant.
         memory: working memory.
         view: observation.
     """
-    if utterance is None or view.time - utterance.time > ANSWERED_WITHIN or utterance.asks is None:
+    if utterance is None or view.time - utterance.time > ANSWERED_WITHIN:
         return None
-    asked, checks = utterance.asked, utterance.asks is DialogueMove.CHECK
-    if checks and utterance.places:
-        asked = Proposition.of(Predicate.GOAL, place=utterance.places[0])
-    elif checks and asked is None:
-        asked = Proposition.of(Predicate.GOAL, place=memory.goal)
+    if utterance.asks is None:
+        return _open_answer(utterance, memory, view)
+    asked = _verified(utterance, memory)
     if asked is None:
         return None
     if asked.predicate in _ABOUT_THE_GOAL and asked.get("place") is None:
@@ -67,16 +70,44 @@ def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -
     if held is None:
         return intend(CommunicativeFunction.UNCERTAIN_ANSWER, asked, elided=elided)
     if held:
+        checks = utterance.asks is DialogueMove.CHECK
         yes = CommunicativeFunction.CONFIRM if checks else CommunicativeFunction.AFFIRMATIVE_ANSWER
         return intend(yes, asked, elided=elided)
     return intend(CommunicativeFunction.NEGATIVE_ANSWER, asked.opposite, elided=elided)
 
 
+def _verified(utterance: Utterance, memory: Memory) -> Proposition | None:
+    """Returns what a yes/no question asks; a check that names no more is about the present goal."""
+    if utterance.asks is not DialogueMove.CHECK:
+        return utterance.asked
+    if utterance.places:
+        return Proposition.of(Predicate.GOAL, place=utterance.places[0])
+    return utterance.asked or Proposition.of(Predicate.GOAL, place=memory.goal)
+
+
+def _open_answer(utterance: Utterance, memory: Memory, view: CoWizardView) -> Remark | None:
+    if utterance.asks_why is ActionValue.STOP:
+        return why_standing(memory, view)
+    if utterance.asks_why is ActionValue.U_TURN:
+        return why_turning_round(memory, view)
+    asked = utterance.heard.words.asked
+    if asked is None or asked.predicate is not Predicate.ARRIVES_IN:
+        return None
+    seconds = seconds_to_goal(memory, view)
+    if seconds is None:
+        return intend(CommunicativeFunction.UNCERTAIN_ANSWER)
+    arrival = Proposition.of(Predicate.ARRIVES_IN, place=memory.goal, seconds=seconds)
+    return intend(CommunicativeFunction.ANSWER, arrival, elided=("place",))
+
+
 def is_answer(remark: Remark, answer: Remark) -> bool:
-    """Returns whether a remark answers what `answer` does, yes or no."""
+    """Returns whether a remark answers what `answer` does: yes, no, a reason, a time, or that it is not known."""
+    if remark.act.move is DialogueMove.REPLY_W:
+        to_open_question = answer.act.move not in _ANSWERS or not answer.meaning
+        return to_open_question and bool(remark.meaning) and remark.meaning[0].predicate in _REASONS_AND_TIMES
     if remark.act.move not in _ANSWERS:
         return False
-    return not remark.meaning or remark.meaning[0].predicate is answer.meaning[0].predicate
+    return not remark.meaning or (bool(answer.meaning) and remark.meaning[0].predicate is answer.meaning[0].predicate)
 
 
 def said_again(utterance: Utterance | None, memory: Memory) -> Remark | None:
@@ -91,12 +122,13 @@ def said_again(utterance: Utterance | None, memory: Memory) -> Remark | None:
 
 
 def is_sayable(
-    remark: Remark, topic: str, memory: Memory, view: CoWizardView, utterance: Utterance | None
+    remark: Remark, topic: str, memory: Memory, view: CoWizardView, utterance: Utterance | None,
+    answer: Remark | None = None,
 ) -> bool:  # fmt: skip
     """Returns whether a remark is not ruled out.
 
     Ruled out is what the evidence denies, an answer about something that was not asked, an acknowledgement instead of
-    an answer, and what has just been said.
+    an answer, and what has just been said. The answer that follows from the evidence is ruled out only by the last.
 
     Args:
         remark: the remark.
@@ -104,10 +136,13 @@ def is_sayable(
         memory: working memory.
         view: observation.
         utterance: latest utterance of the participant.
+        answer: answer to what was just asked (`answer_to`).
     """
     said_at = dict(memory.said_at).get(topic)
     if said_at is not None and said_at > memory.heard_at and seconds_since(view.time, said_at) < SAID_AGAIN_AFTER:
         return False
+    if answer is not None and (remark.act, remark.meaning) == (answer.act, answer.meaning):
+        return True
     if remark.act.move is DialogueMove.ACKNOWLEDGE:
         return utterance is None or not _waits_for_answer(utterance, memory)
     if remark.act.move not in _STATEMENTS:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Final
 
 from dorothie_gym.baselines.co_wizard.memory import Memory
+from dorothie_gym.baselines.co_wizard.reasons import BLOCKED_TIME
 from dorothie_gym.dialogue import Predicate, Proposition
 from dorothie_gym.ontology import ObjectClass, Sensor, StreetName
 from dorothie_gym.policies.co_wizard.judgement import (
@@ -19,6 +21,7 @@ from dorothie_gym.policies.co_wizard.judgement import (
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.sight import camera_fault
+from dorothie_gym.policies.travel_time import travel_time
 from dorothie_gym.spaces import Motion
 
 LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.18
@@ -26,9 +29,6 @@ LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.18
 
 CLOSE_DISTANCE: Final = 120.0
 """Way to the goal that is called short [m]."""
-
-BLOCKED_TIME: Final = 30.0
-"""Time for which an obstacle that was met counts [s]."""
 
 CROWD: Final = 3
 """Least number of people or vehicles in a crowd."""
@@ -46,6 +46,15 @@ def evidence(memory: Memory, view: CoWizardView, said: Proposition) -> bool | No
 def goal_left(memory: Memory, view: CoWizardView) -> float | None:
     """Returns the way to a goal on the map [m]; None without one."""
     return memory.navigator.left(view) if memory.goal_mark >= 0 else None
+
+
+def seconds_to_goal(memory: Memory, view: CoWizardView) -> int | None:
+    """Returns the expected time until the car stops at a goal on the map [s]; None without one, or if the car halts."""
+    progress = memory.navigator.route.progress
+    if progress is None or memory.goal_mark < 0 or memory.value("halted"):
+        return None
+    seconds = travel_time(memory.town, progress, view.station, view.time, view.speed)
+    return round(seconds) if math.isfinite(seconds) else None
 
 
 def _about_goal(memory: Memory, said: Proposition) -> bool:

@@ -17,6 +17,7 @@ from dorothie_gym.ontology import (
     LABEL_INDEX,
     LABELS,
     ActionValue,
+    DialogueAct,
     DialogueMove,
     GoalStatus,
     LandmarkName,
@@ -82,10 +83,18 @@ class Utterance:
         stop?".
         """
         for act in self.heard.acts:
-            why = self.heard.words.asked is None and {ActionValue.STOP, ActionValue.U_TURN} & act.slots
+            why = self.heard.words.asked is None and _explained(act)
             if act.move is DialogueMove.CHECK or (act.move is DialogueMove.QUERY_YN and not why):
                 return act.move
         return None
+
+    @cached_property
+    def asks_why(self) -> ActionValue | None:
+        """What a question asks the reason for: STOP for why the car stands, U_TURN for why it turns round."""
+        if self.heard.words.asked is not None:
+            return None
+        questions = (DialogueMove.QUERY_W, DialogueMove.QUERY_YN)
+        return next((_explained(act) for act in self.heard.acts if act.move in questions and _explained(act)), None)
 
     @cached_property
     def asked(self) -> Proposition | None:
@@ -96,6 +105,11 @@ class Utterance:
             if act.move in (DialogueMove.QUERY_YN, DialogueMove.CHECK):
                 return _asked_by_slots(self, [value for value in act.slots if value.label != "Queried"])
         return None
+
+
+def _explained(act: DialogueAct) -> ActionValue | None:
+    """Returns the action of an act that has a reason to be asked for."""
+    return next((value for value in (ActionValue.STOP, ActionValue.U_TURN) if value in act.slots), None)
 
 
 def _asked_by_slots(utterance: Utterance, values: Sequence[object]) -> Proposition | None:

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.dialogue import Direction
+from dorothie_gym.baselines.co_wizard.reasons import reason_to_stand
+from dorothie_gym.dialogue import Direction, Proposition
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import GoalStatus, LandmarkName, MentalAction, PhysicalAction, StreetName
@@ -50,6 +51,9 @@ again; `resting`: it stops for good before a hazard; `lights`: nothing was said,
 proposed and not answered yet (as the first values of `ORDERS`), `offering`, `detour` and `slower` likewise.
 """
 
+U_TURN: Final = 1
+"""Value of `manoeuvre` for a U-turn that was asked for."""
+
 FRESH: Final = ("order", "nudging", "creeping")
 """Variables that can be set anew to the same value; for each there is a further, binary output."""
 
@@ -74,6 +78,9 @@ CREEP_SHORTFALL, CREEP_LEAST, CREEP_LEAD, CREEP_RENEW, SLOWER_DISTANCE = 12.0, 1
 
 PLACE_SIGHT: Final = 80.0
 """Distance along the default lanes within which a place is looked for [m]; as that of the scripted Co-Wizard."""
+
+REACTION: Final = 3.0
+"""Time within which the memory is changed because of what was heard [s]."""
 
 AWAY: Final = 300.0
 """Time that stands for "never" or "long ago" [s]."""
@@ -117,6 +124,11 @@ class Memory:
         updates: belief updates to be sent, the next first.
         plan: junctions of the route as sent last.
         standing_since: start of the standstill [s]; None while the car moves.
+        stood_until: end of the last standstill [s].
+        reason: why the car stands, or stood last, as far as that could be told.
+        reason_since: since when it has stood for this reason [s].
+        told_to_stop_at: time at which it halted because of an utterance [s].
+        told_to_turn_round_at: last time at which it was to turn round because of one [s].
         physical: last own physical action; None for none.
         physical_at: its time [s].
         junction_of_action: junction ahead at that time.
@@ -145,6 +157,11 @@ class Memory:
     updates: tuple[Mental, ...] = ()
     plan: tuple[int, ...] = ()
     standing_since: float | None = 0.0
+    stood_until: float = -AWAY
+    reason: Proposition | None = None
+    reason_since: float = -AWAY
+    told_to_stop_at: float = -AWAY
+    told_to_turn_round_at: float = -AWAY
     physical: PhysicalAction | None = None
     physical_at: float = -AWAY
     junction_of_action: int = -1
@@ -166,12 +183,22 @@ class Memory:
 
     def seen(self, view: CoWizardView, *, heard: bool) -> Memory:
         """Brings standstill, route and times up to date with an observation."""
-        since = (view.time if self.standing_since is None else self.standing_since) if view.standing else None
         memory = replace(
-            self, clock=self.clock.ticked(view.time), standing_since=since,
-            heard_at=view.time if heard else self.heard_at, navigator=self.navigator.followed(self.town, view),
+            self, clock=self.clock.ticked(view.time), heard_at=view.time if heard else self.heard_at,
+            navigator=self.navigator.followed(self.town, view),
         )  # fmt: skip
-        return memory._carrying_on(view)
+        return memory._standing(view)._carrying_on(view)
+
+    def _standing(self, view: CoWizardView) -> Memory:
+        """Brings the standstill and the reason for it up to date; a reason that cannot be told any more stays."""
+        if not view.standing:
+            ended = self.stood_until if self.standing_since is None else view.time
+            return replace(self, standing_since=None, stood_until=ended)
+        memory = self if self.standing_since is not None else replace(self, standing_since=view.time, reason=None)
+        reason = reason_to_stand(memory, view)
+        if reason is None or reason == memory.reason:
+            return memory
+        return replace(memory, reason=reason, reason_since=view.time)
 
     def updated(
         self, update: Update, view: CoWizardView, named: Sequence[LandmarkName], streets: Sequence[StreetName],
@@ -192,6 +219,10 @@ class Memory:
             for name, new, old, at in zip(VARIABLES, update.values, self.values, self.changed_at, strict=True)
         )
         memory = replace(self, values=update.values, changed_at=changed)
+        if memory.value("halted") and not self.value("halted") and now - self.heard_at < REACTION:
+            memory = replace(memory, told_to_stop_at=now)
+        if memory.value("manoeuvre") == U_TURN:
+            memory = replace(memory, told_to_turn_round_at=now)
         if fresh["order"] or memory.value("skip") < self.value("skip"):
             choice = junction_meant(self.town, view.here, view.choice)
             street = streets[0] if streets and memory.value("onto_street") else self.street

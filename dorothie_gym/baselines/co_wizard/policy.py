@@ -234,11 +234,12 @@ class LearnedCoWizard(Policy[LearnedState]):
         *, joined: bool = False,
     ) -> tuple[int, Remark | None]:  # fmt: skip
         """Returns the number of a form and its remark, drawn among those that are sayable; None for silence."""
-        latest = scene.utterances[0] if scene.utterances else None
+        latest, answer = scene.utterances[0] if scene.utterances else None, available.get("answer")
+        answer = answer if isinstance(answer, Remark) else None
         for _ in range(MAX_DRAWS):
             chosen = drawn(shares, rng)
             remark = filled(self._vocabulary[chosen], available, joined=joined) if chosen else None
-            if remark is None or is_sayable(remark, topic_of(remark), memory, scene.view, latest):
+            if remark is None or is_sayable(remark, topic_of(remark), memory, scene.view, latest, answer):
                 return chosen, remark
             shares[chosen] = 0.0
         return 0, None

@@ -9,11 +9,11 @@ what the sources are at this moment. The grammar words the act, as for the scrip
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from dorothie_gym.baselines.co_wizard.answers import answer_to, is_answer, said_again
+from dorothie_gym.baselines.co_wizard.beliefs import seconds_to_goal
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import Memory
 from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording
@@ -36,7 +36,6 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import direction_of, first_new_street
 from dorothie_gym.policies.sight import sight, suitable_speed
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.policies.travel_time import travel_time
 
 _ENUMS: Final = {
     kind.__name__: kind
@@ -78,9 +77,7 @@ def sources(memory: Memory, view: CoWizardView, utterances: Sequence[Utterance])
         turns = [one for one in crossings if one.direction in (Direction.LEFT, Direction.RIGHT)]
         found |= {f"turn{k}": street_of(view.raw, town, one.exit.lane) for k, one in enumerate(turns[:2])}
         found["new_street"] = first_new_street(view.raw, town, view.lane, progress)
-        seconds = travel_time(town, progress, view.station, view.time, view.speed)
-        if math.isfinite(seconds) and memory.goal_mark >= 0 and not memory.value("halted"):
-            found["seconds"] = round(seconds)
+        found["seconds"] = seconds_to_goal(memory, view)
     for way in () if view.choice is None else view.choice.exits:
         found.setdefault(f"to_{direction_of(way)}", street_of(view.raw, town, way.lane))
     near = nearest_landmark(view.raw, view.landmarks, *view.position)

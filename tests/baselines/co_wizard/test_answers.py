@@ -2,19 +2,26 @@ import pytest
 
 from dorothie_gym.baselines.co_wizard.answers import SAID_AGAIN_AFTER, answer_to, is_sayable, said_again
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
-from dorothie_gym.baselines.co_wizard.memory import Memory
+from dorothie_gym.baselines.co_wizard.memory import VARIABLES, Memory, Update
+from dorothie_gym.baselines.co_wizard.reasons import RECENT
 from dorothie_gym.baselines.co_wizard.remarks import filled, form_of, sources
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName
 from dorothie_gym.policies import contents
+from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import HeardUtterance, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
+from dorothie_gym.spaces import Motion
 
 STANDS = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
+
+
+def with_value(memory, name, value):
+    return tuple(value if one == name else old for one, old in zip(VARIABLES, memory.values, strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -63,11 +70,98 @@ def test_check_of_the_destination_is_confirmed_or_denied(scene):
 
 
 def test_misheard_why_is_not_answered_by_yes_or_no(scene):
-    assert answer(scene, "way did we stop?", DialogueMove.QUERY_YN, ActionValue.STOP) is None
+    said = answer(scene, "way did we stop?", DialogueMove.QUERY_YN, ActionValue.STOP)
+    assert said.act.move not in (DialogueMove.REPLY_Y, DialogueMove.REPLY_N)
     view, memory = scene
     asked = heard(view, "way did we stop?", DialogueMove.QUERY_YN, ActionValue.STOP)
     stops = Proposition.of(Predicate.DOES, action=ActionValue.STOP)
     assert not is_sayable(intend(Function.AFFIRMATIVE_ANSWER, stops), "does", memory, view, asked)
+
+
+def why_stopped(view, memory):
+    return answer_to(heard(view, "why did we stop?", DialogueMove.QUERY_W, ActionValue.STOP), memory, view)
+
+
+def test_car_says_for_what_it_stands(scene):
+    view, memory = scene
+    bound, waits = replace(memory, goal=LandmarkName.KFC), replace(view, speed=0.0, motion=Motion.HAZARD)
+    said = why_stopped(replace(waits, hazard=ObjectClass.PEDESTRIAN), bound)
+    hinders = Proposition.of(Predicate.HINDERS, object=ObjectClass.PEDESTRIAN)
+    assert said.meaning == (Proposition.of(Predicate.BECAUSE, effect=STANDS, cause=hinders, at=None),)
+    assert why_stopped(waits, replace(bound, values=with_value(bound, "arrived", 1))).meaning[0].get("cause") == (
+        Proposition.of(Predicate.ARRIVED, place=LandmarkName.KFC)
+    )
+
+
+def test_reason_for_an_earlier_standstill_is_remembered_with_its_time(scene):
+    view, memory = scene
+    stands = replace(view, time=20.0, speed=0.0, motion=Motion.HAZARD, hazard=ObjectClass.PEDESTRIAN)
+    drives = replace(view, time=26.0, speed=8.0, motion=Motion.DRIVING, hazard=ObjectClass.UNLABELED)
+    memory = replace(memory, goal=LandmarkName.KFC).seen(stands, heard=False).seen(drives, heard=False)
+    said = why_stopped(drives, memory).meaning[0]
+    assert said.get("cause") == Proposition.of(Predicate.HINDERS, object=ObjectClass.PEDESTRIAN)
+    assert said.get("at") == 20
+    much_later = replace(drives, time=20.0 + 2.0 * RECENT)
+    assert why_stopped(much_later, memory).meaning == (STANDS.opposite,)
+
+
+def test_driver_that_was_told_to_stop_says_so_and_does_not_claim_it_otherwise(scene):
+    view, memory = scene
+    view = replace(view, time=30.0, speed=0.0)
+    bound = replace(memory, goal=LandmarkName.KFC, goal_mark=0, standing_since=None)
+    halting = Update(values=with_value(bound, "halted", 1), fresh=(False,) * 3)
+    told = replace(bound, heard_at=29.0).updated(halting, view, (), (), None).seen(view, heard=False)
+    unasked = replace(bound, heard_at=2.0).updated(halting, view, (), (), None).seen(view, heard=False)
+    assert why_stopped(view, told).meaning[0].get("cause") == TOLD_TO_STOP
+    assert why_stopped(view, unasked).act.move is DialogueMove.REPLY_U
+
+
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [
+        ({"told_to_turn_round_at": 0.0}, Predicate.TOLD),
+        ({"goal": LandmarkName.KFC, "goal_mark": 0}, Predicate.BEHIND),
+        ({}, None),
+    ],
+)
+def test_car_says_why_it_turns_round(scene, change, cause):
+    memory = scene[1]
+    said = answer(
+        scene, "why do we turn round?", DialogueMove.QUERY_W, ActionValue.U_TURN, memory=replace(memory, **change)
+    )
+    if cause is None:
+        assert said.act.move is DialogueMove.REPLY_U
+    else:
+        assert said.meaning[0].get("cause").predicate is cause
+
+
+def test_arrival_that_cannot_be_told_is_answered_so(scene):
+    said = answer(scene, "when will we be there?", DialogueMove.QUERY_W)
+    assert said.act.move is DialogueMove.REPLY_U
+
+
+def test_answer_that_follows_from_the_evidence_is_sayable_however_the_question_was_understood(scene):
+    view, memory = scene
+    bound = replace(memory, goal=LandmarkName.KFC)
+    asked = heard(view, "The next stop is the KFC, right?", DialogueMove.CHECK, LandmarkName.KFC)
+    said = answer_to(asked, bound, view)
+    assert is_sayable(said, "goal", bound, view, asked, said)
+    just_said = replace(bound, heard_at=view.time - 2.0).spoken(said, "goal", view, asks=False, asks_way=False)
+    assert not is_sayable(said, "goal", just_said, view, asked, said)
+
+
+@pytest.mark.parametrize(
+    "remark",
+    [
+        intend(Function.ANSWER, Proposition.of(Predicate.BECAUSE, effect=STANDS, cause=TOLD_TO_STOP, at=None)),
+        intend(Function.UNCERTAIN_ANSWER),
+    ],
+)
+def test_reason_of_the_corpus_becomes_the_reason_of_the_moment(scene, remark):
+    view, memory = scene
+    asked = heard(view, "why did we stop?", DialogueMove.QUERY_W, ActionValue.STOP)
+    available = sources(replace(memory, goal=LandmarkName.KFC), view, (asked,))
+    assert form_of(remark, available) == form_of(available["answer"], available)
 
 
 def test_no_answer_without_a_question(scene):
