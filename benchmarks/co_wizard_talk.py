@@ -24,16 +24,17 @@ FIGURES = ("truth", "yes_no_answers", "relevance")
 def main(
     rollouts: Annotated[list[Path], typer.Argument(help="folders of rollouts")],
     role: Annotated[str, typer.Option(help="co_wizard or participant")] = Role.CO_WIZARD.value,
+    maps: Annotated[Path | None, typer.Option(help="folder of the OpenDRIVE files of imported towns")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object")] = False,
 ) -> None:
     """Prints shares and numbers of cases, and what was wrong by predicate."""
     for folder in rollouts:
         found, wrong = TalkChecks(), Counter[str]()
-        for entry in Corpus.load(folder / "sessions").entries:
+        for entry in Corpus.load(folder / "sessions", maps=maps).entries:
             session = entry.load()
             town = find_town(session.header.town, entry.maps)
             if town is None:
-                raise SystemExit(f"{session.name}: there is no map of {session.header.town}")
+                raise SystemExit(f"{session.name}: there is no map of {session.header.town}; give its folder by --maps")
             _add_statements(found, wrong, SessionWorld(session, town), Role(role))
             _add_answers(found, wrong, session, Role(role))
         figures = {name: found.share(name) for name in FIGURES} | {f"{name}_n": found.cases[name] for name in FIGURES}

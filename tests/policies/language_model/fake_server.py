@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableSequence
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -21,12 +21,12 @@ class FakeServer(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
 
-    def __init__(self, answerer: Answerer = answer_of) -> None:
-        super().__init__(("127.0.0.1", 0), _Handler)
+    def __init__(self, answerer: Answerer = answer_of, port: int = 0) -> None:
+        super().__init__(("127.0.0.1", port), _Handler)
         self.answerer = answerer
         self.fault, self.fault_calls = "", 10**9
-        self.requests: list[dict[str, Any]] = []
-        self.headers: list[dict[str, str]] = []
+        self.requests: MutableSequence[dict[str, Any]] = []
+        self.headers: MutableSequence[dict[str, str]] = []
         self.over = threading.Event()
         self.lock = threading.Lock()
 
