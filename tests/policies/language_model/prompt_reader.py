@@ -196,14 +196,19 @@ class CoWizardReader:
     def _aim(
         self, page: Page, name: LandmarkName, words: ParsedText, note: dict[str, str], answer: dict[str, str]
     ) -> None:  # fmt: skip
+        if "halt" in note and _name(page.goal) == name.label and words.distance is None:  # this is not the place yet
+            note.clear()
+            note["go"] = "1"
+            answer.update(goal="none" if page.there else "keep", say="Which way should I go?")
+            return
         streets = [f"{street.label} Street" for street in words.streets if isinstance(street, StreetName)]
         known = {
             label: street
             for label, street in page.places.items()
-            if label.split(" on ")[0] == name.label and not (name in SAME_EVERYWHERE and label in page.visited)
+            if _name(label) == name.label and not (name in SAME_EVERYWHERE and label in page.visited)
         }
         fitting = [label for label, street in known.items() if street in streets]
-        guided = page.off_map and page.goal.removeprefix("another ") == name.label
+        guided = page.off_map and _name(page.goal) == name.label
         if (fitting or (known and (not streets or name not in SAME_EVERYWHERE))) and not guided:
             label = (fitting or list(known))[0]
             if page.goal != label:
@@ -344,8 +349,13 @@ class CoWizardReader:
         return label if label in page.drives else ""
 
 
+def _name(label: str) -> str:
+    """Returns the name of a place that a prompt shows as "another House on Beal Street", say."""
+    return label.removeprefix("another ").split(" on ")[0]
+
+
 def _is_on_map(page: Page, name: LandmarkName) -> bool:
-    return any(label.split(" on ")[0] == name.label for label in page.places)
+    return any(_name(label) == name.label for label in page.places)
 
 
 def _ahead(metres: float) -> str:
