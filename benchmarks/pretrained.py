@@ -77,6 +77,11 @@ RECIPES: Final[Mapping[str, Recipe]] = {
         commands=(GENERATE_TALKS, "train co-wizard --corpus talks --workers 2 --out models"),
         folders=(f"models/co-wizard/seed-{SEED}",),
     ),
+    "co-wizard-rl": Recipe(
+        description="The learned Co-Wizard, trained further by reinforcement",
+        commands=(GENERATE_TALKS, "train co-wizard-rl --corpus talks --workers 2 --out models"),
+        folders=(f"models/co-wizard-rl/seed-{SEED}",),
+    ),
     "participant": Recipe(
         description="The learned participant chooses the next errand, guides and talks",
         commands=(GENERATE_TALKS, "train participant --corpus talks --workers 2 --out models"),
@@ -111,7 +116,7 @@ def main(
     names: Annotated[list[str] | None, typer.Argument(help="names of models; by default all")] = None,
     work: Annotated[Path, typer.Option(help="folder of corpus, trainings and rollouts")] = Path("runs/pretrained"),
 ) -> None:
-    """Makes shipped models; all take about an hour and a half of processor time."""
+    """Makes shipped models; all take about two hours of processor time."""
     torch.set_num_threads(1)
     chosen = names or list(RECIPES)
     unknown = [name for name in chosen if name not in RECIPES]

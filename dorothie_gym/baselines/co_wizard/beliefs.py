@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Final
 
 from dorothie_gym.baselines.co_wizard.memory import Memory
-from dorothie_gym.baselines.co_wizard.reasons import BLOCKED_TIME
 from dorothie_gym.dialogue import Predicate, Proposition
 from dorothie_gym.ontology import ObjectClass, Sensor, StreetName
 from dorothie_gym.policies.co_wizard.judgement import (
+    DETOUR_TIME,
     is_localised,
     is_located,
     is_red_ahead,
@@ -91,7 +91,7 @@ def _failed(memory: Memory, view: CoWizardView, said: Proposition) -> bool | Non
 
 def _blocked(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
     """Returns whether the car has met an obstacle lately, or sees one."""
-    met = view.time - memory.navigator.blocked_at < BLOCKED_TIME
+    met = view.time - memory.navigator.blocked_at < DETOUR_TIME
     return met or view.hazard is ObjectClass.STATIC or any(thing.kind is ObjectClass.STATIC for thing in view.objects)
 
 

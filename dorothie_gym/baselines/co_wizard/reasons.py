@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass
-from dorothie_gym.policies.co_wizard.judgement import is_red_ahead
+from dorothie_gym.policies.co_wizard.answers import RECENT_STOP
+from dorothie_gym.policies.co_wizard.judgement import DETOUR_TIME, OBEYED_WITHIN, is_red_ahead
 from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import Remark, intend
@@ -14,15 +15,6 @@ from dorothie_gym.spaces import Motion
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.co_wizard.memory import Memory
-
-RECENT: Final = 45.0
-"""Time after a standstill or U-turn within which the reason for it can be asked for [s]."""
-
-OBEYED_WITHIN: Final = 15.0
-"""Time from an instruction to the standstill that it causes [s]."""
-
-BLOCKED_TIME: Final = 30.0
-"""Time for which an obstacle that was met counts [s]."""
 
 
 def reason_to_stand(memory: Memory, view: CoWizardView) -> Proposition | None:
@@ -49,7 +41,8 @@ def reason_to_stand(memory: Memory, view: CoWizardView) -> Proposition | None:
 
 def why_standing(memory: Memory, view: CoWizardView) -> Remark:
     """Returns the answer to why the car stands, or has just stood."""
-    stands, stood = Proposition.of(Predicate.STANDS, action=ActionValue.STOP), view.time - memory.stood_until < RECENT
+    stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
+    stood = view.time - memory.stood_until < RECENT_STOP
     if view.standing or (view.motion is Motion.HAZARD and not stood):
         reason = reason_to_stand(memory, view) or memory.reason
         if reason is not None and reason.predicate is Predicate.GOAL:
@@ -65,9 +58,9 @@ def why_standing(memory: Memory, view: CoWizardView) -> Remark:
 def why_turning_round(memory: Memory, view: CoWizardView) -> Remark:
     """Returns the answer to why the car turns round."""
     turns, reason = Proposition.of(Predicate.DOES, action=ActionValue.U_TURN), None
-    if view.time - memory.told_to_turn_round_at < RECENT:
+    if view.time - memory.told_to_turn_round_at < RECENT_STOP:
         reason = Proposition.of(Predicate.TOLD, action=ActionValue.U_TURN)
-    elif view.time - memory.navigator.blocked_at < BLOCKED_TIME:
+    elif view.time - memory.navigator.blocked_at < DETOUR_TIME:
         reason = Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
     elif memory.goal is not None and memory.goal_mark >= 0:
         reason = Proposition.of(Predicate.BEHIND, place=memory.goal)

@@ -25,7 +25,9 @@ NAMED_ACTIONS: Final = {
 }
 """Manoeuvres that the Co-Wizard names, and the slot value of each."""
 
-_OBEYED_WITHIN: Final = 15.0  # time from an instruction to what it causes [s]
+OBEYED_WITHIN: Final = 15.0
+"""Longest time from an instruction to what it causes [s]."""
+
 DETOUR_TIME: Final = 30.0
 """Time for which an obstacle explains a U-turn [s]."""
 
@@ -191,7 +193,7 @@ def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | N
     if hazard is not ObjectClass.UNLABELED:
         return Proposition.of(Predicate.HINDERS, object=hazard)
     since = view.time if commands.standing_since is None else commands.standing_since
-    if intentions.halted and since - state.dialogue.stop_instructed_at < _OBEYED_WITHIN:
+    if intentions.halted and since - state.dialogue.stop_instructed_at < OBEYED_WITHIN:
         return state.dialogue.stop_reason
     if goal is None and intentions.directive is None:
         return Proposition.of(Predicate.GOAL, negated=True)
@@ -204,7 +206,7 @@ def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | N
 def reason_to_turn_round(state: CoWizardState, view: CoWizardView) -> Proposition | None:
     """Returns why the car turns round now; None if the Co-Wizard cannot tell."""
     goal = state.beliefs.goal
-    told = view.time - state.dialogue.u_turn_instructed_at < state.config.wish_time + _OBEYED_WITHIN
+    told = view.time - state.dialogue.u_turn_instructed_at < state.config.wish_time + OBEYED_WITHIN
     if state.intentions.wish is Wish.U_TURN or told:
         return Proposition.of(Predicate.TOLD, action=ActionValue.U_TURN)
     if view.time - state.dialogue.blocked_at < DETOUR_TIME:

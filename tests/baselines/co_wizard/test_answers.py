@@ -3,13 +3,13 @@ import pytest
 from dorothie_gym.baselines.co_wizard.answers import SAID_AGAIN_AFTER, answer_to, is_sayable, said_again
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import VARIABLES, Memory, Update
-from dorothie_gym.baselines.co_wizard.reasons import RECENT
 from dorothie_gym.baselines.co_wizard.remarks import filled, form_of, sources
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName
 from dorothie_gym.policies import contents
+from dorothie_gym.policies.co_wizard.answers import RECENT_STOP
 from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import HeardUtterance, street_of
@@ -101,7 +101,7 @@ def test_reason_for_an_earlier_standstill_is_remembered_with_its_time(scene):
     said = why_stopped(drives, memory).meaning[0]
     assert said.get("cause") == Proposition.of(Predicate.HINDERS, object=ObjectClass.PEDESTRIAN)
     assert said.get("at") == 20
-    much_later = replace(drives, time=20.0 + 2.0 * RECENT)
+    much_later = replace(drives, time=20.0 + 2.0 * RECENT_STOP)
     assert why_stopped(much_later, memory).meaning == (STANDS.opposite,)
 
 
