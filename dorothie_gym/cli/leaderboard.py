@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -90,6 +91,7 @@ def leaderboard(
             if len(folders) != 1:
                 fail("--play takes one folder, for all rollouts")
             plan = _plan(row, parts, imported or [], sessions, max_seconds)
+            _check_weights(plan, folders[0])
             _play(plan, folders[0], workers, ray, quiet=as_json)
         try:
             entries = read_entries(folders)
@@ -141,6 +143,23 @@ def _plan(
         )  # fmt: skip
     except ValueError as error:
         fail(str(error))
+
+
+def _check_weights(plan: LeaderboardPlan, folder: Path) -> None:
+    """Exits if the folder has a row of a planned model with other weights: the page could not have both."""
+    from dorothie_gym.ontology import Role
+
+    for name, settings in plan.rollouts().items():
+        player = settings.cast[Role.CO_WIZARD]
+        if player.sha256 is None:
+            continue
+        stem = name.removesuffix(player.sha256[:8])
+        others = [
+            other for other in sorted(folder.glob(f"{stem}*")) if re.fullmatch("[0-9a-f]{8}", other.name[len(stem) :])
+        ]
+        found = next((other for other in others if other.name != name), None)
+        if found is not None:
+            fail(f"{found}: sessions of other weights of {player.name}; move or delete them, or choose another folder")
 
 
 def _play(plan: LeaderboardPlan, folder: Path, workers: int | None, ray: str | None, *, quiet: bool) -> None:

@@ -17,6 +17,7 @@ from dorothie_gym.baselines.co_wizard.memory import Memory, seconds_since
 from dorothie_gym.baselines.co_wizard.reasons import why_standing, why_turning_round
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition
 from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, Slot, SlotValue, StreetName
+from dorothie_gym.policies.co_wizard.answers import arrival
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import Remark, intend, repeated
 
@@ -86,6 +87,7 @@ def _verified(utterance: Utterance, memory: Memory) -> Proposition | None:
 
 
 def _open_answer(utterance: Utterance, memory: Memory, view: CoWizardView) -> Remark | None:
+    """Returns the answer to why the car stands or turns round, or when it arrives; None to other questions."""
     if utterance.asks_why is ActionValue.STOP:
         return why_standing(memory, view)
     if utterance.asks_why is ActionValue.U_TURN:
@@ -93,11 +95,7 @@ def _open_answer(utterance: Utterance, memory: Memory, view: CoWizardView) -> Re
     asked = utterance.heard.words.asked
     if asked is None or asked.predicate is not Predicate.ARRIVES_IN:
         return None
-    seconds = seconds_to_goal(memory, view)
-    if seconds is None:
-        return intend(CommunicativeFunction.UNCERTAIN_ANSWER)
-    arrival = Proposition.of(Predicate.ARRIVES_IN, place=memory.goal, seconds=seconds)
-    return intend(CommunicativeFunction.ANSWER, arrival, elided=("place",))
+    return arrival(memory.goal, seconds_to_goal(memory, view))
 
 
 def is_answer(remark: Remark, answer: Remark) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
+from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition
 from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass
-from dorothie_gym.policies.co_wizard.answers import RECENT_STOP
+from dorothie_gym.policies.co_wizard.answers import RECENT_STOP, explanation
 from dorothie_gym.policies.co_wizard.judgement import DETOUR_TIME, OBEYED_WITHIN, is_red_ahead
 from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -48,10 +48,10 @@ def why_standing(memory: Memory, view: CoWizardView) -> Remark:
         if reason is not None and reason.predicate is Predicate.GOAL:
             where = Proposition.of(Predicate.GOAL, place=LandmarkName.QUERIED)
             return intend(CommunicativeFunction.SET_QUESTION, where)
-        return _because(stands, reason)
+        return explanation(stands, reason)
     if stood:
         since = memory.stood_until if memory.reason is None else memory.reason_since
-        return _because(stands, memory.reason, at=round(since))
+        return explanation(stands, memory.reason, at=round(since))
     return intend(CommunicativeFunction.ANSWER, stands.opposite, elided=("action",))
 
 
@@ -64,14 +64,4 @@ def why_turning_round(memory: Memory, view: CoWizardView) -> Remark:
         reason = Proposition.of(Predicate.BLOCKED, object=ObjectClass.STATIC)
     elif memory.goal is not None and memory.goal_mark >= 0:
         reason = Proposition.of(Predicate.BEHIND, place=memory.goal)
-    return _because(turns, reason)
-
-
-def _because(effect: Proposition, cause: Proposition | None, at: int | None = None) -> Remark:
-    """Returns the answer with a reason, present or of a time [s], or that it is not known."""
-    if cause is None:
-        return intend(CommunicativeFunction.UNCERTAIN_ANSWER)
-    because = Proposition.of(Predicate.BECAUSE, effect=effect, cause=cause, at=at)
-    elided = ("effect",) if at is None else ("effect", "at")
-    topic = "because" if at is None else "because_then"
-    return intend(CommunicativeFunction.ANSWER, because, elided=elided, wording=Wording(topic=topic))
+    return explanation(turns, reason)

@@ -140,7 +140,7 @@ def answer_open(
     """Answers an open question."""
     asked, actions, landmarks = words.asked, act.values(Slot.ACTION), act.values(Slot.LANDMARK)
     if asked is not None and asked.predicate is Predicate.ARRIVES_IN:
-        _say_time(state, view)
+        state.say(arrival(state.beliefs.goal, seconds_to_goal(state, view)))
     elif ActionValue.STOP in actions:
         _explain_standing(state, view)
     elif ActionValue.U_TURN in actions:
@@ -164,14 +164,13 @@ def answer_open(
         state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
 
 
-def _say_time(state: CoWizardState, view: CoWizardView) -> None:
-    """Answers when the car will be at its goal."""
-    seconds = seconds_to_goal(state, view)
+def arrival(place: LandmarkName | None, seconds: int | None) -> Remark:
+    """Returns the answer to when the car will be at its goal, in `seconds` [s]; one without content for None."""
     if seconds is None:
-        state.say(intend(Function.UNCERTAIN_ANSWER))
-        return
-    arrival = Proposition.of(Predicate.ARRIVES_IN, place=state.beliefs.goal, seconds=seconds)
-    state.say(intend(Function.ANSWER, arrival, elided=("place",)))
+        return intend(Function.UNCERTAIN_ANSWER)
+    return intend(
+        Function.ANSWER, Proposition.of(Predicate.ARRIVES_IN, place=place, seconds=seconds), elided=("place",)
+    )
 
 
 def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
@@ -197,13 +196,17 @@ def _explain_standing(state: CoWizardState, view: CoWizardView) -> None:
 
 def _explain(state: CoWizardState, effect: Proposition, cause: Proposition | None, at: int | None = None) -> None:
     """Answers why something is so, or was so at a time [s]; says so where the reason is not known."""
+    state.say(explanation(effect, cause, at))
+
+
+def explanation(effect: Proposition, cause: Proposition | None, at: int | None = None) -> Remark:
+    """Returns the answer to why something is so, or was so at a time [s]; one without content if there is no cause."""
     if cause is None:
-        state.say(intend(Function.UNCERTAIN_ANSWER))
-        return
+        return intend(Function.UNCERTAIN_ANSWER)
     because = Proposition.of(Predicate.BECAUSE, effect=effect, cause=cause, at=at)
     elided = ("effect",) if at is None else ("effect", "at")
     topic = "because" if at is None else "because_then"
-    state.say(intend(Function.ANSWER, because, elided=elided, wording=Wording(topic=topic)))
+    return intend(Function.ANSWER, because, elided=elided, wording=Wording(topic=topic))
 
 
 def _name_objects(state: CoWizardState, view: CoWizardView) -> None:

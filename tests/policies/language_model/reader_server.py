@@ -30,7 +30,10 @@ def answer_by_role(request: Mapping[str, Any]) -> Mapping[str, str]:
 
 def main(port: Annotated[int, typer.Option(help="port on the loopback interface")] = 8011) -> None:
     """Serves until it is interrupted."""
-    server = FakeServer(answer_by_role, port)
+    try:
+        server = FakeServer(answer_by_role, port)
+    except OSError as error:
+        raise SystemExit(f"port {port}: {error.strerror}; choose another by --port") from None
     server.requests, server.headers = deque(maxlen=1), deque(maxlen=1)  # not kept
     print(f"--llm-url {server.url}", flush=True)
     try:

@@ -78,3 +78,13 @@ def test_play_takes_one_folder(tmp_path: Path) -> None:
     call = ["leaderboard", str(tmp_path / "a"), str(tmp_path / "b"), "--play", "--out", str(tmp_path / "board.md")]
     done = CliRunner().invoke(app, call)
     assert done.exit_code == 2 and "--play takes one folder" in done.stderr
+
+
+def test_row_of_other_weights_is_reported_before_anything_is_played(tmp_path: Path) -> None:
+    pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+    former = tmp_path / "seen-pretrained-ppo-00000000"
+    former.mkdir()
+    done = CliRunner().invoke(app, ["leaderboard", str(tmp_path), "--play", "--row", "pretrained:ppo"])
+    assert done.exit_code == 2 and done.stderr.count("\n") == 1
+    assert f"{former}: sessions of other weights of pretrained:ppo" in done.stderr
+    assert list(tmp_path.iterdir()) == [former]
