@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.camera.session_camera import Bodies
 from dorothie_gym.compilation.records import Record, RecordArray, empty_records, plain
@@ -62,6 +63,6 @@ def _between(
             if name == "heading":
                 change = wrap_radians(change)
             moved[name] = first[name][same] + share * change
-    moved["cos"], moved["sin"] = np.cos(moved["heading"]), np.sin(moved["heading"])
+    moved["cos"], moved["sin"] = pn.cos(moved["heading"]), pn.sin(moved["heading"])
     last[same] = moved
     return found

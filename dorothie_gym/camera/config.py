@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.copying import shared
 
@@ -119,5 +120,5 @@ class CameraConfig:
             rise: of the road per metre ahead.
         """
         mount = self.mount
-        car = CameraPose(x, y, z, heading, math.atan(rise))
+        car = CameraPose(x, y, z, heading, pm.atan(rise))
         return car.mounted(mount.forward, mount.up, math.radians(mount.pitch))

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import WeatherParameter
@@ -96,7 +97,7 @@ def daylight_of(weather: Weather, *, head_lights: bool) -> Daylight:
     zenith = _between(_sky(_CLEAR_ZENITH, _WARM_ZENITH, _GREY_ZENITH, warm, clouds), _NIGHT_ZENITH, 1.0 - bright)
     fogginess = weather.above_clear(WeatherParameter.FOG_DENSITY)
     haze = min(1.0, _HAZE * fogginess)  # takes the sun's direct light, and scatters a part of it
-    sunshine = _SUNSHINE * (1.0 - 0.9 * clouds**2) * _share(altitude, -1.0, 5.0) * (1.0 - haze)
+    sunshine = _SUNSHINE * (1.0 - 0.9 * clouds * clouds) * _share(altitude, -1.0, 5.0) * (1.0 - haze)
     tint = _between(_NOON_TINT, _WARM_TINT, warm) if sunshine > 0.02 else np.array(_SHADE_TINT)
     daily = (_AMBIENT + (_OVERCAST_AMBIENT - _AMBIENT) * max(clouds, haze)) * (1.0 - 0.35 * rainfall)
     visibility = weather.visibility(lights=False)
@@ -142,4 +143,4 @@ def _sky(
 
 def _direction(altitude: float, azimuth: float) -> Array:
     a, z = math.radians(altitude), math.radians(azimuth)
-    return np.array([math.cos(a) * math.cos(z), math.cos(a) * math.sin(z), math.sin(a)])
+    return np.array([pm.cos(a) * pm.cos(z), pm.cos(a) * pm.sin(z), pm.sin(a)])

@@ -117,7 +117,7 @@ class FirstPersonCamera:
         """
         self.scene, self.config = scene, config
         self._overlay, self._overlay_cells, order = sorted_by_cell(empty_mesh() if overlay is None else overlay)
-        self._rows = np.argsort(order)  # of the overlay as given
+        self._rows = np.argsort(order, kind="stable")  # of the overlay as given
         width, height, samples = config.width, config.height, config.samples
         self._draws_rgb = CameraOutput.RGB in config.outputs
         self._labelled = any(output != CameraOutput.RGB for output in config.outputs)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.models.model_bank import FIRST_CYCLIST, LAMP_STATES, PlacementRecord
 from dorothie_gym.camera.models.vehicles import Lamps
 from dorothie_gym.compilation import concurrent, inlined
@@ -69,7 +70,7 @@ def draw_head_lights(
         heading: of the camera [rad].
         bodies: models and places.
     """
-    middle_x, middle_y = x + _AHEAD * math.cos(heading), y + _AHEAD * math.sin(heading)
+    middle_x, middle_y = x + _AHEAD * pm.cos(heading), y + _AHEAD * pm.sin(heading)
     lights.corner[0], lights.corner[1] = math.floor(middle_x) - SQUARES // 2, math.floor(middle_y) - SQUARES // 2
     lights.light[:] = 0
     for k in range(len(bodies)):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.optics import Optics
 from dorothie_gym.compilation import concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
@@ -61,7 +62,8 @@ def lamp_map(lamps: Array) -> LampMap:
         column, row = int(x - low[0]), int(y - low[1])
         dx, dy = column + steps + 0.5 - (x - low[0]), row + steps + 0.5 - (y - low[1])
         away = dx[None, :] ** 2 + dy[:, None] ** 2
-        share = (height * height / (height * height + away)) ** 1.5  # inverse square, and the slant of the rays
+        near = height * height / (height * height + away)
+        share = near * np.sqrt(near)  # inverse square, and the slant of the rays
         share *= np.clip(1.5 - 1.5 * away / LAMP_REACH**2, 0.0, 1.0)
         total[row - reach : row + reach + 1, column - reach : column + reach + 1] += share.astype(np.float32)
     return LampMap(low, np.clip(np.rint(total * 255.0), 0, 255).astype(np.uint8))
@@ -116,7 +118,7 @@ def clearness(optics: Optics, depth: float, right: float, up: float) -> float:
         distance = depth * math.sqrt(1.0 + right * right + up * up)
         clear = transmission(optics.fog, optics.fog_start, optics.rain, distance)
     if depth > HAZE_START:
-        clear *= math.exp(-_HAZE * (depth - HAZE_START))
+        clear *= pm.exp(-_HAZE * (depth - HAZE_START))
     return clear
 
 

@@ -7,13 +7,14 @@ south, so that its corners appear clockwise on the map when it is seen from abov
 from __future__ import annotations
 
 import enum
-import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
@@ -205,7 +206,7 @@ class MeshBuilder:
         two_sided: bool = False,
     ) -> None:
         """Adds an upright rectangle with one repeat of a texture, to be read by somebody who looks along a heading."""
-        right = np.array([-math.sin(heading), math.cos(heading), 0.0]) * (width / 2.0)
+        right = np.array([-pm.sin(heading), pm.cos(heading), 0.0]) * (width / 2.0)
         up, middle = np.array([0.0, 0.0, height / 2.0]), np.asarray(centre, dtype=np.float64)
         corners = [middle - right - up, middle - right + up, middle + right + up, middle + right - up]
         self.quad(
@@ -251,7 +252,7 @@ class MeshBuilder:
         upper = np.column_stack((head, np.full(count, high)))
         for k in range(count):
             after = (k + 1) % count
-            width = float(np.hypot(*(foot[after] - foot[k])))
+            width = float(pn.hypot(*(foot[after] - foot[k])))
             repeats = (1.0, 1.0) if repeat is None else (_whole(width, repeat[0]), _whole(high - low, repeat[1]))
             # seen from outside, the wall runs from the later corner on the left to the earlier one on the right
             self.quad(
@@ -332,7 +333,7 @@ _UNIT = np.array([[0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]])
 def oriented(points: ArrayLike, centre: Sequence[float] | Array, heading: float) -> Array:
     """Returns world positions (n, 2) [m] of points (forward, right) (n, 2) [m] relative to a pose."""
     local = np.asarray(points, dtype=np.float64)
-    c, s = math.cos(heading), math.sin(heading)
+    c, s = pm.cos(heading), pm.sin(heading)
     turned = np.stack((local[:, 0] * c - local[:, 1] * s, local[:, 0] * s + local[:, 1] * c), axis=-1)
     return np.asarray(centre, dtype=np.float64)[:2] + turned
 
@@ -344,7 +345,7 @@ def _whole(length: float, repeat: float) -> float:
 def _axes(corners: Array, normals: Array, values: Array) -> Array:
     """Returns (n, 4): the gradients in the planes of triangles, and the values at first corners, of values (n, 3)."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    system = np.stack((first, second, normals), axis=1)
-    steps = np.stack((values[:, 1] - values[:, 0], values[:, 2] - values[:, 0], np.zeros(len(values))), axis=-1)
-    gradient = np.linalg.solve(system, steps[..., None])[..., 0]
+    along, across = (values[:, k, None] - values[:, :1] for k in (1, 2))
+    volume = (np.cross(first, second) * normals).sum(axis=1, keepdims=True)
+    gradient = (along * np.cross(second, normals) + across * np.cross(normals, first)) / volume  # Cramer's rule
     return np.column_stack((gradient, values[:, 0]))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.daylight import Daylight
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.shadows import ShadowMaps
@@ -98,7 +98,7 @@ def optics_of(view: View, light: tuple[float, ...], maps: ShadowMaps, tilt: floa
         tilt: of the car upwards [rad].
     """
     return Optics(  # type: ignore[call-arg]  # unpacked arrays, in the order of the fields
-        *view.origin.tolist(), *view.axes.ravel().tolist(), 1.0 / view.focal, *light, math.tan(tilt),
+        *view.origin.tolist(), *view.axes.ravel().tolist(), 1.0 / view.focal, *light, pm.tan(tilt),
         bool(maps.strength[0] > 0.0), *maps.slope.tolist(), *maps.window.tolist(),
     )  # fmt: skip
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.lettering import Ink, Picture
 from dorothie_gym.maps.model import Array
 
@@ -176,7 +177,7 @@ def house_sign() -> Picture:
 def person_sign() -> Picture:
     """Returns a white person with a raised arm on magenta."""
     across, up = _square()
-    head = np.hypot(across - 0.5, up - 0.80) < 0.10
+    head = pn.hypot(across - 0.5, up - 0.80) < 0.10
     body = (np.abs(across - 0.5) < 0.12) & (up > 0.38) & (up < 0.68)
     legs = (np.abs(np.abs(across - 0.5) - 0.065) < 0.05) & (up > 0.08) & (up <= 0.40)
     arm = (np.abs(across - 0.345) < 0.04) & (up > 0.36) & (up < 0.66)

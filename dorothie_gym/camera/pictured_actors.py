@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.camera.visibility import PERCEPTION_CAMERA, is_body_seen
 from dorothie_gym.maps.town import Town
@@ -42,6 +41,6 @@ def _are_seen(pictures: RecordedPictures, frame: int, rows: slice) -> list[bool]
     pixels = dict(zip(boxes.keys.tolist(), boxes.pixels.tolist(), strict=True))
     actors = pictures.actors[rows]
     return [
-        is_body_seen(pixels.get(key, 0), visibility.gain(math.hypot(x - pose.x, y - pose.y)))
+        is_body_seen(pixels.get(key, 0), visibility.gain(pm.hypot(x - pose.x, y - pose.y)))
         for key, x, y in zip(pictures.keys[rows].tolist(), actors["x"].tolist(), actors["y"].tolist(), strict=True)
     ]

@@ -12,6 +12,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
@@ -46,9 +48,9 @@ class CameraPose:
             up: above the road, at a right angle to it [m].
             pitch: relative to the car [rad].
         """
-        c, s = math.cos(self.pitch), math.sin(self.pitch)
+        c, s = pm.cos(self.pitch), pm.sin(self.pitch)
         ahead, rise = forward * c - up * s, forward * s + up * c
-        x, y = self.x + ahead * math.cos(self.heading), self.y + ahead * math.sin(self.heading)
+        x, y = self.x + ahead * pm.cos(self.heading), self.y + ahead * pm.sin(self.heading)
         return type(self)(x, y, self.z + rise, self.heading, self.pitch + pitch, self.pitch)
 
 
@@ -82,7 +84,7 @@ class View(NamedTuple):
 
     def project(self, points: Array) -> tuple[Array, Array]:
         """Returns the picture coordinates (n, 2) [pixels] of points (n, 3) [m], and their depths (n,) [m]."""
-        right, up, depth = ((points - self.origin) @ self.axes.T).T
+        right, up, depth = pn.matmul(points - self.origin, self.axes.T).T
         with np.errstate(divide="ignore", invalid="ignore"):
             x = 0.5 * self.width + self.focal * right / depth
             y = 0.5 * self.height - self.focal * up / depth
@@ -98,8 +100,8 @@ def view_from(pose: CameraPose, width: int, height: int, field_of_view: float) -
         height: [pixels].
         field_of_view: horizontal [degrees].
     """
-    c, s = math.cos(pose.heading), math.sin(pose.heading)
-    cp, sp = math.cos(pose.pitch), math.sin(pose.pitch)
+    c, s = pm.cos(pose.heading), pm.sin(pose.heading)
+    cp, sp = pm.cos(pose.pitch), pm.sin(pose.pitch)
     axes = np.array([[-s, c, 0.0], [-sp * c, -sp * s, cp], [cp * c, cp * s, sp]])
-    focal = 0.5 * width / math.tan(0.5 * math.radians(field_of_view))
+    focal = 0.5 * width / pm.tan(0.5 * math.radians(field_of_view))
     return View(np.array([pose.x, pose.y, pose.z]), axes, focal, width, height)

@@ -14,6 +14,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.camera.body_snapshots import BodySnapshot
 from dorothie_gym.camera.config import CameraConfig
@@ -176,7 +178,7 @@ class RecordedPictures:
             odometers = np.maximum(odometers + moment.seconds * np.abs(actors["speed"]), 0.0)
         columns: dict[str, NDArray[np.generic]] = {
             **{name: actors[name] for name in ("x", "y", "heading", "speed", "length", "width")},
-            "cos": np.cos(actors["heading"]), "sin": np.sin(actors["heading"]), "key": self.keys[moment.rows],
+            "cos": pn.cos(actors["heading"]), "sin": pn.sin(actors["heading"]), "key": self.keys[moment.rows],
             "height": _between(self._heights, moment), "odometer": odometers,
             "acceleration": _between(self._accelerations, moment),
         }  # fmt: skip
@@ -316,7 +318,7 @@ def _follow(
             odometers[k] = odometers[last] + math.sqrt((x[k] - x[last]) ** 2 + (y[k] - y[last]) ** 2)
         if not town.flat:
             lane, station, _, segment = closest_lane(
-                town, x[k], y[k], heading[k], math.cos(heading[k]), math.sin(heading[k]), height, 0
+                town, x[k], y[k], heading[k], pm.cos(heading[k]), pm.sin(heading[k]), height, 0
             )
             heights[k] = value_near(town.points, town.lanes[lane], segment, 4, station)
 
@@ -354,7 +356,7 @@ def _placed_landmarks(rows: Sequence[LandmarkRow], town: Town, scene: TownScene)
             (
                 site.id
                 for site in town.sites
-                if math.hypot(site.position[0] - row["x"], site.position[1] - row["y"]) < _SAME_PLACE
+                if pm.hypot(site.position[0] - row["x"], site.position[1] - row["y"]) < _SAME_PLACE
             ),
             None,
         )
@@ -377,5 +379,5 @@ def _placed_landmarks(rows: Sequence[LandmarkRow], town: Town, scene: TownScene)
 
 def _own_lot(number: int, place: tuple[float, float], waypoint: tuple[float, float]) -> Lot:
     """Returns a lot behind a place, as seen from its waypoint on the road."""
-    heading = math.atan2(place[1] - waypoint[1], place[0] - waypoint[0]) if place != waypoint else 0.0
+    heading = pm.atan2(place[1] - waypoint[1], place[0] - waypoint[0]) if place != waypoint else 0.0
     return Lot(number, place, heading, place, *_OWN_LOT)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
@@ -49,7 +50,7 @@ def road_slopes(town: Town) -> RoadSlopes:
             slope[a:b] = np.gradient(samples.centre[a:b, 2], samples.station[a:b])
     keep = np.full(len(slope), bool((np.abs(slope) > _SMALLEST).any()))  # level ones as well: beside a slope, say
     places = samples.centre[keep]
-    ways = np.column_stack((np.cos(samples.heading), np.sin(samples.heading), slope))[keep]
+    ways = np.column_stack((pn.cos(samples.heading), pn.sin(samples.heading), slope))[keep]
     if not len(places):
         empty = np.zeros(1, dtype=np.int32)
         return RoadSlopes(np.zeros(2), np.zeros(2, dtype=np.int64), empty, np.zeros((0, 3)), np.zeros((0, 3)))

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.cells import is_in_view
 from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.first_person_camera import CameraFrame, FirstPersonCamera
@@ -96,7 +97,7 @@ class SessionCamera:
             z: of the road below it [m].
             heading: of the car [rad].
         """
-        rise = rise_at(self.scene.town.slopes, x, y, z, math.cos(heading), math.sin(heading))
+        rise = rise_at(self.scene.town.slopes, x, y, z, pm.cos(heading), pm.sin(heading))
         return self.config.pose_on(x, y, z, heading, rise)
 
     def render(self, world: World) -> CameraFrame:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.bodies import surround
 from dorothie_gym.camera.cells import CellTable, is_in_view
 from dorothie_gym.camera.mesh import TOWN, Mesh, Surface
@@ -88,7 +89,7 @@ def new_shadow_maps(*, enabled: bool = True) -> ShadowMaps:
 
 def turn_sun(maps: ShadowMaps, sun: Array, strength: float) -> bool:
     """Prepares maps for a direction (3,) towards the sun; returns whether it casts shadows."""
-    casts = maps.town.shape[0] > 1 and strength > 0.03 and sun[2] >= math.sin(math.radians(LOWEST_SUN))
+    casts = maps.town.shape[0] > 1 and strength > 0.03 and sun[2] >= pm.sin(math.radians(LOWEST_SUN))
     maps.strength[0] = 1.0 if casts else 0.0
     if casts:
         slope = sun[:2] / sun[2]

@@ -8,6 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.daylight import Daylight
 from dorothie_gym.camera.optics import Optics, ray
 from dorothie_gym.camera.samples import (
@@ -47,9 +49,9 @@ def sky_noise() -> NDArray[np.float32]:
     """Returns noise (256, 256) in 0..1 that repeats without seams."""
     rng = np.random.default_rng(7)
     waves = np.fft.rfftfreq(_SIZE)[None, :] ** 2 + np.fft.fftfreq(_SIZE)[:, None] ** 2
-    strength = np.where(waves > 0.0, np.maximum(waves, 1e-9) ** -0.9, 0.0) * (waves < 0.1)
+    strength = np.where(waves > 0.0, pn.exp(-0.9 * pn.log(np.maximum(waves, 1e-9))), 0.0) * (waves < 0.1)
     phases = rng.uniform(0.0, 2.0 * np.pi, waves.shape)
-    noise = np.fft.irfft2(strength * np.exp(1j * phases), s=(_SIZE, _SIZE))
+    noise = np.fft.irfft2(strength * (pn.cos(phases) + 1j * pn.sin(phases)), s=(_SIZE, _SIZE))
     ranks = np.argsort(np.argsort(np.round(noise, 9), axis=None, kind="stable"), kind="stable")
     return (ranks / (_SIZE * _SIZE - 1.0)).astype(np.float32).reshape(_SIZE, _SIZE)
 
@@ -142,7 +144,7 @@ def _add_hills(light: Daylight, noise: NDArray[np.float32], values: Array, count
     for k in range(count):
         z = values[THREE + k]
         if -_HILLS < z < _HILLS:
-            turns = math.atan2(values[Y + k], values[X + k]) * (40.0 * 6.4 / (2.0 * math.pi)) + 512.0
+            turns = pm.atan2(values[Y + k], values[X + k]) * (40.0 * 6.4 / (2.0 * math.pi)) + 512.0
             height = 0.004 + 0.026 * _smooth(noise, turns, 7.0) + 0.010 * _smooth(noise, turns * 4.0, 91.0)
             share = min(max((height - z) * 260.0, 0.0), 1.0)
             values[RED + k] += (0.62 * horizon[0] + 22.0 * ambient[0] - values[RED + k]) * share

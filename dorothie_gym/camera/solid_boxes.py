@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.models.model_bank import ModelBank, PlacementRecord
 from dorothie_gym.compilation.records import RecordArray, plain
 from dorothie_gym.maps.model import Array
@@ -43,4 +44,4 @@ def solid_boxes(bank: ModelBank, placed: RecordArray[PlacementRecord]) -> SolidB
     centres = np.column_stack(
         (bodies["x"] + ahead * cos - aside * sin, bodies["y"] + ahead * sin + aside * cos, bodies["z"] + up)
     )
-    return SolidBoxes(bodies["key"].copy(), centres, high - low, np.arctan2(sin, cos))
+    return SolidBoxes(bodies["key"].copy(), centres, high - low, pn.arctan2(sin, cos))

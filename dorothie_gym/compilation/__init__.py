@@ -17,7 +17,7 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation.cache import compiled_folder
-from dorothie_gym.compilation.dispatcher import CompiledFunction
+from dorothie_gym.compilation.dispatcher import CompiledFunction, InlinedFunction
 
 __all__ = [
     "WITHOUT_COUNTS",
@@ -29,6 +29,7 @@ __all__ = [
     "direct",
     "fixed",
     "inlined",
+    "portable",
 ]
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -63,6 +64,17 @@ def inlined(function: F) -> F:
     A call passes a tuple of thirty arrays as two hundred numbers, which takes longer than many small functions.
     """
     return _compile(function, **WITHOUT_COUNTS, forceinline=True)
+
+
+def portable(function: F) -> F:
+    """As `inlined`; called from Python, the function runs as Python, with the same result.
+
+    For short arithmetic that Python calls rarely: reading machine code at the start would take longer than it saves.
+    Integers count as floating-point numbers.
+    """
+    if config.DISABLE_JIT:
+        return function
+    return cast(F, InlinedFunction(function, targetoptions={"nopython": True, **WITHOUT_COUNTS, "forceinline": True}))
 
 
 def direct(function: F) -> F:

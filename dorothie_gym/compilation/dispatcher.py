@@ -241,3 +241,11 @@ class CompiledFunction(CPUDispatcher):  # type: ignore[misc]  # numba has no typ
                     found = self._parts[args] = self._part_compiler.compile(args, None)
                 self.targetctx.insert_user_function(found.fndesc, found.fndesc, [found.library])
         return found
+
+
+class InlinedFunction(CompiledFunction):
+    """A function of numbers that is a part of compiled functions, and Python when it is called from Python."""
+
+    def __call__(self, *numbers: float) -> object:
+        """Runs the function in Python, with numbers of Python's own type, whose arithmetic is the fastest."""
+        return self.py_func(*[float(number) for number in numbers])

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.copying import shared
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.engine.session_log import Outcome
@@ -44,13 +46,13 @@ class PlaceEstimate:
 
     def distance(self, x: float, y: float) -> float:
         """Returns the squared Mahalanobis distance of a place [m] from the mean."""
-        offset = np.array([x, y]) - self.mean
-        return float(offset @ np.linalg.solve(np.array(self.covariance), offset))
+        offset = np.array([[x, y]]) - self.mean
+        return float((pn.matmul(offset, pn.inverse(np.array(self.covariance))) * offset).sum())
 
 
 def near(x: float, y: float, sigma: float) -> PlaceEstimate:
     """Returns an estimate around a place [m] with the standard deviation `sigma` along each axis [m]."""
-    return PlaceEstimate((x, y), ((sigma**2, 0.0), (0.0, sigma**2)))
+    return PlaceEstimate((x, y), ((sigma * sigma, 0.0), (0.0, sigma * sigma)))
 
 
 def refined(before: PlaceEstimate | None, mark: PlaceEstimate, drift: float = 0.0) -> PlaceEstimate:
@@ -66,13 +68,15 @@ def refined(before: PlaceEstimate | None, mark: PlaceEstimate, drift: float = 0.
     # Imported here: filterpy imports matplotlib, which is slow.
     from filterpy.kalman import KalmanFilter
 
+    # Arrays of Python's numbers: products of arrays of float64 are rounded differently by different processors (BLAS).
     refine = KalmanFilter(dim_x=2, dim_z=2)
-    refine.x, refine.P = np.array(before.mean), np.array(before.covariance)
-    refine.F, refine.H = np.eye(2), np.eye(2)
-    refine.Q, refine.R = drift**2 * np.eye(2), np.array(mark.covariance)
+    refine.inv = pn.inverse
+    refine.x, refine.P = np.array(before.mean, object), np.array(before.covariance, object)
+    refine.F, refine.H = np.eye(2, dtype=object), np.eye(2, dtype=object)
+    refine.Q, refine.R = drift * drift * np.eye(2, dtype=object), np.array(mark.covariance, object)
     refine.predict()
-    refine.update(np.array(mark.mean))
-    if float(refine.y @ refine.SI @ refine.y) > GATE:
+    refine.update(np.array(mark.mean, object))
+    if float((refine.y[:, None] * refine.SI * refine.y).sum()) > GATE:
         return mark
     return PlaceEstimate.of(refine.x, refine.P)
 
@@ -94,23 +98,24 @@ def about(before: PlaceEstimate | None, points: Array, sigma: float) -> PlaceEst
     points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     if not len(points):
         raise ValueError("a place about one of some points needs at least one point")
-    offset = points.mean(axis=0) - points
-    alone = PlaceEstimate.of(points.mean(axis=0), offset.T @ offset / len(points) + sigma**2 * np.eye(2))
+    offset, noise = points.mean(axis=0) - points, sigma * sigma * np.eye(2)
+    alone = PlaceEstimate.of(points.mean(axis=0), pn.matmul(offset.T, offset) / len(points) + noise)
     if before is None:
         return alone
     mean, covariance = np.array(before.mean), np.array(before.covariance)
-    spread = np.linalg.inv(covariance + sigma**2 * np.eye(2))
+    spread = pn.inverse(covariance + noise)
     away = points - mean
-    squared = np.einsum("ij,jk,ik->i", away, spread, away)
+    squared = (pn.matmul(away, spread) * away).sum(axis=1)
     if squared.min() > GATE:
         return alone
-    weights = np.exp(-0.5 * (squared - squared.min()))
+    weights = pn.exp(-0.5 * (squared - squared.min()))
     weights /= weights.sum()
-    gain = covariance @ spread
-    means = mean + away @ gain.T  # (n, 2)
-    together = weights @ means
+    gain = pn.matmul(covariance, spread)
+    means = mean + pn.matmul(away, gain.T)  # (n, 2)
+    together = (weights[:, None] * means).sum(axis=0)
     centred = means - together
-    return PlaceEstimate.of(together, (centred * weights[:, None]).T @ centred + (np.eye(2) - gain) @ covariance)
+    spread_out = pn.matmul((centred * weights[:, None]).T, centred)
+    return PlaceEstimate.of(together, spread_out + pn.matmul(np.eye(2) - gain, covariance))
 
 
 # --- Names on the map -------------------------------------------------------------------------------------------------
@@ -301,10 +306,11 @@ class BeliefTracker:
             sight: range of sight [m]; a mark within it is as exact as the perception.
         """
         place = self._town.lanes[lane].position(station)
-        distance = float(np.hypot(*(place - pose[:2])))
-        error = (SIGHTING**2 + (distance**2 / RANGE_SCALE) ** 2) * np.eye(2) + covariance[:2, :2]
+        distance = pm.hypot(*(place - pose[:2]))
+        blur = distance * distance / RANGE_SCALE
+        error = (SIGHTING * SIGHTING + blur * blur) * np.eye(2) + covariance[:2, :2]
         if distance > sight:
-            error = MARK**2 * np.eye(2)
+            error = MARK * MARK * np.eye(2)
         last = self.guesses.get(name)
         self.guesses[name] = LandmarkGuess(lane, station)
         if last != self.guesses[name]:  # a repeated mark adds no information

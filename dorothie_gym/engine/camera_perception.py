@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.camera.visibility import PERCEPTION_CAMERA, is_body_seen, is_landmark_recognised
 from dorothie_gym.compilation.records import RecordArray, empty_records, plain
@@ -89,7 +90,7 @@ class CameraPerception(Lookups):
 
     def _recognises(self, landmark: Landmark, pixels: int) -> bool:
         visibility, (x, y) = self._world.visibility, self._world.car.position.tolist()
-        distance = math.hypot(landmark.position[0] - x, landmark.position[1] - y)
+        distance = pm.hypot(landmark.position[0] - x, landmark.position[1] - y)
         return is_landmark_recognised(pixels, visibility.clarity * visibility.transmission(distance))
 
     # --- Observations -------------------------------------------------------------------------------------------------
@@ -120,17 +121,17 @@ class CameraPerception(Lookups):
         world, row = self._world, 0
         heading, (x, y) = float(world.car.heading), world.car.position.tolist()
         believed_x, believed_y, believed_heading = world.localizer.pose.tolist()
-        cosine, sine = math.cos(believed_heading - heading), math.sin(believed_heading - heading)
+        cosine, sine = pm.cos(believed_heading - heading), pm.sin(believed_heading - heading)
         for key, kind, at_x, at_y, _, length, width, speed, _ in self._bodies().tolist():
             dx, dy = at_x - x, at_y - y
-            distance = math.hypot(dx, dy)
+            distance = pm.hypot(dx, dy)
             if row == len(table):
                 break
             if not is_body_seen(self.pixels(int(key)), world.visibility.gain(distance)):
                 continue
             if role is Role.CO_WIZARD:
                 at_x, at_y = believed_x + dx * cosine - dy * sine, believed_y + dx * sine + dy * cosine
-            bearing = wrap_radians(math.atan2(dy, dx) - heading)
+            bearing = wrap_radians(pm.atan2(dy, dx) - heading)
             table[row] = kind, at_x, at_y, distance, bearing, length, width, speed
             row += 1
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.engine.session_log import Outcome
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.maps.model import Array, LinkType
@@ -217,7 +217,7 @@ class ExceptionExecutor:
                 f"a prop stands at least {PROP_FROM_START:.0f} m into its lane and {PROP_FROM_END:.0f} m before its end"
             )
         place = lane.position(station)
-        if math.hypot(*(place - world.car.position)) < FROM_CAR + self._stopping_distance():
+        if pm.hypot(*(place - world.car.position)) < FROM_CAR + self._stopping_distance():
             return "it would appear inside the car's stopping distance"
         for site in town.sites:
             if site.lane == lane.id and abs(site.station - station) < FROM_SITE:
@@ -226,7 +226,7 @@ class ExceptionExecutor:
         box = OrientedBox(
             float(place[0]), float(place[1]), lane.heading_at(station), kind.length + PROP_GAP, kind.width + PROP_GAP
         )
-        if any(math.hypot(*(place - other.position)) < FROM_VEHICLE for other in world.actors.vehicles) or any(
+        if any(pm.hypot(*(place - other.position)) < FROM_VEHICLE for other in world.actors.vehicles) or any(
             boxes_touch(box, OrientedBox.of(prop)) for prop in props
         ):
             return "there is something in that place already"

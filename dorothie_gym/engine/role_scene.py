@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import GoalStatus, LandmarkName, ObjectClass, PhysicalAction, Role, Sensor, StreetName
 from dorothie_gym.ontology import WeatherParameter as Weather
@@ -155,7 +156,7 @@ class RoleView:
         """Points of the lanes' centre lines, and the heading of the lane at each [rad]."""
         steps = [np.diff(lane.points[:, :2], axis=0) for lane in self._town.lanes]
         starts = np.concatenate([lane.points[:-1, :2] for lane in self._town.lanes])
-        return cKDTree(starts), np.concatenate([np.arctan2(step[:, 1], step[:, 0]) for step in steps])
+        return cKDTree(starts), np.concatenate([pn.arctan2(step[:, 1], step[:, 0]) for step in steps])
 
 
 def _pins(seen: ObservationMapping, town: Town) -> list[Pin]:

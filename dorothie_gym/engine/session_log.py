@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import NotRequired, TypeAlias, TypedDict
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.engine.dialogue_channel import DialogueChannel
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.ontology import ARRIVAL_DISTANCE, Role
@@ -139,7 +139,7 @@ class SubgoalTracker:
     def note_arrivals(self, x: float, y: float) -> None:
         """Completes the subgoals whose waypoint is close to the place (x, y) of a standing ego [m]."""
         for place_x, place_y, landmark in self._waypoints:
-            if abs(place_x - x) <= ARRIVAL_DISTANCE and math.hypot(place_x - x, place_y - y) <= ARRIVAL_DISTANCE:
+            if abs(place_x - x) <= ARRIVAL_DISTANCE and pm.hypot(place_x - x, place_y - y) <= ARRIVAL_DISTANCE:
                 for i in self._task.arrive(landmark):
                     self._add(i, "arrival")
                 self._statuses = [self._task.status(i) for i in range(len(self._statuses))]

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.copying import shared
 from dorothie_gym.dialogue import SHORTEST_SPAN, Span, Utterance, guess_act
 from dorothie_gym.dialogue.asr_channel import UNCLASSIFIED, OpenMoves
@@ -168,7 +169,7 @@ class SpokenDialogue:
             if other is not role:
                 for span in (*self._over[other], *self._spans[other]):
                     _add(found, span.samples, round((span.start - audio.start) * SAMPLE_RATE))
-        return found * np.float32(10.0 ** (CROSSTALK / 20.0))
+        return found * np.float32(pm.power(10.0, CROSSTALK / 20.0))
 
     def _read(self, span: Span, heard: Recognition, after: DialogueMove | None) -> Span:
         words = audible(heard)

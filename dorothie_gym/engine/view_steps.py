@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, concurrent
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.engine.view_arrays import (
@@ -115,7 +116,7 @@ def write_objects(world: WorldArrays, objects: Array, believed: Array) -> None:
     """
     car, belief = world.vehicles[0], world.localizer[0]
     turn = belief.estimate[2] - car.heading
-    cosine, sine = math.cos(turn), math.sin(turn)
+    cosine, sine = pm.cos(turn), pm.sin(turn)
     count = see(
         world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], car.x, car.y, world.clock[0].frame, 0
     )  # fmt: skip
@@ -126,7 +127,7 @@ def write_objects(world: WorldArrays, objects: Array, believed: Array) -> None:
             continue
         body = world.seen[row]
         dx, dy = body.x - car.x, body.y - car.y
-        distance, bearing = math.sqrt(dx * dx + dy * dy), wrap_radians(math.atan2(dy, dx) - car.heading)
+        distance, bearing = math.sqrt(dx * dx + dy * dy), wrap_radians(pm.atan2(dy, dx) - car.heading)
         for table in (objects, believed):
             table[row, 0], table[row, 3], table[row, 4] = body.kind, distance, bearing
             table[row, 5], table[row, 6], table[row, 7] = body.length, body.width, body.speed
@@ -168,8 +169,8 @@ def write_waypoints(
     for row in range(len(table)):
         at = start + (row + 1) * spacing
         if at < 0.0:
-            table[row, 0] = course[0].x + at * math.cos(course[0].heading)
-            table[row, 1] = course[0].y + at * math.sin(course[0].heading)
+            table[row, 0] = course[0].x + at * pm.cos(course[0].heading)
+            table[row, 1] = course[0].y + at * pm.sin(course[0].heading)
             continue
         at = min(at, course[end].s)
         k = min(point_before(course, count, at), end - 1)
@@ -218,7 +219,7 @@ def observe_as_co_wizard(
         for j in range(3):
             views.pose_covariance[number, i, j] = belief.covariance[i, j]
     lane, station, _, _ = closest_lane(
-        town, x, y, heading, math.cos(heading), math.sin(heading), car.height, int(plan.lane)
+        town, x, y, heading, pm.cos(heading), pm.sin(heading), car.height, int(plan.lane)
     )
     views.lane[number], views.station[number, 0] = lane, min(max(station, 0.0), town.lanes[lane].length)
     views.sight[number, 0] = world.eye[0].sight
@@ -230,7 +231,7 @@ def observe_as_co_wizard(
     views.hazard[number] = control.hazard
     views.hazard_distance[number, 0] = max(control.hazard_gap, 0.0) if control.hazard > 0 else 0.0
     views.manoeuvre[number], views.manoeuvre_angle[number, 0] = plan.action, plan.angle
-    error = np.hypot(x - car.x, y - car.y)
+    error = pm.hypot(x - car.x, y - car.y)
     progress = progress_on_path(world.course, int(plan.points), x, y, control.s, SEARCH + 2.0 * error)
     write_waypoints(world.course, int(plan.points), progress, WAYPOINT_SPACING, views.waypoints[number])
     exits = views.exits[number]

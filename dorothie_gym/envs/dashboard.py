@@ -6,13 +6,13 @@ it is a part of the picture, drawn at `HEIGHT` x `WIDTH` pixels and enlarged to 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies.navigation.junction_exits import SECTORS
 
@@ -103,7 +103,7 @@ def draw_dashboard(readings: Readings) -> NDArray[np.uint8]:
     panel[:] = PANEL
     if readings.goal is not None:
         _draw_needle(panel, *readings.goal)
-        _fill(panel, 2, _DISTANCE, math.hypot(*readings.goal) / GOAL, GOAL_COLOUR)
+        _fill(panel, 2, _DISTANCE, pm.hypot(*readings.goal) / GOAL, GOAL_COLOUR)
     elif readings.action is not None:
         _draw_icon(panel, _ICON, readings.action, readings.sector, None)
         colour = AHEAD if readings.distance >= 0.0 else PASSED
@@ -295,7 +295,7 @@ def _draw_icon(
 
 def _draw_needle(panel: NDArray[np.uint8], ahead: float, right: float) -> None:
     """Draws a needle from the middle of the first icon towards the goal: up is ahead."""
-    square, middle, reach = panel[HEIGHT - _SIZE :, _ICON : _ICON + _SIZE], _SIZE // 2, math.hypot(ahead, right)
+    square, middle, reach = panel[HEIGHT - _SIZE :, _ICON : _ICON + _SIZE], _SIZE // 2, pm.hypot(ahead, right)
     square[middle, middle] = SPEED
     if reach > 0.0:
         for step in range(2, 2 * middle + 1):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -10,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.engine.pictures import FIELDS, picture_spaces
@@ -118,7 +118,7 @@ def readings_of(batch: DrivingRows, number: int) -> Readings:
     goal = None
     if action is None and heard["goal_lane"] >= 0:
         dx, dy = float(heard["goal_x"] - view["x"]), float(heard["goal_y"] - view["y"])
-        sine, cosine = math.sin(float(view["heading"])), math.cos(float(view["heading"]))
+        sine, cosine = pm.sin(float(view["heading"])), pm.cos(float(view["heading"]))
         goal = dx * cosine + dy * sine, dy * cosine - dx * sine
     return Readings(
         action=action,

@@ -297,7 +297,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         """Returns the arrays of all batches as arrays of all environments."""
         if len(parts) == 1:
             return dict(parts[0])
-        order = np.argsort(np.concatenate(self._members))
+        order = np.argsort(np.concatenate(self._members), kind="stable")
         return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
 
     def _infos(self, mask: Flags, outcomes: Mapping[int, StepOutcome]) -> dict[str, Infos]:

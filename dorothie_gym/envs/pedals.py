@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.ontology import ActionValue, WeatherParameter
 from dorothie_gym.policies.navigation.actions import LEFT, RIGHT
@@ -167,9 +168,9 @@ def observe_path(world: WorldArrays, driver: DriverArrays, max_seconds: float) -
     for value in (car.throttle, car.steer, car.brake, car.offset / OFFSET_UNIT):
         k = put(vector, k, value)
     heading = _interpolated(world, car.s)[2]
-    k = put(vector, k, math.sin(ego.heading - heading))
-    k = put(vector, k, math.cos(ego.heading - heading))
-    sine, cosine = math.sin(ego.heading), math.cos(ego.heading)
+    k = put(vector, k, pm.sin(ego.heading - heading))
+    k = put(vector, k, pm.cos(ego.heading - heading))
+    sine, cosine = pm.sin(ego.heading), pm.cos(ego.heading)
     for ahead in AHEAD:
         x, y, _ = _interpolated(world, min(car.s + ahead, plan.length))
         dx, dy = x - ego.x, y - ego.y
@@ -210,10 +211,10 @@ def _encode_objects(world: WorldArrays, vector: Vector, k: int) -> int:
     for row in range(min(count, OBSERVED_OBJECTS)):
         body, at = world.seen[row], k + row * size
         dx, dy = body.x - ego.x, body.y - ego.y
-        bearing = wrap_radians(math.atan2(dy, dx) - ego.heading)
+        bearing = wrap_radians(pm.atan2(dy, dx) - ego.heading)
         at = put(vector, at, math.sqrt(dx * dx + dy * dy) / OBJECT_UNIT)
-        at = put(vector, at, math.sin(bearing))
-        at = put(vector, at, math.cos(bearing))
+        at = put(vector, at, pm.sin(bearing))
+        at = put(vector, at, pm.cos(bearing))
         at = put(vector, at, body.speed / SPEED_UNIT)
         for n in range(len(_KINDS)):
             if body.kind == _KINDS[n]:

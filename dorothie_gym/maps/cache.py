@@ -20,7 +20,7 @@ from typing import Any, TypeAlias, TypedDict, get_type_hints
 import msgspec
 import numpy as np
 
-from dorothie_gym import angles
+from dorothie_gym import angles, portable_arrays, portable_math
 from dorothie_gym.errors import InputFileError, TownArchiveError, one_line
 from dorothie_gym.files import PART
 from dorothie_gym.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, read_file
@@ -291,17 +291,25 @@ def towns_folder() -> Path | None:
 def compiler_digest() -> str | None:
     """Returns a digest of everything besides the source file that determines the compiled town.
 
-    It covers the sources of this package, `dorothie_gym.angles`, and the versions of numpy and scipy, which may round
-    differently. None if the sources cannot be read.
+    It covers the sources of this package and of the arithmetic that it uses (`angles`, `portable_math`,
+    `portable_arrays` and their compilation), and the versions of numpy and scipy, which may round differently. None if
+    the sources cannot be read.
     """
     digest = hashlib.sha256(f"format {ARCHIVE_FORMAT}, numpy {np.__version__}".encode())
     digest.update(f"scipy {importlib.metadata.version('scipy')}".encode())
     sources = package_sources("dorothie_gym.maps")
     if sources:
-        sources.append(("angles.py", Path(angles.__file__).read_bytes()))
+        sources += arithmetic_sources()
     for name, text in sources:
         digest.update(f"{name} {len(text)}\n".encode() + text)
     return digest.hexdigest() if sources else None
+
+
+def arithmetic_sources() -> list[tuple[str, bytes]]:
+    """Returns names and contents of the modules that compute elementary functions for this and other packages."""
+    own = {f"{module.__name__}.py": module.__file__ for module in (angles, portable_arrays, portable_math)}
+    found = [(name, Path(file).read_bytes()) for name, file in own.items() if file is not None]
+    return found + package_sources("dorothie_gym.compilation")
 
 
 def package_sources(package: str) -> list[tuple[str, bytes]]:

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import NO_JUNCTION, NO_STREET, Array, Junction, Lane, LaneLink, LinkType, Street
 
@@ -183,7 +184,7 @@ def _features(lane: Lane) -> tuple[float, ...]:
     rows = []
     for point, along, heading in ((0, slice(0, 2), lane.headings[0]), (-1, slice(-2, None), lane.headings[-1])):
         dx, dy, dz = np.diff(lane.points[along], axis=0)[0]
-        pitch = math.degrees(math.atan2(dz, math.hypot(dx, dy)))
+        pitch = math.degrees(pm.atan2(dz, pm.hypot(dx, dy)))
         rows += [*(float(value) for value in lane.points[point]), pitch, wrap_degrees(math.degrees(heading)), 0.0]
     return (*rows, lane.length, float(lane.lane_id))
 

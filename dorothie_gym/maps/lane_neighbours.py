@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import allocating, compiled
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, LinkType
@@ -97,7 +99,7 @@ class OncomingLanes:
         lane = self._town.lanes[lane_id]
         if lane.in_junction or self._town.neighbour(lane_id, LinkType.LANE_CHANGE_LEFT) is not None:
             return np.empty(0, dtype=np.int64)
-        reach = math.hypot(WIDEST_MEDIAN, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
+        reach = pm.hypot(WIDEST_MEDIAN, MAX_OFFSET) + 2 * SAMPLING  # points are at most two samplings apart
         own = self._points[self._owners == lane_id]
         around = ((self._points >= own.min(axis=0) - reach) & (self._points <= own.max(axis=0) + reach)).all(axis=1)
         gaps = self._points[around][:, None] - own[None, :]
@@ -135,7 +137,7 @@ def opposite_gap(
     """Returns the distance to a point on another lane, infinite if that is not opposite and oncoming [m]."""
     if abs((other_heading - heading + math.pi) % (2 * math.pi) - math.pi) < MIN_OPPOSITION:
         return math.inf
-    c, n = math.cos(heading), math.sin(heading)
+    c, n = pm.cos(heading), pm.sin(heading)
     dx, dy = other_x - x, other_y - y
     across, along = dy * c - dx * n, dx * c + dy * n  # positive right
     if not -WIDEST_MEDIAN <= across < -MIN_GAP or abs(along) > MAX_OFFSET:
@@ -198,7 +200,7 @@ class LaneEdges:
     def is_clear(self, ends: Sequence[Array] | Array, height: float, margin: float) -> bool:
         """Returns whether a straight line between two positions keeps a margin [m] to all lanes at its height."""
         first, last = ends[0][:2], ends[1][:2]
-        count = max(2, math.ceil(float(np.hypot(*(last - first))) / LANE_SAMPLING) + 1)
+        count = max(2, math.ceil(float(pn.hypot(*(last - first))) / LANE_SAMPLING) + 1)
         share = np.linspace(0.0, 1.0, count)[:, None]
         places = (1.0 - share) * first + share * last
         return bool(self.free(np.column_stack((places, np.full(len(places), height))), margin).all())
@@ -213,6 +215,6 @@ class LaneEdges:
             return free
         owners = np.repeat(np.arange(len(places)), counts)
         discs = self._discs[np.concatenate([np.asarray(discs, dtype=np.int64) for discs in near if discs])]
-        gaps = np.hypot(*(discs[:, :2] - places[owners, :2]).T)
+        gaps = pn.hypot(*(discs[:, :2] - places[owners, :2]).T)
         free[owners[(gaps < discs[:, 3] + margin) & (np.abs(discs[:, 2] - places[owners, 2]) < LANE_LEVEL)]] = False
         return free

@@ -14,6 +14,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import NO_STREET, Array, Lane, LaneLink, Site, Street
 
@@ -298,7 +299,7 @@ def _candidates(lanes: Iterable[Lane], margin: float) -> Array:
         )
         aside = 0.5 * width + SITE_OFFSET
         number = np.full(len(station), float(lane.id))
-        place = (x - aside * np.sin(heading), y + aside * np.cos(heading))
+        place = (x - aside * pn.sin(heading), y + aside * pn.cos(heading))
         tables.append(np.column_stack((number, station, *place, x, y)))
     return np.concatenate(tables)
 
@@ -311,7 +312,7 @@ def _is_clear(lanes: Sequence[Lane], places: Array) -> np.ndarray[tuple[int], np
         points.append([np.interp(s, lane.stations, lane.points[:, k]) for k in (0, 1)])
         owner.append(np.full(len(s), lane.id))
     tree, owners = cKDTree(np.concatenate(points, axis=1).T), np.concatenate(owner)
-    aside = np.hypot(*(places[:, 2:4] - places[:, 4:6]).T)
+    aside = pn.hypot(*(places[:, 2:4] - places[:, 4:6]).T)
     # Lanes are sampled every metre, which is at most 2 cm off their true distance: the waypoint must be closest.
     near, index = tree.query(places[:, 2:4], k=1)
     clear = (owners[index] == places[:, 0].astype(int)) & (near >= aside - 0.05)
@@ -325,11 +326,11 @@ def _is_clear(lanes: Sequence[Lane], places: Array) -> np.ndarray[tuple[int], np
 def _spread(positions: Array, count: int) -> list[int]:
     """Returns rows of positions (n, 2) by farthest-point sampling."""
     middle = positions.mean(axis=0)
-    chosen = [int(np.argmax(np.hypot(*(positions - middle).T)))]
-    distance = np.hypot(*(positions - positions[chosen[0]]).T)
+    chosen = [int(np.argmax(pn.hypot(*(positions - middle).T)))]
+    distance = pn.hypot(*(positions - positions[chosen[0]]).T)
     while len(chosen) < min(count, len(positions)):
         chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.hypot(*(positions - positions[chosen[-1]]).T))
+        distance = np.minimum(distance, pn.hypot(*(positions - positions[chosen[-1]]).T))
     return chosen
 
 

@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.copying import shared
 
 Array: TypeAlias = NDArray[np.float64]
@@ -76,7 +77,7 @@ class Lane:
     @cached_property
     def stations(self) -> Array:
         """Distance of each point from the start of the lane, measured in the plane (n,) [m]."""
-        steps = np.hypot(*np.diff(self.points[:, :2], axis=0).T)
+        steps = pn.hypot(*np.diff(self.points[:, :2], axis=0).T)
         return np.concatenate(([0.0], np.cumsum(steps)))
 
     @cached_property
@@ -88,7 +89,7 @@ class Lane:
         the curvature.
         """
         steps = np.diff(self.points[:, :2], axis=0)
-        segment = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))  # (n-1,)
+        segment = np.unwrap(pn.arctan2(steps[:, 1], steps[:, 0]))  # (n-1,)
         if len(segment) == 1:
             return np.repeat(segment, 2)
         length = np.diff(self.stations)
@@ -121,7 +122,7 @@ class Lane:
         x = np.interp(s, self.stations, self.points[:, 0])
         y = np.interp(s, self.stations, self.points[:, 1])
         heading = self.heading_at(s)
-        c, n = np.cos(heading), np.sin(heading)
+        c, n = pn.cos(heading), pn.sin(heading)
         over = longitudinal - s
         return np.array([x + over * c - lateral * n, y + over * n + lateral * c])
 
@@ -150,7 +151,7 @@ class Lane:
         offset = position[:2] - (a + t[:, None] * d)
         k = int(np.argmin(np.einsum("ij,ij->i", offset, offset)))
         side = d[k, 0] * offset[k, 1] - d[k, 1] * offset[k, 0]
-        distance = float(np.hypot(*offset[k]))
+        distance = float(pn.hypot(*offset[k]))
         s = self.stations[k] + t[k] * (self.stations[k + 1] - self.stations[k])
         return float(s), distance if side >= 0 else -distance
 

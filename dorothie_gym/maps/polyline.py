@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import allocating
 from dorothie_gym.maps.model import Array, Lane
 
@@ -43,7 +44,7 @@ class LaneTable(NamedTuple):
             for lane in lanes
         ]
         ends = [
-            [math.cos(first), math.sin(first), math.cos(last), math.sin(last)]
+            [pm.cos(first), pm.sin(first), pm.cos(last), pm.sin(last)]
             for first, last in ((float(rows[0, HEADING]), float(rows[-1, HEADING])) for rows in columns)
         ]
         boxes = [np.concatenate((rows[:, :2].min(axis=0), rows[:, :2].max(axis=0))) for rows in columns]
@@ -131,7 +132,7 @@ def position(
         return points[last, 0] + over * c - lateral * n, points[last, 1] + over * n + lateral * c
     heading = value_at(points, offsets, row, 3, station)
     x, y = value_at(points, offsets, row, 0, station), value_at(points, offsets, row, 1, station)
-    return x - lateral * math.sin(heading), y + lateral * math.cos(heading)
+    return x - lateral * pm.sin(heading), y + lateral * pm.cos(heading)
 
 
 @allocating

@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Lane, LaneLink, LinkType, SignalKind
 from dorothie_gym.maps.town import Town
 
@@ -176,5 +177,5 @@ def _swept(lane: Lane) -> Array:
     stations = np.linspace(0.0, lane.length, int(lane.length) + 2)
     headings = np.interp(stations, lane.stations, lane.headings)
     middles = np.column_stack([np.interp(stations, lane.stations, lane.points[:, k]) for k in (0, 1)])
-    along = np.column_stack((np.cos(headings), np.sin(headings)))
+    along = np.column_stack((pn.cos(headings), pn.sin(headings)))
     return np.concatenate([middles + offset * along for offset in (-CIRCLE_OFFSET, 0.0, CIRCLE_OFFSET)])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, Signal, SignalKind
 from dorothie_gym.maps.right_of_way import FACING, LEFTWARD, opposition, turn_into
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
@@ -132,7 +133,7 @@ def _junction(signal: Signal, lanes: Sequence[Lane], followers: dict[int, list[L
     Some maps assign a light to both directions of a road, and thus to the junctions at both ends.
     """
     found = [
-        (float(np.hypot(*(lanes[lane].points[-1, :2] - signal.position[:2]))), lanes[link.target].junction_id)
+        (float(pn.hypot(*(lanes[lane].points[-1, :2] - signal.position[:2]))), lanes[link.target].junction_id)
         for lane in signal.lanes
         for link in followers.get(lane, ())
         if lanes[link.target].in_junction

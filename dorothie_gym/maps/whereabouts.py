@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.model import NO_STREET, SignalKind
 from dorothie_gym.maps.town import Town
 
@@ -34,7 +34,7 @@ def corner_of(town: Town, street: int, x: float, y: float, within: float = CORNE
         within: largest distance to the middle of the junction [m].
     """
     near = [
-        (math.hypot(corner.x - x, corner.y - y), corner.streets - {street})
+        (pm.hypot(corner.x - x, corner.y - y), corner.streets - {street})
         for corner in _corners(town)
         if street in corner.streets
     ]
@@ -45,7 +45,7 @@ def corner_of(town: Town, street: int, x: float, y: float, within: float = CORNE
 def is_near_corner(town: Town, street: int, cross: int, x: float, y: float, within: float) -> bool:
     """Returns whether two streets meet within a distance of a point [m]."""
     return any(
-        {street, cross} <= corner.streets and math.hypot(corner.x - x, corner.y - y) <= within
+        {street, cross} <= corner.streets and pm.hypot(corner.x - x, corner.y - y) <= within
         for corner in _corners(town)
     )
 
@@ -53,7 +53,7 @@ def is_near_corner(town: Town, street: int, cross: int, x: float, y: float, with
 def signals_near(town: Town, x: float, y: float, within: float = SIGNAL_DISTANCE) -> frozenset[SignalKind]:
     """Returns the kinds of the lights and signs within a distance of a point [m]."""
     return frozenset(
-        signal.kind for signal in town.signals if math.hypot(signal.position[0] - x, signal.position[1] - y) <= within
+        signal.kind for signal in town.signals if pm.hypot(signal.position[0] - x, signal.position[1] - y) <= within
     )
 
 

@@ -11,6 +11,7 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.records import Rows
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
@@ -326,7 +327,7 @@ def _restore(state: AdWizardState, observation: ObservationMapping, now: float) 
     assert due.prop is not None
     for row, prop in enumerate(observation["props"]):
         x, y = float(prop[PropColumn.X]), float(prop[PropColumn.Y])
-        if prop[PropColumn.KIND] > 0 and math.hypot(x - due.prop[0], y - due.prop[1]) < SAME_PROP:
+        if prop[PropColumn.KIND] > 0 and pm.hypot(x - due.prop[0], y - due.prop[1]) < SAME_PROP:
             return AdWizardAction(exception=ExceptionKind.DELETE_PROP, item=row), state
     return None, state
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.dialogue import WORDS_PER_SECOND, speech_seconds
 
 FULL_TURN = 7
@@ -57,4 +57,4 @@ class Delivery:
 
 
 def _skewed(median: float, rng: np.random.Generator, spread: float = SPREAD) -> float:
-    return median * math.exp(spread * float(rng.standard_normal())) if median > 0.0 else 0.0
+    return median * pm.exp(spread * float(rng.standard_normal())) if median > 0.0 else 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.policies.policy import replace
 
 HALF_LIFE = 120.0
@@ -41,7 +42,7 @@ class Mood:
 
     def after(self, happening: Happening, now: float) -> Mood:
         """Returns the mood after an event at a time [s]."""
-        kept = 0.5 ** ((now - self.at) / HALF_LIFE)
+        kept = pm.power(0.5, (now - self.at) / HALF_LIFE)
         stress, hurry, trust = happening.value
         return replace(
             self,
@@ -53,15 +54,15 @@ class Mood:
 
     def rarer(self, chance: float) -> float:
         """Returns a probability that stress lowers; 0 and 1 stay."""
-        return float(chance ** (1.0 + 2.0 * self.stress))
+        return pm.power(chance, 1.0 + 2.0 * self.stress)
 
     def likelier_without_trust(self, chance: float) -> float:
         """Returns a probability that mistrust raises and trust lowers; 0 and 1 stay."""
-        return float(chance ** (0.4 + 1.2 * self.trust))
+        return pm.power(chance, 0.4 + 1.2 * self.trust)
 
     def likelier_in_hurry(self, chance: float) -> float:
         """Returns a probability that hurry raises; 0 and 1 stay."""
-        return float(chance ** (1.0 - 0.6 * self.hurry))
+        return pm.power(chance, 1.0 - 0.6 * self.hurry)
 
 
 def _share(value: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.records import Rows
 from dorothie_gym.dialogue import ParsedText, guess_spans, understand
 from dorothie_gym.maps import Town
@@ -78,7 +78,7 @@ def nearest_landmark(
     shown = landmarks_in_view(observation, landmarks)
     seen = landmarks if shown is None else shown
     near = [mark for mark in seen if abs(mark.x - x) < IN_VIEW and abs(mark.y - y) < IN_VIEW]
-    return min(near, key=lambda mark: (math.hypot(mark.x - x, mark.y - y), mark.row), default=None)
+    return min(near, key=lambda mark: (pm.hypot(mark.x - x, mark.y - y), mark.row), default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,7 +242,7 @@ def place_on_lanes(
     for lane in lanes:
         station, lateral = town.lanes[lane].project(point)
         end = town.lanes[lane].position(station)
-        if abs(lateral) <= width and math.hypot(end[0] - x, end[1] - y) <= width + 1.0:
+        if abs(lateral) <= width and pm.hypot(end[0] - x, end[1] - y) <= width + 1.0:
             return lane, station
     return None
 

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.errors import did_you_mean
 from dorothie_gym.policies.delivery import Delivery
 
@@ -94,7 +95,7 @@ class Persona:
 
     def draw_reaction(self, rng: np.random.Generator) -> float:
         """Draws the time from the end of an instruction to pedal or button [s]."""
-        return self.reaction * math.exp(REACTION_SPREAD * float(rng.standard_normal()))
+        return self.reaction * pm.exp(REACTION_SPREAD * float(rng.standard_normal()))
 
     def to_json(self) -> dict[str, float | str]:
         """Returns the traits in JSON types."""
@@ -112,7 +113,7 @@ class Persona:
         drawn["directions"] = _pick(rng, {Directions.TURNS: 0.5, Directions.LANDMARKS: 0.25, Directions.VAGUE: 0.25})
         drawn["driving"] = _pick(rng, {Driving.GENTLE: 0.3, Driving.USUAL: 0.45, Driving.BRISK: 0.25})
         for name, (median, spread, low, high) in _TIMES.items():
-            drawn[name] = min(max(median * math.exp(spread * float(rng.standard_normal())), low), high)
+            drawn[name] = min(max(median * pm.exp(spread * float(rng.standard_normal())), low), high)
         # from a stream of its own, so that the other numbers stay those of sessions without voices
         drawn["pitch"] = round(float(rng.spawn(1)[0].uniform(*PITCHES)), 3)
         for name, trait in (given or {}).items():

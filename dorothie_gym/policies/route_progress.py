@@ -96,7 +96,7 @@ class RouteJunction:
 
 def stopping_distance(speed: float) -> float:
     """Returns the distance driven after a Stop command at a speed [m/s], in metres."""
-    return LAG * speed + speed**2 / (2 * PLANNED_BRAKING)
+    return LAG * speed + speed * speed / (2 * PLANNED_BRAKING)
 
 
 def direction_of(way: Exit) -> Direction:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ExceptionKind
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal, read_landmarks, read_subgoals
@@ -69,7 +69,7 @@ def _options(subgoals: Sequence[SeenSubgoal]) -> Iterator[tuple[ExceptionKind, S
 def _is_near(observation: ObservationMapping, marks: Mapping[int, SeenLandmark], subgoal: SeenSubgoal) -> bool:
     mark = marks.get(subgoal.landmark)
     x, y = float(observation["pose"][0]), float(observation["pose"][1])
-    return mark is not None and math.hypot(mark.x - x, mark.y - y) < PRESSING_DISTANCE
+    return mark is not None and pm.hypot(mark.x - x, mark.y - y) < PRESSING_DISTANCE
 
 
 _OPENINGS: Mapping[ExceptionKind, str] = {

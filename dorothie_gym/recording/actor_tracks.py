@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.recording.surroundings import ACTOR_DTYPE, Rows, SceneTable
 from dorothie_gym.sim.config import FRAME_RATE
@@ -72,7 +73,7 @@ class ActorTracks:
         here, there = self.table.rows[moment.rows], self.table.rows[moment.after]
         found = np.array(here, dtype=ACTOR_DTYPE)
         if moment.share < 0.0:
-            for name, part in (("x", np.cos(here["heading"])), ("y", np.sin(here["heading"]))):
+            for name, part in (("x", pn.cos(here["heading"])), ("y", pn.sin(here["heading"]))):
                 found[name] += moment.seconds * here["speed"] * part
             return found
         for name in ("x", "y", "speed"):

@@ -18,6 +18,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import PhysicalAction, WeatherParameter
@@ -172,9 +173,9 @@ def _relative(places: Array, at: Array) -> Array:
     """Returns distance [m], bearing [degrees, positive left], metres ahead and to the left of positions (m, 4)."""
     dx, dy = (places - at[:, :2]).T
     heading = np.radians(at[:, 2])
-    ahead = np.cos(heading) * dx + np.sin(heading) * dy
-    left = np.sin(heading) * dx - np.cos(heading) * dy  # y points south: left of east is north
-    return np.stack([np.hypot(ahead, left), np.degrees(np.arctan2(left, ahead)), ahead, left], axis=1)
+    ahead = pn.cos(heading) * dx + pn.sin(heading) * dy
+    left = pn.sin(heading) * dx - pn.cos(heading) * dy  # y points south: left of east is north
+    return np.stack([pn.hypot(ahead, left), np.degrees(pn.arctan2(left, ahead)), ahead, left], axis=1)
 
 
 def _wrap(degrees: Array) -> Array:

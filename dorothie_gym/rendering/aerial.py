@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.rendering import MapPainter, palette
 from dorothie_gym.rendering.figures import (
@@ -242,7 +243,7 @@ class AerialView:
         """Draws a note at the edge of the picture with the direction of a landmark outside it."""
         centre = np.array(self.size) / 2.0
         direction = canvas.pixel((pin.x, pin.y)) - centre
-        metres = float(np.hypot(*direction)) / canvas.scale
+        metres = float(pn.hypot(*direction)) / canvas.scale
         text = f"{pin.label}  {metres:.0f} m"
         width, height = font(_PIN_TYPE - 1).size(text)[0] + 34, 22
         room = centre - np.array([width / 2 + 8, height / 2 + 8])
@@ -257,7 +258,7 @@ class AerialView:
         taken.append(box)
         colour = palette.STATE[pin.state]
         canvas.box(box, palette.PAPER, colour, radius=11)
-        unit = direction / max(float(np.hypot(*direction)), 1e-9)
+        unit = direction / max(float(pn.hypot(*direction)), 1e-9)
         side = np.array([-unit[1], unit[0]])
         tip = np.array([box[0] + 13, box[1] + height / 2])
         canvas.pixel_polygon(

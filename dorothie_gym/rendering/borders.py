@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering.shapes import TownSamples, right_of
@@ -147,10 +148,10 @@ def find_borders(town: Town, samples: TownSamples) -> Borders:
 def _beside(samples: TownSamples, outside: NDArray[np.int64], sign: int) -> NDArray[np.int64]:
     """Returns the sample of the adjacent lane in the same direction on a side (n,), or -1."""
     own, other = samples.edge(sign)[outside], samples.edge(-sign)[outside]
-    near, where = cKDTree(other).query(own, k=6, distance_upper_bound=np.hypot(_TOUCH, 1.5))
+    near, where = cKDTree(other).query(own, k=6, distance_upper_bound=pn.hypot(_TOUCH, 1.5))
     candidate = outside[np.minimum(where, len(outside) - 1)]  # (m, 6)
     fits = np.isfinite(near) & (samples.lane[candidate] != samples.lane[outside][:, None])
-    fits &= np.cos(samples.heading[candidate] - samples.heading[outside][:, None]) > 0.9
+    fits &= pn.cos(samples.heading[candidate] - samples.heading[outside][:, None]) > 0.9
     fits &= np.abs(samples.centre[candidate, 2] - samples.centre[outside, 2][:, None]) < SAME_SURFACE
     ahead, aside = _frame(samples, outside, samples.edge(-sign)[candidate] - own[:, None])
     fits &= (np.abs(aside) < _TOUCH) & (np.abs(ahead) < 1.5)
@@ -168,7 +169,7 @@ def _facing(samples: TownSamples, leftmost: NDArray[np.int64]) -> tuple[NDArray[
     edge = samples.edge(-1)[leftmost]
     near, where = cKDTree(edge).query(edge, k=40, distance_upper_bound=_WIDEST_MEDIAN + 1.0)
     candidate = leftmost[np.minimum(where, len(leftmost) - 1)]
-    fits = np.isfinite(near) & (np.cos(samples.heading[candidate] - samples.heading[leftmost][:, None]) < -0.9)
+    fits = np.isfinite(near) & (pn.cos(samples.heading[candidate] - samples.heading[leftmost][:, None]) < -0.9)
     fits &= np.abs(samples.centre[candidate, 2] - samples.centre[leftmost, 2][:, None]) < SAME_SURFACE
     ahead, aside = _frame(samples, leftmost, edge[np.minimum(where, len(leftmost) - 1)] - edge[:, None])
     fits &= (np.abs(ahead) < 1.3) & (aside < _TOUCH) & (aside > -_WIDEST_MEDIAN)
@@ -183,7 +184,7 @@ def _facing(samples: TownSamples, leftmost: NDArray[np.int64]) -> tuple[NDArray[
 def _frame(samples: TownSamples, index: NDArray[np.int64], offset: Array) -> tuple[Array, Array]:
     """Transforms offsets (m, k, 2) [m] from samples into their frames: forward and right (m, k) each."""
     heading = samples.heading[index][:, None]
-    c, s = np.cos(heading), np.sin(heading)
+    c, s = pn.cos(heading), pn.sin(heading)
     return offset[..., 0] * c + offset[..., 1] * s, offset[..., 1] * c - offset[..., 0] * s
 
 
@@ -253,7 +254,7 @@ def _followers(town: Town, samples: TownSamples, runs: Sequence[_Run], edge: Arr
             found = begins.get((link.target, kind), -1)
             if found < 0 or town.lanes[link.target].street != lane.street:
                 continue
-            if np.hypot(*(edge[runs[found][0], :2] - edge[end - 1, :2])) < _JOIN:
+            if pn.hypot(*(edge[runs[found][0], :2] - edge[end - 1, :2])) < _JOIN:
                 after[k] = found
                 break
     return after
@@ -265,7 +266,7 @@ def _border(
     # the common point of successive lanes is kept once
     index = np.concatenate([np.arange(a + (k > 0), b) for k, (a, b, _) in enumerate(chain)])
     line = edge[index]
-    if len(line) < 2 or np.hypot(*np.diff(line[:, :2], axis=0).T).sum() < _SHORTEST_BORDER:
+    if len(line) < 2 or pn.hypot(*np.diff(line[:, :2], axis=0).T).sum() < _SHORTEST_BORDER:
         return
     lanes = tuple(dict.fromkeys(samples.lane[index].tolist()))
     yield Border(

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.model import Array
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.palette import Colour
@@ -137,7 +139,7 @@ def draw_headlights(canvas: Canvas, at: Array, heading: float, length: float, wi
     angles = np.linspace(-_BEAM_HALF_ANGLE, _BEAM_HALF_ANGLE, 9)
     front, half = 0.4 * length * zoom, 0.38 * width * zoom
     for share in np.linspace(1.0, 0.1, 14):
-        arc = share * _BEAM_LENGTH * zoom * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+        arc = share * _BEAM_LENGTH * zoom * np.stack((pn.cos(angles), pn.sin(angles)), axis=-1)
         arc += np.stack((np.full(9, front), np.linspace(-half, half, 9)), axis=-1)
         cone = np.concatenate(([[front, -half]], arc, [[front, half]]))
         canvas.polygon(place(cone, at, heading), palette.HEADLIGHT, float(0.06 + 0.6 * (1.0 - share)))
@@ -175,7 +177,7 @@ def draw_trail(canvas: Canvas, trail: Array) -> None:
     points = canvas.pixel(trail.reshape(-1, 2))
     if len(points) < 2:
         return
-    travelled = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    travelled = np.concatenate(([0.0], np.cumsum(pn.hypot(*np.diff(points, axis=0).T))))
     keep = np.flatnonzero(np.diff(np.floor(travelled / 3.0)) > 0) + 1
     points = points[np.unique(np.concatenate(([0], keep, [len(points) - 1])))]
     seen = ((points > -20.0) & (points < np.array(canvas.size) + 20.0)).all(axis=1)
@@ -185,7 +187,7 @@ def draw_trail(canvas: Canvas, trail: Array) -> None:
             canvas.line(points[run], width, palette.TRAIL)
 
 
-_REGION = math.sqrt(-2.0 * math.log(0.05))  # Mahalanobis radius of the region of 95 % of a plane normal distribution
+_REGION = math.sqrt(-2.0 * pm.log(0.05))  # Mahalanobis radius of the region of 95 % of a plane normal distribution
 
 
 def draw_estimate(canvas: Canvas, centre: Array, covariance: tuple[float, float, float], colour: Colour) -> None:
@@ -193,7 +195,7 @@ def draw_estimate(canvas: Canvas, centre: Array, covariance: tuple[float, float,
     xx, xy, yy = covariance
     spread, axes = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
     angles = np.linspace(0.0, 2.0 * np.pi, 73)
-    circle = np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+    circle = np.stack((pn.cos(angles), pn.sin(angles)), axis=-1)
     region = centre + _REGION * (circle * np.sqrt(np.maximum(spread, 0.0))) @ axes.T
     canvas.line(canvas.pixel(region), 1.6, colour)
 
@@ -202,7 +204,7 @@ def draw_waypoints(canvas: Canvas, waypoints: Array) -> None:
     """Draws the planned path (n, 2) [m] as dots, at least eight pixels apart."""
     last = np.full(2, -np.inf)
     for point in canvas.pixel(waypoints.reshape(-1, 2)):
-        if np.hypot(*(point - last)) < 8.0:
+        if pn.hypot(*(point - last)) < 8.0:
             continue
         last = point
         canvas.dot(point, 2.4, palette.WAYPOINT)
@@ -218,7 +220,7 @@ PIN_RADIUS = 10.0
 def pin_direction(at: Array, waypoint: Array) -> Array:
     """Returns the unit vector (2,) from the tip of a pin to its head: away from the road, so that it covers no name."""
     away = at - waypoint
-    length = float(np.hypot(*away))
+    length = float(pn.hypot(*away))
     return np.asarray(away / length) if length > 0.5 else np.array([0.0, -1.0])
 
 
@@ -239,7 +241,7 @@ def draw_pin(canvas: Canvas, at: Array, waypoint: Array, colour: Colour, hollow:
     if hollow:
         canvas.dot(head, radius - 2.2, palette.PAPER)
         for angle in np.arange(0.3, 2.0 * np.pi, np.pi / 3.0):
-            gap = head + (radius - 1.0) * np.array([np.cos(angle), np.sin(angle)])
+            gap = head + (radius - 1.0) * np.array([pn.cos(angle), pn.sin(angle)])
             canvas.dot(gap, 1.7, palette.PAPER)
         canvas.dot(head, 2.6, colour)
     elif done:
@@ -258,17 +260,17 @@ def draw_direction(canvas: Canvas, trail: Array) -> None:
     points = canvas.pixel(trail.reshape(-1, 2))
     if len(points) < 2:
         return
-    lengths = np.hypot(*np.diff(points, axis=0).T)
+    lengths = pn.hypot(*np.diff(points, axis=0).T)
     stations = np.concatenate(([0.0], np.cumsum(lengths)))
     for station in np.arange(0.5 * _CHEVRON_SPACING, stations[-1], _CHEVRON_SPACING):
         before, after = (
             np.array([np.interp(station + d, stations, points[:, k]) for k in (0, 1)]) for d in (-3.0, 3.0)
         )
         step = after - before
-        if float(np.hypot(*step)) < 1.0:
+        if float(pn.hypot(*step)) < 1.0:
             continue
-        angle = float(np.arctan2(step[1], step[0]))
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        angle = float(pn.arctan2(step[1], step[0]))
+        turn = np.array([[pn.cos(angle), -pn.sin(angle)], [pn.sin(angle), pn.cos(angle)]])
         canvas.line((before + after) / 2.0 + _CHEVRON @ turn.T, 1.8, palette.DIRECTION)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
@@ -215,6 +216,6 @@ def _trees(town: Town, piece: _Piece, rng: np.random.Generator, share: float, co
     for k in np.flatnonzero(wanted).tolist():
         wanted[k] = all(piece.mask.get_at(pixel) for pixel in pixels[k].tolist())
     for site in town.sites:
-        wanted &= np.hypot(*(centres - np.array(site.position)).T) > radii + 6.0
+        wanted &= pn.hypot(*(centres - np.array(site.position)).T) > radii + 6.0
     for k in np.flatnonzero(wanted).tolist():
         yield Shape(disc(centres[k], float(radii[k])), colour)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array, SignalKind
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.rendering import palette
@@ -64,7 +65,7 @@ def _stop(size: int) -> pygame.Surface:
     side = size * ICON_SUPERSAMPLING
     fine = pygame.Surface((side, side), pygame.SRCALPHA, 32)
     for radius, ink in ((0.5, palette.SIGN_WHITE), (0.44, palette.SIGN_RED)):
-        pygame.draw.polygon(fine, ink, _regular(8, side / 2.0, radius * side / np.cos(np.pi / 8), np.pi / 8).tolist())
+        pygame.draw.polygon(fine, ink, _regular(8, side / 2.0, radius * side / pn.cos(np.pi / 8), np.pi / 8).tolist())
     text = font(max(6, round(0.27 * side)), bold=True).render("STOP", True, palette.SIGN_WHITE)
     fine.blit(text, text.get_rect(center=(side // 2, side // 2)))
     return _smooth(fine)
@@ -98,7 +99,7 @@ def pin_icon(text: str, radius: int, bearing: int) -> pygame.Surface:
     fine = pygame.Surface((side, side), pygame.SRCALPHA, 32)
     middle = np.array([side / 2.0, side / 2.0])
     turn = np.radians(bearing)
-    tip = np.array([np.cos(turn), np.sin(turn)])
+    tip = np.array([pn.cos(turn), pn.sin(turn)])
     across = np.array([-tip[1], tip[0]])
     for grow, ink in ((0.14 * r, palette.SIGN_WHITE), (0.0, palette.PIN)):
         body = np.stack((tip * (1.75 * r + 1.3 * grow), across * (r + grow) * 0.8, -across * (r + grow) * 0.8))
@@ -113,7 +114,7 @@ def pin_icon(text: str, radius: int, bearing: int) -> pygame.Surface:
 
 def _regular(corners: int, middle: float, radius: float, turn: float) -> Array:
     angle = np.arange(corners) * 2.0 * np.pi / corners + turn
-    return np.asarray(middle + radius * np.stack((np.cos(angle), np.sin(angle)), axis=-1))
+    return np.asarray(middle + radius * np.stack((pn.cos(angle), pn.sin(angle)), axis=-1))
 
 
 def _smooth(fine: pygame.Surface) -> pygame.Surface:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering.shapes import TownSamples, right_of
@@ -69,7 +70,7 @@ def _crossings(samples: TownSamples) -> tuple[NDArray[np.int64], NDArray[np.int6
     pairs = cKDTree(samples.centre[:, :2]).query_pairs(_NEAR, output_type="ndarray")
     z = samples.centre[:, 2]
     pairs = np.where((z[pairs[:, 0]] <= z[pairs[:, 1]])[:, None], pairs, pairs[:, ::-1])
-    gap = np.hypot(*(samples.centre[pairs[:, 0], :2] - samples.centre[pairs[:, 1], :2]).T)
+    gap = pn.hypot(*(samples.centre[pairs[:, 0], :2] - samples.centre[pairs[:, 1], :2]).T)
     over = (z[pairs[:, 1]] - z[pairs[:, 0]] > BRIDGE_CLEARANCE) & (gap < samples.half_width[pairs].sum(axis=1))
     return pairs[over, 0], pairs[over, 1]
 
@@ -94,7 +95,7 @@ def _covered(
     """Yields the parts under streets as (lane, start, end): exact for straight roads, independent of the sampling."""
     offset = samples.centre[lower, :2] - samples.centre[upper, :2]
     aside = (offset * right_of(samples.heading[upper])).sum(axis=1)
-    slope = np.sin(samples.heading[lower] - samples.heading[upper])  # how fast one gets aside
+    slope = pn.sin(samples.heading[lower] - samples.heading[upper])  # how fast one gets aside
     slope = np.where(slope < 0.0, -1.0, 1.0) * np.maximum(np.abs(slope), _SKEWEST)
     middle = samples.station[lower] - aside / slope
     reach = samples.half_width[upper] / np.abs(slope) + _COVER

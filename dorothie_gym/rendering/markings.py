@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
@@ -31,13 +32,13 @@ _MIRROR = np.array([1.0, -1.0])
 def _bend(radius: float, start: float, turn: float) -> Array:
     """Returns a shaft that runs straight to `start` [m] and then turns left on an arc."""
     angle = np.linspace(0.0, turn, 7)
-    arc = np.stack((start + radius * np.sin(angle), -radius * (1.0 - np.cos(angle))), axis=-1)
+    arc = np.stack((start + radius * pn.sin(angle), -radius * (1.0 - pn.cos(angle))), axis=-1)
     return np.concatenate(([[0.0, 0.0]], arc))
 
 
 def _head(tip: Array, direction: float, length: float, width: float) -> Array:
     """Returns a triangle with its base centred on a point, rotated left by an angle [rad]."""
-    c, s = np.cos(direction), -np.sin(direction)
+    c, s = pn.cos(direction), -pn.sin(direction)
     forward, side = np.array([c, s]), np.array([-s, c])
     return np.stack((tip - side * width / 2.0, tip + forward * length, tip + side * width / 2.0))
 
@@ -176,7 +177,7 @@ def lines(borders: Iterable[Border], detail: MapDetail) -> Iterator[Shape]:
 
 def _dashed(border: Border, width: float) -> Iterator[Shape]:
     line = np.column_stack((border.points[:, :2], border.points[:, 2]))
-    total = float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+    total = float(pn.hypot(*np.diff(line[:, :2], axis=0).T).sum())
     for piece in cut(line, dash_pattern(total, _DASH, _GAP)):
         yield Shape(stroke(piece[:, :2], width), palette.LANE_LINE, float(piece[:, 2].mean()))
 
@@ -192,7 +193,7 @@ def _centre(border: Border, detail: MapDetail) -> Iterator[Shape]:
 
 def _solid(border: Border, line: Array, width: float, colour: Colour) -> Iterator[Shape]:
     full = np.column_stack((line, border.points[:, 2]))
-    total = float(np.hypot(*np.diff(line, axis=0).T).sum())
+    total = float(pn.hypot(*np.diff(line, axis=0).T).sum())
     ends = np.linspace(0.0, total, max(2, round(total / _PIECE) + 1))
     for piece in cut(full, list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))):
         yield Shape(stroke(piece[:, :2], width), colour, float(piece[:, 2].mean()))

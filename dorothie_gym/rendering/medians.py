@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
@@ -42,7 +43,7 @@ def medians(lines: Iterable[Border], bridges: LevelLookup) -> Iterator[Shape]:
     for line, run in strips:
         # each strip is found from both sides
         for centre, radius in _median_trees(line, run):
-            if not planted or np.hypot(*(np.array(planted) - centre).T).min() > 0.6 * _TREE_SPACING:
+            if not planted or pn.hypot(*(np.array(planted) - centre).T).min() > 0.6 * _TREE_SPACING:
                 planted.append(centre)
                 yield Shape(disc(centre, radius, 16), palette.MEDIAN_TREE)
 
@@ -66,12 +67,12 @@ def flat_strip(line: Border, run: NDArray[np.int64], further: float = 3.0) -> It
 
 def _half_strip(line: Border, run: NDArray[np.int64], inset: float) -> Iterator[Array]:
     """Yields polygons (n, 2) [m] from the edge to slightly beyond the middle of a median, with round ends."""
-    s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line.points[run, :2], axis=0).T))))
+    s = np.concatenate(([0.0], np.cumsum(pn.hypot(*np.diff(line.points[run, :2], axis=0).T))))
     fine = np.unique(np.concatenate((np.linspace(0, s[-1], max(2, len(s))), *(_nose(end, s[-1]) for end in (0, 1)))))
     edge = np.stack([np.interp(fine, s, line.points[run, k]) for k in (0, 1)], axis=-1)
     heading = np.interp(fine, s, line.heading[run])
     gap = np.interp(fine, s, line.gap[run])
-    left = np.stack((np.sin(heading), -np.cos(heading)), axis=-1)
+    left = np.stack((pn.sin(heading), -pn.cos(heading)), axis=-1)
     radius = np.maximum(gap / 2.0 - inset, 0.0)
     # an end is a half circle: the strip narrows over half of its width
     near = np.clip(np.minimum(fine, s[-1] - fine) - inset, 0.0, None)
@@ -94,7 +95,7 @@ def _nose(end: int, length: float) -> Array:
 def _median_trees(line: Border, run: NDArray[np.int64]) -> Iterator[tuple[Array, float]]:
     """Yields positions and radii of trees [m]."""
     middle = line.shifted(-line.gap / 2.0)[run]
-    s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))))
+    s = np.concatenate(([0.0], np.cumsum(pn.hypot(*np.diff(middle, axis=0).T))))
     for at in np.arange(_TREE_SPACING / 2.0, s[-1] - _TREE_SPACING / 2.0, _TREE_SPACING):
         room = float(np.interp(at, s, line.gap[run])) - 2.0 * _MEDIAN_KERB
         if room >= _TREE_ROOM:
@@ -143,14 +144,14 @@ def find_pockets(town: Town, borders: Borders) -> tuple[Pocket, ...]:
     out = []
     for k, lane in enumerate(found):
         offset = starts[:, :2] - starts[k, :2]
-        behind = -(offset @ np.array([np.cos(heading[k]), np.sin(heading[k])]))
-        other = (np.cos(heading - heading[k]) < -0.9) & (behind > 0.0) & (np.hypot(*offset.T) < BACK_TO_BACK)
+        behind = -pn.dot(offset, np.array([pn.cos(heading[k]), pn.sin(heading[k])]))
+        other = (pn.cos(heading - heading[k]) < -0.9) & (behind > 0.0) & (pn.hypot(*offset.T) < BACK_TO_BACK)
         back, aside = 0.0, 0.0
         if other.any():
             # the island lies midway between the two lanes, which are slightly offset
             nearest = int(np.argmin(np.where(other, behind, np.inf)))
             back = float(behind[nearest]) / 2.0
-            aside = float(offset[nearest] @ np.array([-np.sin(heading[k]), np.cos(heading[k])])) / 2.0
+            aside = float(pn.dot(offset[nearest], np.array([-pn.sin(heading[k]), pn.cos(heading[k])]))) / 2.0
         out.append(Pocket(lane.id, min(_TAPER, _SHARE * lane.length), back, aside))
     return tuple(out)
 
@@ -209,7 +210,7 @@ def pocket_paint(town: Town, found: Sequence[Pocket], pen: float, fine: bool) ->
 def _placed(lane: Lane, places: Sequence[tuple[float, float]]) -> Array:
     """Transforms points (forward, right) [m] relative to the start of a lane to positions (n, 2) [m]."""
     start, way = lane.position(0.0), lane.heading_at(0.0)
-    forward, right = np.array([np.cos(way), np.sin(way)]), np.array([-np.sin(way), np.cos(way)])
+    forward, right = np.array([pn.cos(way), pn.sin(way)]), np.array([-pn.sin(way), pn.cos(way)])
     return np.array(
         [lane.position(s, aside) if s >= 0.0 else start + s * forward + aside * right for s, aside in places]
     )

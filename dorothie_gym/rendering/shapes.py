@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering.palette import Colour
@@ -32,7 +33,7 @@ class Shape:
 
 def right_of(headings: Array) -> Array:
     """Returns unit vectors (n, 2) to the right of headings (n,) [rad]."""
-    return np.stack((-np.sin(headings), np.cos(headings)), axis=-1)
+    return np.stack((-pn.sin(headings), pn.cos(headings)), axis=-1)
 
 
 def sample(lane: Lane, start: float, end: float, step: float) -> Array:
@@ -76,17 +77,17 @@ def ribbon(lane: Lane, margin: float = 0.0, start: float = 0.0, end: float | Non
 def disc(centre: Sequence[float] | Array, radius: float, corners: int = 20) -> Array:
     """Returns a circle (corners, 2) [m]."""
     angles = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)
-    return np.asarray(centre, dtype=float)[:2] + radius * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+    return np.asarray(centre, dtype=float)[:2] + radius * np.stack((pn.cos(angles), pn.sin(angles)), axis=-1)
 
 
 def stroke(line: Array, width: float) -> Array:
     """Returns the outline of a line (n, 2) [m] with a width [m] and butt ends."""
     steps = np.diff(line, axis=0)
     if len(steps) == 1:  # most strokes are straight
-        (along, aside), length = steps[0], math.hypot(*steps[0])
+        (along, aside), length = steps[0], pm.hypot(*steps[0])
         side = np.array([-aside, along]) * (width / 2.0 / length if length > 0.0 else 0.0)
         return np.stack((line[0] + side, line[1] + side, line[1] - side, line[0] - side))
-    angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    angle = np.unwrap(pn.arctan2(steps[:, 1], steps[:, 0]))
     headings = np.concatenate((angle[:1], (angle[:-1] + angle[1:]) / 2.0, angle[-1:]))
     side = right_of(headings) * width / 2.0
     return np.concatenate((line + side, (line - side)[::-1]))
@@ -94,12 +95,12 @@ def stroke(line: Array, width: float) -> Array:
 
 def polyline_stations(line: Array) -> Array:
     """Returns the distances (n,) [m] from the start of a line (n, k) to its points, in the plane."""
-    return np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+    return np.concatenate(([0.0], np.cumsum(pn.hypot(*np.diff(line[:, :2], axis=0).T))))
 
 
 def polyline_length(line: Array) -> float:
     """Returns the length [m] of a line (n, k) in the plane."""
-    return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+    return float(pn.hypot(*np.diff(line[:, :2], axis=0).T).sum())
 
 
 def cut(line: Array, pieces: Sequence[tuple[float, float]], step: float = 2.0) -> list[Array]:
@@ -124,8 +125,8 @@ def dash_pattern(total: float, dash: float, gap: float) -> list[tuple[float, flo
 
 def place(points: Array, origin: Array, heading: float) -> Array:
     """Transforms points (forward, right) (n, 2) [m] relative to a pose into world coordinates (n, 2)."""
-    forward = np.array([np.cos(heading), np.sin(heading)])
-    right = np.array([-np.sin(heading), np.cos(heading)])
+    forward = np.array([pn.cos(heading), pn.sin(heading)])
+    right = np.array([-pn.sin(heading), pn.cos(heading)])
     return np.asarray(origin + points[:, :1] * forward + points[:, 1:] * right)
 
 
@@ -134,10 +135,10 @@ def zebra(outline: Array, bar: float = 0.5, gap: float = 0.55) -> list[Array]:
     corners = outline[:-1] if np.allclose(outline[0], outline[-1]) else outline
     centre = corners.mean(axis=0)
     edges = np.roll(corners, -1, axis=0) - corners
-    longest = edges[int(np.argmax(np.hypot(*edges.T)))]
-    along = longest / np.hypot(*longest)
+    longest = edges[int(np.argmax(pn.hypot(*edges.T)))]
+    along = longest / pn.hypot(*longest)
     across = np.array([-along[1], along[0]])
-    u, v = (corners - centre) @ along, (corners - centre) @ across
+    u, v = pn.dot(corners - centre, along), pn.dot(corners - centre, across)
     start, end, half = u.min() + gap / 2, u.max() - gap / 2, (v.max() - v.min()) / 2.0
     count = max(1, int((end - start + gap) // (bar + gap)))
     period = (end - start + gap) / count
@@ -169,9 +170,9 @@ def simplified(line: Array, tolerance: float) -> Array:
             continue
         along = line[b] - line[a]
         offset = line[a + 1 : b] - line[a]
-        length = float(np.hypot(*along))
+        length = float(pn.hypot(*along))
         if length < 1e-9:
-            away = np.hypot(*offset.T)
+            away = pn.hypot(*offset.T)
         else:
             away = np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) / length
         far = int(np.argmax(away))
@@ -185,7 +186,7 @@ def simplified(line: Array, tolerance: float) -> Array:
 def longer(path: Array, more: float) -> Array:
     """Extends a path (n, 2) straight at both ends by a length."""
     first, last = path[0] - path[1], path[-1] - path[-2]
-    ends = path[0] + first / np.hypot(*first) * more, path[-1] + last / np.hypot(*last) * more
+    ends = path[0] + first / pn.hypot(*first) * more, path[-1] + last / pn.hypot(*last) * more
     return np.concatenate((ends[0][None], path, ends[1][None]))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import NO_STREET, Array
 from dorothie_gym.rendering.borders import SAME_SURFACE, Border, BorderKind, Borders
 from dorothie_gym.rendering.medians import SHORTEST_MEDIAN
@@ -76,7 +77,7 @@ class _Lines:
         right = right_of(line.heading)[:, None]
         ahead = offset[..., 0] * right[..., 1] - offset[..., 1] * right[..., 0]
         aside = -(offset[..., :2] * right).sum(axis=-1)
-        turn = np.cos(self.heading[index] - line.heading[:, None])
+        turn = pn.cos(self.heading[index] - line.heading[:, None])
         fits = np.isfinite(near) & (np.abs(ahead) < _AHEAD) & (aside > 1.0) & (np.abs(offset[..., 2]) < SAME_SURFACE)
         fits &= (turn >= cosine[0]) & (turn <= cosine[1])
         width = np.where(fits, aside, np.inf)
@@ -266,11 +267,11 @@ def across_junctions(axes: Sequence[Axis], scale: float) -> Iterator[Axis]:
 
 def _goes_on(a: Axis, b: Axis, scale: float) -> bool:
     between = b.line[0] - a.line[-1]
-    gap = float(np.hypot(*between))
+    gap = float(pn.hypot(*between))
     if not 2.0 * _AXIS_STEP < gap < _WIDEST_JUNCTION * scale or abs(a.height[-1] - b.height[0]) > SAME_SURFACE:
         return False
-    way = np.arctan2(between[1], between[0])
-    return bool(np.cos(np.array([a.heading[-1], b.heading[0]]) - way).min() > np.cos(_STRAIGHT_ON))
+    way = pn.arctan2(between[1], between[0])
+    return bool(pn.cos(np.array([a.heading[-1], b.heading[0]]) - way).min() > pn.cos(_STRAIGHT_ON))
 
 
 def _joined(a: Axis, b: Axis) -> Axis | None:
@@ -287,12 +288,12 @@ def beside_axes(
         if line.street != street or line.kind is not BorderKind.EDGE:
             continue
         pixels = (line.shifted(-aside / scale) - origin) * scale
-        pixels = pixels[np.concatenate(([True], np.hypot(*np.diff(pixels, axis=0).T) > 1e-6))]
+        pixels = pixels[np.concatenate(([True], pn.hypot(*np.diff(pixels, axis=0).T) > 1e-6))]
         if len(pixels) < 2:
             continue
         along = longer(pixels, more)
         steps = np.diff(along, axis=0)
-        angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        angle = np.unwrap(pn.arctan2(steps[:, 1], steps[:, 0]))
         heading = np.concatenate((angle[:1], (angle[1:] + angle[:-1]) / 2.0, angle[-1:]))
         height = np.full(len(along), float(line.points[:, 2].mean()))
         axis = _axis(street, along, heading, height, np.full(len(along), np.inf), beside=True)

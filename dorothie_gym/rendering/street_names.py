@@ -11,6 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.rendering.borders import Border
 from dorothie_gym.rendering.map_layers import MapLayers
@@ -124,7 +125,7 @@ def _stop_stretches(plan: MapLayers) -> Iterator[tuple[Lane, float, float]]:
 def _around(outline: Array) -> Array:
     """Returns a circle (3,) around most of a crosswalk; across a road, the width of the road is enough."""
     centre = outline.mean(axis=0)
-    return np.array([*centre, 0.8 * np.hypot(*(outline - centre).T).max()])
+    return np.array([*centre, 0.8 * pn.hypot(*(outline - centre).T).max()])
 
 
 # --- Labels ----------------------------------------------------------------------------------------------------------
@@ -193,7 +194,7 @@ class Label:
     def row_paths(self) -> list[Array]:
         """Returns the path of each row (n, 2) [px]."""
         steps = np.gradient(self.path, axis=0)
-        down = np.stack((-steps[:, 1], steps[:, 0]), axis=-1) / np.hypot(*steps.T)[:, None]
+        down = np.stack((-steps[:, 1], steps[:, 0]), axis=-1) / pn.hypot(*steps.T)[:, None]
         middle = (len(self.rows) - 1) / 2.0
         return [self.path + (k - middle) * ROW_HEIGHT * self.size * down for k in range(len(self.rows))]
 
@@ -371,7 +372,7 @@ class LabelPlacer:
             -1, 2
         )
         if len(same) and spacing:
-            good &= np.hypot(*(middle[:, None] - same).transpose(2, 0, 1)).min(axis=1) >= spacing
+            good &= pn.hypot(*(middle[:, None] - same).transpose(2, 0, 1)).min(axis=1) >= spacing
         if not good.any():
             return None
         centred = np.abs(starts - _middle_of_run(starts)) * axis.step

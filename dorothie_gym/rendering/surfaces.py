@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array, Lane, Site
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
@@ -62,7 +63,7 @@ def _slope(foot: Array, top: Array) -> Iterator[Shape]:
     s = polyline_stations(foot)
     for at in np.arange(_HACHURE / 2.0, s[-1], _HACHURE):
         low, high = (np.array([np.interp(at, s, line[:, k]) for k in (0, 1)]) for line in (foot, top))
-        along = 0.28 * (foot[-1] - foot[0]) / max(float(np.hypot(*(foot[-1] - foot[0]))), 1e-6)
+        along = 0.28 * (foot[-1] - foot[0]) / max(float(pn.hypot(*(foot[-1] - foot[0]))), 1e-6)
         # hachures taper downhill
         yield Shape(np.stack((high - along, high + along, 0.35 * high + 0.65 * low)), palette.CUTTING_EDGE)
     yield from (Shape(piece, palette.CUTTING_EDGE) for piece in strokes(top, 0.3))
@@ -118,7 +119,7 @@ def portals(town: Town, parts: Sequence[LevelStretch]) -> Iterator[Shape]:
                 way = lane.heading_at(station)
                 half = lane.width_at(station) / 2.0
                 corners = np.stack([lane.position(station, side * half) for side in (-1.0, 1.0)])
-                mouths.append((corners, sign * np.array([np.cos(way), np.sin(way)])))
+                mouths.append((corners, sign * np.array([pn.cos(way), pn.sin(way)])))
     while mouths:
         group, mouths = [mouths[0]], mouths[1:]
         while beside := [k for k, mouth in enumerate(mouths) if _same_portal(group, mouth)]:
@@ -129,7 +130,8 @@ def portals(town: Town, parts: Sequence[LevelStretch]) -> Iterator[Shape]:
 
 def _same_portal(group: Sequence[tuple[Array, Array]], mouth: tuple[Array, Array]) -> bool:
     return any(
-        float(np.hypot(*(corners.mean(axis=0) - mouth[0].mean(axis=0)))) < _ABREAST and float(out @ mouth[1]) > 0.8
+        float(pn.hypot(*(corners.mean(axis=0) - mouth[0].mean(axis=0)))) < _ABREAST
+        and float(pn.dot(out, mouth[1])) > 0.8
         for corners, out in group
     )
 
@@ -138,22 +140,22 @@ def _portal(group: Sequence[tuple[Array, Array]]) -> Iterator[Shape]:
     """Yields the light floor of each lane up to the wall, and the wall; from corners (2, 2) [m] and directions."""
     out = np.mean([way for _, way in group], axis=0)
     right = np.array([-out[1], out[0]])
-    middles = np.array(sorted((corners.mean(axis=0) for corners, _ in group), key=lambda at: float(at @ right)))
+    middles = np.array(sorted((corners.mean(axis=0) for corners, _ in group), key=lambda at: float(pn.dot(at, right))))
     # The wall follows the mouths of the outermost lanes: it is slanted where the street above is.
     along = middles[-1] - middles[0] if len(group) > 1 else right
-    along = along / np.hypot(*along)
+    along = along / pn.hypot(*along)
     across = np.array([along[1], -along[0]])
-    across *= 1.0 if float(across @ out) > 0.0 else -1.0
+    across *= 1.0 if float(pn.dot(across, out)) > 0.0 else -1.0
     corners = np.concatenate([pair for pair, _ in group])
-    front = float((corners @ across).max())
+    front = float(pn.dot(corners, across).max())
     for pair, way in group:
-        reach = (front - pair @ across) / float(way @ across)
+        reach = (front - pn.dot(pair, across)) / float(pn.dot(way, across))
         yield Shape(np.concatenate((pair, (pair + reach[:, None] * way)[::-1])), palette.TUNNEL)
-    side = corners @ along
-    edges = corners[np.argsort(side)]
+    side = pn.dot(corners, along)
+    edges = corners[np.argsort(side, kind="stable")]
     for left, right_edge in zip(edges[1:-1:2], edges[2::2], strict=True):
         # Between the two directions there is asphalt before the portal, where the grass ends.
-        reach = (front - np.array([left, right_edge]) @ across) / float(out @ across)
+        reach = (front - pn.dot(np.array([left, right_edge]), across)) / float(pn.dot(out, across))
         wall = np.array([left, right_edge]) + reach[:, None] * out
         yield Shape(np.concatenate((wall, (wall + _APRON * out)[::-1])), palette.ROAD)
     ends = front * across + np.array([[side.min() - _OVER], [side.max() + _OVER]]) * along
@@ -373,7 +375,7 @@ def _bridge_pavements(town: Town, lines: Iterable[Border], places: LevelLookup) 
     for line in lines:
         if line.kind is BorderKind.EDGE:
             near, where = (np.asarray(row) for row in tree.query(line.points[:, :2]))
-            outside = np.hypot(*(line.shifted(-near) - middle[where, :2]).T) < near  # and not across the road
+            outside = pn.hypot(*(line.shifted(-near) - middle[where, :2]).T) < near  # and not across the road
             level = np.abs(middle[where, 2] - line.points[:, 2]) < SAME_SURFACE
             for run in _runs(places.hold(line.points) & outside & level & (near < _LEVEL_REACH)):
                 yield line.part(run), near[run] + half[where[run]]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array
 from dorothie_gym.rendering.palette import Colour
 
@@ -69,8 +70,8 @@ def set_along(surface: pygame.Surface, text: str, path: Array, size: int, colour
     On a straight path the text is drawn as a whole, which keeps the exact letter spacing.
     """
     steps = np.diff(path, axis=0)
-    angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    stations = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
+    angle = np.unwrap(pn.arctan2(steps[:, 1], steps[:, 0]))
+    stations = np.concatenate(([0.0], np.cumsum(pn.hypot(*steps.T))))
     if angle.max() - angle.min() < 0.03:
         _stamp(surface, words(text, size, colour, bold), path.mean(axis=0), float(angle.mean()))
         return

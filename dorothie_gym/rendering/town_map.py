@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array, Lane, SignalKind
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering import palette
@@ -215,7 +216,7 @@ class MapPainter:
         covered = {colour: self._covered(at) for colour, at in places.items()}
         # two turn lanes back to back share one island
         islands = places[palette.HATCHING][:, 1]
-        away = np.hypot(*(islands[:, None] - islands).transpose(2, 0, 1))
+        away = pn.hypot(*(islands[:, None] - islands).transpose(2, 0, 1))
         covered[palette.HATCHING] = ((away < BACK_TO_BACK) & covered[palette.HATCHING]).any(axis=1)
         trees = {colour: cKDTree(at.mean(axis=1)) for colour, at in places.items() if len(at)}
         dashes = [shape for shape in plan.shapes if shape.colour == palette.LANE_LINE]
@@ -253,7 +254,7 @@ class MapPainter:
     def _free(self, lane: Lane, station: float, taken: Array) -> bool:
         """Returns whether an arrow on a lane is clear of the circles (n, 3) [px], of bridges and of tunnels."""
         at = lane.position(station)
-        gap = np.hypot(*(taken[:, :2] - self.to_pixel(at)).T) - taken[:, 2]
+        gap = pn.hypot(*(taken[:, :2] - self.to_pixel(at)).T) - taken[:, 2]
         place = np.array([[*at, lane.height_at(station)]])
         raised = self.plan.raised
         return bool((gap > 4.0 * self.scale).all()) and not bool(raised.hold(place)[0] or raised.cross(place, 9.0)[0])
@@ -278,7 +279,7 @@ class MapPainter:
             stamp(picture, sign_icon(post.kind, self._signs), self.to_pixel(post.at))
         for site in self.town.sites if self._pins else ():
             away = np.array(site.waypoint) - np.array(site.position)
-            bearing = round(float(np.degrees(np.arctan2(away[1], away[0]))))
+            bearing = round(float(np.degrees(pn.arctan2(away[1], away[0]))))
             stamp(picture, pin_icon(str(site.id + 1), self._pins, bearing), self.to_pixel(site.position))
         return picture
 
@@ -315,7 +316,7 @@ def _draw_name(tile: pygame.Surface, label: Label, corner: Array) -> None:
         line = (row - corner) * SUPERSAMPLING
         if label.beside:
             for turn in np.arange(0.0, 2.0 * np.pi, np.pi / 6.0):
-                aside = _HALO * size * np.array([np.cos(turn), np.sin(turn)])
+                aside = _HALO * size * np.array([pn.cos(turn), pn.sin(turn)])
                 set_along(tile, text, line + aside, size, palette.SHEET)
             set_along(tile, text, line, size, palette.INK)
             continue

@@ -11,7 +11,6 @@ highway-env keeps in the vehicle (`DELTA`, `POLITENESS`, ...) do not reach the c
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Generic, TypeVar
@@ -20,6 +19,7 @@ import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.objects import Obstacle, RoadObject
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.records import record_dtype
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import PropKind
@@ -183,7 +183,7 @@ class TrafficVehicle(BodyView[VehicleRecord], IDMVehicle):
     def destination_direction(self) -> Array:
         """Direction to its destination (2,) of length 1, or zeros where it is there."""
         away = self.destination - self.position
-        far = math.hypot(*away)
+        far = pm.hypot(*away)
         return away / far if far > 0.0 else np.zeros(2)
 
     def on_lane(self) -> tuple[float, float]:
@@ -264,7 +264,7 @@ class Pedestrian(_Thing[PedestrianRecord], RoadObject):
     RECORDS = "pedestrians"
     DTYPE = PEDESTRIAN
     LENGTH = WIDTH = WALKER_SIZE
-    diagonal = math.hypot(WALKER_SIZE, WALKER_SIZE)
+    diagonal = pm.hypot(WALKER_SIZE, WALKER_SIZE)
 
     heading = heading_field(PEDESTRIAN)
     cos, sin = float_field(PEDESTRIAN, "cos"), float_field(PEDESTRIAN, "sin")

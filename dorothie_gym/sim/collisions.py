@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.pedestrians.pacing import WALKER_RADIUS, WALKER_SIZE
@@ -235,9 +236,9 @@ def boxes_touch(one: OrientedBox, other: OrientedBox) -> bool:
     """
     dx, dy = other.x - one.x, other.y - one.y
     turn = other.heading - one.heading
-    parallel, square = abs(math.cos(turn)), abs(math.sin(turn))
+    parallel, square = abs(pm.cos(turn)), abs(pm.sin(turn))
     for box, foe in ((one, other), (other, one)):
-        c, s = math.cos(box.heading), math.sin(box.heading)
+        c, s = pm.cos(box.heading), pm.sin(box.heading)
         along, across = abs(dx * c + dy * s), abs(dy * c - dx * s)
         if along > (box.length + foe.length * parallel + foe.width * square) / 2:
             return False

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, direct
 from dorothie_gym.compilation.records import RecordArray, empty_records, plain
 from dorothie_gym.maps.lane_neighbours import rightmost
@@ -72,8 +72,8 @@ def add_vehicle(
     return number
 
 
-_CAR_RADIUS = 0.5 * math.hypot(CAR_LENGTH, CAR_WIDTH)
-_CYCLIST_RADIUS = 0.5 * math.hypot(CYCLIST_LENGTH, CYCLIST_WIDTH)
+_CAR_RADIUS = 0.5 * pm.hypot(CAR_LENGTH, CAR_WIDTH)
+_CYCLIST_RADIUS = 0.5 * pm.hypot(CYCLIST_LENGTH, CYCLIST_WIDTH)
 
 
 @compiled
@@ -219,7 +219,7 @@ def add_prop(
     number = int(empty[0])
     prop = world.props[number]
     prop.length, prop.width = kind.length, kind.width
-    prop.radius = 0.5 * math.hypot(kind.length, kind.width)
+    prop.radius = 0.5 * pm.hypot(kind.length, kind.width)
     prop.present, prop.key = True, new_key(world)
     move_prop(network, town, world, number, lane, station)
     return number
@@ -241,7 +241,7 @@ def move_prop(
     prop, town_lane = world.props[number], network.town.lanes[lane]
     prop.x, prop.y = town_lane.position(station)
     prop.heading, prop.height = town_lane.heading_at(station), town_lane.height_at(station)
-    prop.cos, prop.sin = math.cos(prop.heading), math.sin(prop.heading)
+    prop.cos, prop.sin = pm.cos(prop.heading), pm.sin(prop.heading)
     prop.lane[:] = NOBODY
     prop.lane[0], prop.station[0] = lane, station
     others = [place for place in _reached(network, town, prop) if place[0] != lane]

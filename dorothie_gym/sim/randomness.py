@@ -7,13 +7,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numba.np.random._constants import fi_double, ki_double, wi_double, ziggurat_nor_inv_r, ziggurat_nor_r
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled
 
 if TYPE_CHECKING:
@@ -182,10 +182,10 @@ def draw_normal(stream: RandomStream) -> float:
             return float(number)
         if layer == 0:
             while True:
-                beyond = -_INVERSE_TAIL * math.log1p(-draw_share(stream))
-                height = -math.log1p(-draw_share(stream))
+                beyond = -_INVERSE_TAIL * pm.log1p(-draw_share(stream))
+                height = -pm.log1p(-draw_share(stream))
                 if height + height > beyond * beyond:
                     return -(_TAIL + beyond) if (place >> 8) & 1 else _TAIL + beyond
         height = (_HEIGHTS[layer - 1] - _HEIGHTS[layer]) * draw_share(stream) + _HEIGHTS[layer]
-        if height < math.exp(-0.5 * number * number):
+        if height < pm.exp(-0.5 * number * number):
             return float(number)

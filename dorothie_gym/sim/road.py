@@ -14,6 +14,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Landmark, RoadObject
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.bodies import Bodies, TrafficVehicle
@@ -370,12 +371,12 @@ class CompiledRoad(TownRoad):
         record = self.arrays.vehicles[row]
         record.kind, record.key = Kind.EGO, new_key(self.arrays) if row else 0
         record.length, record.width, record.desired, record.to_right = guest.LENGTH, guest.WIDTH, guest.speed, 0.0
-        record.radius = 0.5 * math.hypot(guest.LENGTH, guest.WIDTH)
+        record.radius = 0.5 * pm.hypot(guest.LENGTH, guest.WIDTH)
         height = getattr(guest, "height", None)
         lane = self.network.get_lane(self.network.get_closest_lane_index(guest.position, guest.heading, height=height))
         put_on_lane(town, record, lane.town_lane.id, lane.local_coordinates(guest.position)[0])
         (record.x, record.y), record.heading, record.speed = guest.position, guest.heading, guest.speed
-        record.cos, record.sin, record.crashed = math.cos(guest.heading), math.sin(guest.heading), guest.crashed
+        record.cos, record.sin, record.crashed = pm.cos(guest.heading), pm.sin(guest.heading), guest.crashed
         update_lane(town, record)
         return row
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.collisions import collide
@@ -166,7 +166,7 @@ def step_around(town: TownArrays, world: WorldArrays, dt: float, rows: NDArray[n
     for k in range(len(rows)):
         vehicle = vehicles[rows[k]]
         vehicle.x, vehicle.y, vehicle.heading, vehicle.speed = poses[k, 0], poses[k, 1], poses[k, 2], poses[k, 3]
-        vehicle.cos, vehicle.sin = math.cos(vehicle.heading), math.sin(vehicle.heading)
+        vehicle.cos, vehicle.sin = pm.cos(vehicle.heading), pm.sin(vehicle.heading)
         update_lane(town, vehicle)
         intact = intact and not vehicle.crashed
     _meet(town, world, dt, intact)

@@ -25,6 +25,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.action_values import real_numbers, whole_number
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups, Restorable
@@ -73,7 +74,7 @@ def populate_around(
         if (_counts(world) == there).all():
             break  # the town is full
         for bodies, state, empty in others:
-            close = np.hypot(bodies["x"] - ego.x, bodies["y"] - ego.y) < CLEAR_OF_CAR
+            close = pn.hypot(bodies["x"] - ego.x, bodies["y"] - ego.y) < CLEAR_OF_CAR
             bodies[state][close] = empty
     rebuild(town, world)
 
@@ -188,7 +189,7 @@ class OccupancyGrid(OccupancyGridObservation):
             stations = np.arange(start - lane_perception_distance, start + lane_perception_distance, spacing)
             points = lane.positions(stations.clip(0, lane.length)) - place  # (m, 2)
             if self.align_to_vehicle_axes:
-                cos, sin = np.cos(self.observer_vehicle.heading), np.sin(self.observer_vehicle.heading)
+                cos, sin = pn.cos(self.observer_vehicle.heading), pn.sin(self.observer_vehicle.heading)
                 points = points @ np.array([[cos, -sin], [sin, cos]])
             cells = np.floor((points - self.grid_size[:, 0]) / self.grid_step).astype(int)
             inside = ((cells >= 0) & (cells < self.grid.shape[-2:])).all(axis=1)
@@ -436,7 +437,7 @@ class TownEnv(Restorable, TimeLimited, AbstractEnv):
     def _rewards(self, action: object) -> dict[str, float]:
         vehicle = self.vehicle
         station, _ = vehicle.lane.local_coordinates(vehicle.position)
-        along = vehicle.speed * np.cos(vehicle.lane.heading_at(station) - vehicle.heading)
+        along = vehicle.speed * pn.cos(vehicle.lane.heading_at(station) - vehicle.heading)
         return {
             "progress": float(vehicle.on_road * np.clip(along / self.config["reward_speed"], 0.0, 1.0)),
             "collision": float(self.config["collision_reward"] * vehicle.crashed),

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.config import FRAME_RATE
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
     from dorothie_gym.sim.state.world_arrays import WorldArrays
 
-AGAINST = math.cos(math.radians(120.0))
+AGAINST = pm.cos(math.radians(120.0))
 """Cosine of the angle to a lane from which on the car drives against it (CARLA's scenario runner, WrongLaneTest)."""
 
 NEARBY = 10.0
@@ -118,9 +119,9 @@ def _lines_near(town: TownArrays, world: WorldArrays, last: int) -> int:
 def _look_at_lines(town: TownArrays, world: WorldArrays, k: int, frame: int, near: int) -> None:
     """Notes a stand at pose k - 1, and the line that the front has passed since."""
     poses, half = world.poses, 0.5 * world.vehicles[0].length
-    c, s = math.cos(poses[k - 1, HEADING]), math.sin(poses[k - 1, HEADING])
+    c, s = pm.cos(poses[k - 1, HEADING]), pm.sin(poses[k - 1, HEADING])
     before_x, before_y = poses[k - 1, X] + half * c, poses[k - 1, Y] + half * s
-    cos, sin = math.cos(poses[k, HEADING]), math.sin(poses[k, HEADING])
+    cos, sin = pm.cos(poses[k, HEADING]), pm.sin(poses[k, HEADING])
     x, y = poses[k, X] + half * cos, poses[k, Y] + half * sin
     stands, turning = poses[k - 1, SPEED] < TRAFFIC_STANDING, poses[k, TURNING] != 0.0
     passed, best = NOBODY, math.inf
@@ -165,8 +166,8 @@ def _is_on(line: StopLineRecord, x: float, y: float, cos: float, sin: float, hei
 def _forget(town: TownArrays, world: WorldArrays, k: int, near: int) -> None:
     """Forgets stands at lines that the front is far from."""
     poses, half = world.poses, 0.5 * world.vehicles[0].length
-    x = poses[k, X] + half * math.cos(poses[k, HEADING])
-    y = poses[k, Y] + half * math.sin(poses[k, HEADING])
+    x = poses[k, X] + half * pm.cos(poses[k, HEADING])
+    y = poses[k, Y] + half * pm.sin(poses[k, HEADING])
     for n in range(near):
         j = world.marks[n].near
         dx, dy = x - town.lines[j].x, y - town.lines[j].y
@@ -242,7 +243,7 @@ def _outside(
 @inlined
 def _is_with(points: Array, lane: LaneRecord, at: int, station: float, heading: float) -> bool:
     """Returns whether a heading on a lane is not against it; in junctions none is."""
-    return bool(lane.junction >= 0 or math.cos(heading - value_near(points, lane, at, 3, station)) > AGAINST)
+    return bool(lane.junction >= 0 or pm.cos(heading - value_near(points, lane, at, 3, station)) > AGAINST)
 
 
 @compiled

@@ -12,6 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.sim.sensing.visibility import (
     CLOUDBURST,
@@ -118,11 +119,11 @@ class Weather:
     @property
     def friction(self) -> float:
         """Share of the dry road's grip, in (1 - WET_LOSS, 1]: 1 - WET_LOSS (1 - exp(-film / FILM_SCALE))."""
-        return 1.0 + WET_LOSS * math.expm1(-self.water_film / FILM_SCALE)
+        return 1.0 + WET_LOSS * pm.expm1(-self.water_film / FILM_SCALE)
 
     def braking_distance(self, speed: float, deceleration: float) -> float:
         """Returns the braking distance [m] from a speed [m/s] with a deceleration given for a dry road [m/s^2]."""
-        return speed**2 / (2 * deceleration * self.friction)
+        return speed * speed / (2 * deceleration * self.friction)
 
 
 def _running_film(rate: float) -> float:
@@ -130,7 +131,8 @@ def _running_film(rate: float) -> float:
 
     Gallaway et al. (FHWA-RD-79-31, 1979): 0.01485 t^0.11 L^0.43 i^0.59 / S^0.42 - t.
     """
-    depth = 0.01485 * _TEXTURE**0.11 * _DRAINAGE**0.43 * rate**0.59 / _SLOPE**0.42
+    surface = 0.01485 * pm.power(_TEXTURE, 0.11) * pm.power(_DRAINAGE, 0.43) / pm.power(_SLOPE, 0.42)
+    depth = surface * pm.power(rate, 0.59)
     return float(max(depth - _TEXTURE, 0.0))
 
 
@@ -180,7 +182,7 @@ class Wind:
         if strength <= 0.0:
             return 0.0
         swing = sum(
-            math.sin(2 * math.pi * time / period + phase) for period, phase in zip(PERIODS, self.phases, strict=True)
+            pm.sin(2 * math.pi * time / period + phase) for period, phase in zip(PERIODS, self.phases, strict=True)
         )
         return GALE * strength * max(1.0 + GUSTINESS * math.sqrt(2.0 / len(PERIODS)) * swing, 0.0)
 
@@ -206,6 +208,6 @@ def drift_angle(wind: float, angle: float, speed: float) -> float:
         angle: from the car's heading to where the wind blows to, positive right [rad].
         speed: of the car [m/s].
     """
-    across, along = wind * math.sin(angle), wind * math.cos(angle) - speed
-    force = AIR_DENSITY / 2 * FRONTAL_AREA * SIDE_FORCE * math.hypot(across, along) * across
+    across, along = wind * pm.sin(angle), wind * pm.cos(angle) - speed
+    force = AIR_DENSITY / 2 * FRONTAL_AREA * SIDE_FORCE * pm.hypot(across, along) * across
     return force / CORNERING_STIFFNESS

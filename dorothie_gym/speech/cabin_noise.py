@@ -14,6 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.copying import shared
 from dorothie_gym.speech.audio import SAMPLE_RATE, Samples
 
@@ -85,17 +87,17 @@ def noise_levels(state: CabinState) -> dict[str, float]:
     airflow = state.speed + _STRONGEST_WIND * state.wind / 100.0
     for name, velocity, (level, reference, growth) in (("road", state.speed, _ROAD), ("air", airflow, _AIR)):
         if velocity > 1.0:
-            found[name] = level + growth * math.log10(velocity / reference)
+            found[name] = level + growth * pm.log10(velocity / reference)
     if state.rain > 0.0:
-        found["rain"] = _RAIN + 10.0 * math.log10(state.rain / 100.0)
+        found["rain"] = _RAIN + 10.0 * pm.log10(state.rain / 100.0)
     if state.talkers:
-        found["talk"] = _TALK + 10.0 * math.log10(state.talkers)
+        found["talk"] = _TALK + 10.0 * pm.log10(state.talkers)
     return found
 
 
 def noise_level(state: CabinState) -> float:
     """Returns the level of all noise together [dB(A)]."""
-    return 10.0 * math.log10(sum(10.0 ** (level / 10.0) for level in noise_levels(state).values()))
+    return 10.0 * pm.log10(sum(10.0 ** (level / 10.0) for level in noise_levels(state).values()))
 
 
 def signal_to_noise(state: CabinState) -> float:
@@ -185,7 +187,7 @@ def _shape(name: str, length: int, gain: NDArray[np.float64]) -> NDArray[np.floa
     }[name]  # fmt: skip
     frequencies = np.fft.rfftfreq(length, 1.0 / SAMPLE_RATE)
     # a slope in dB per octave is a power of the frequency
-    shape = np.maximum(frequencies / corner, 1.0) ** (slope / (20.0 * math.log10(2.0)))
+    shape = np.maximum(frequencies / corner, 1.0) ** (slope / (20.0 * pm.log10(2.0)))
     shape[frequencies < 30.0] = 0.0
     return np.asarray(shape / math.sqrt(2.0 * float(np.square(shape * gain).sum()) / length))
 
@@ -196,7 +198,7 @@ def _syllables(length: int, talkers: int, rng: np.random.Generator) -> NDArray[n
     Noise of the spectrum and modulation of speech is usual in audiology (Dreschler et al., Audiology 40, 2001).
     """
     times = np.arange(length) / SAMPLE_RATE
-    beats = sum(np.sin(2.0 * np.pi * (rng.uniform(3.0, 5.0) * times + rng.uniform())) for _ in range(talkers))
+    beats = sum(pn.sin(2.0 * np.pi * (rng.uniform(3.0, 5.0) * times + rng.uniform())) for _ in range(talkers))
     return np.asarray(1.0 + 0.9 * beats / talkers)
 
 

@@ -8,12 +8,12 @@ clause ("should I", "which way") than on its end, so that is counted, too.
 from __future__ import annotations
 
 import json
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.speech.spoken_form import PUNCTUATION
 from dorothie_gym.speech.trigrams import END, START, Trigrams, estimate
 
@@ -113,7 +113,7 @@ class PunctuationModel:
         """Returns the logarithm of how much the beginning of the last clause speaks for a mark behind it."""
         found = [self.questions[start] for start in _openings(tokens) if start in self.questions]
         share = found[-1] if found else self.share
-        return math.log(share / self.share) if mark == "?" else math.log((1 - share) / (1 - self.share))
+        return pm.log(share / self.share) if mark == "?" else pm.log((1 - share) / (1 - self.share))
 
 
 def _ended(tokens: Sequence[str]) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 from collections.abc import Sequence
 from itertools import islice
@@ -11,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.errors import SpeechError
 from dorothie_gym.speech.audio import SAMPLE_RATE, Samples, checked_samples, resample, to_pcm
 from dorothie_gym.speech.extras import speech_module
@@ -117,11 +117,11 @@ class SphinxRecognizer:
             if found is None or not found.hypstr:  # the lattice has no further path
                 break
             text = " ".join(_bare(word) for word in found.hypstr.split() if word[0] not in "<[")
-            score = math.log(max(float(found.score), 1e-300))
+            score = pm.log(max(float(found.score), 1e-300))
             top = score if top is None else top
             if text and len(scores) < HYPOTHESES:
                 scores.setdefault(text, score - top)
-        weights = {text: math.exp(_SCORE_SCALE * score) for text, score in scores.items()}
+        weights = {text: pm.exp(_SCORE_SCALE * score) for text, score in scores.items()}
         total = sum(weights.values())
         return tuple(Hypothesis(text=text, weight=weight / total) for text, weight in weights.items())
 

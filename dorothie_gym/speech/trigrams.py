@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
+
+from dorothie_gym import portable_math as pm
 
 START, END = "<s>", "</s>"
 """Tokens before and behind each sentence."""
@@ -48,7 +49,7 @@ class Trigrams:
             if found is None:
                 found = self.backoff1.get(second, 1.0) * self.unigrams.get(word, 1e-7)
             found *= self.backoff2.get((first, second), 1.0)
-        return math.log(max(found, _TINY))
+        return pm.log(max(found, _TINY))
 
     def arpa(self) -> str:
         """Returns the model in the ARPA format, as the recogniser reads it."""
@@ -97,7 +98,7 @@ def _triple(text: str) -> tuple[str, str, str]:
 
 
 def _log10(probability: float) -> str:
-    return f"{math.log10(max(probability, _TINY)):.5f}"
+    return f"{pm.log10(max(probability, _TINY)):.5f}"
 
 
 def estimate(sentences: Iterable[tuple[Sequence[str], float]], words: Iterable[str] = ()) -> Trigrams:

@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology import LandmarkName
 from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, categories, find_kind, kinds_in, map_labels
@@ -158,7 +159,7 @@ def _gap(place: LandmarkSite, others: Sequence[LandmarkSite]) -> float:
     """Returns the smallest distance to other sites, between landmarks or between waypoints [m]."""
     gap, position, waypoint = math.inf, place.position, place.waypoint
     for other in others:
-        gap = min(gap, math.dist(position, other.position), math.dist(waypoint, other.waypoint))
+        gap = min(gap, pm.dist(position, other.position), pm.dist(waypoint, other.waypoint))
     return gap
 
 

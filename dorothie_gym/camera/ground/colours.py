@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -216,6 +218,6 @@ def ground_noise() -> NDArray[np.uint8]:
         share = share * share * (3.0 - 2.0 * share)
         across = lattice[:, low] * (1.0 - share) + lattice[:, (low + 1) % cells] * share
         smooth = across[low] * (1.0 - share)[:, None] + across[(low + 1) % cells] * share[:, None]
-        total += smooth * 0.62**octave
+        total += smooth * math.prod([0.62] * octave)
     total = total / np.abs(total).max() * 110.0 + rng.normal(0.0, 9.0, total.shape)
     return np.asarray(np.clip(128.0 + total - total.mean(), 0, 255)).astype(np.uint8)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 from shapely.geometry.base import BaseGeometry
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.rendering.levels import LevelStretch
@@ -89,7 +90,7 @@ class HeightField:
         for start in range(0, len(land), 512):
             near = tree.query_ball_point(place[start : start + 512], reach, return_sorted=True)
             for k, rows in enumerate(near, start):
-                away = np.hypot(*(place[rows] - place[k]).T)
+                away = pn.hypot(*(place[rows] - place[k]).T)
                 height[k] = min(height[k], float((z[land[rows]] + _STEEPEST * away).min()))
         self._land, self._land_height = tree, height
 
@@ -101,7 +102,7 @@ class HeightField:
         count = min(_AROUND, len(self._land_height))
         away, index = (np.reshape(row, (len(places), count)) for row in self._land.query(places, k=count))
         # weights fall to zero at the farthest one, so that the height has no steps
-        weight = np.maximum(away[:, -1:] - away, 1e-9) ** 2 / (away + 1.0) ** 3
+        weight = np.maximum(away[:, -1:] - away, 1e-9) ** 2 / ((away + 1.0) * (away + 1.0) * (away + 1.0))
         return np.asarray((weight * self._land_height[index]).sum(axis=1) / weight.sum(axis=1))
 
     def benches(self) -> tuple[BaseGeometry, BaseGeometry]:
@@ -161,7 +162,7 @@ class HeightField:
 
 def _nearest(edge: Array, height: Array, away: Array) -> Array:
     """Returns the height (n,) of the nearest lane; arguments as from `_Lanes.near`."""
-    weight = (edge <= edge.min(axis=1, keepdims=True) + _BESIDE) / (away + 0.05) ** 4
+    weight = (edge <= edge.min(axis=1, keepdims=True) + _BESIDE) / np.square(np.square(away + 0.05))
     return np.asarray((weight * height).sum(axis=1) / weight.sum(axis=1))
 
 
@@ -173,7 +174,7 @@ def _sidewalk_samples(town: Town) -> TownSamples:
         stations = polyline_stations(walk.points[:, :2])
         s = np.linspace(0.0, stations[-1], max(2, int(np.ceil(stations[-1] / SAMPLE_STEP)) + 1))
         centre = np.column_stack([np.interp(s, stations, column) for column in walk.points.T])
-        heading = np.arctan2(*np.gradient(centre[:, :2], axis=0).T[::-1])
+        heading = pn.arctan2(*np.gradient(centre[:, :2], axis=0).T[::-1])
         half = np.full(len(s), walk.width / 2.0)
         for column, value in zip(columns, (s, heading, half, centre), strict=True):
             column.append(value)
@@ -202,7 +203,7 @@ class _Lanes:
 
     def strips(self, chosen: NDArray[np.bool_], margins: Array) -> NDArray[np.object_]:
         """Returns areas (m,) from one chosen sample (n,) to the next one, wider by margins (n,) [m]."""
-        aside = (self._half + margins)[:, None] * np.column_stack((-np.sin(self._heading), np.cos(self._heading)))
+        aside = (self._half + margins)[:, None] * np.column_stack((-pn.sin(self._heading), pn.cos(self._heading)))
         right, left = self.centre[:, :2] + aside, self.centre[:, :2] - aside
         rows = np.flatnonzero(self._followed[:-1] & chosen[:-1] & chosen[1:])
         corners = np.stack((right[rows], right[rows + 1], left[rows + 1], left[rows]), axis=1)
@@ -214,8 +215,8 @@ class _Lanes:
         count = min(_NEAREST, self.count)
         away, index = (np.reshape(row, (len(places), count)) for row in self._tree.query(places, k=count))
         offset = places[:, None] - self.centre[index, :2]
-        c, s = np.cos(self._heading[index]), np.sin(self._heading[index])
+        c, s = pn.cos(self._heading[index]), pn.sin(self._heading[index])
         along, aside = offset[..., 0] * c + offset[..., 1] * s, offset[..., 1] * c - offset[..., 0] * s
         height = self.centre[index, 2] + self._slope[index] * np.clip(along, -_AHEAD, _AHEAD)
         beside = np.maximum(0.0, np.abs(aside) - self._half[index])
-        return np.hypot(beside, np.maximum(0.0, np.abs(along) - SAMPLE_STEP)), height, away
+        return pn.hypot(beside, np.maximum(0.0, np.abs(along) - SAMPLE_STEP)), height, away

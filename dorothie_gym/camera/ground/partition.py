@@ -7,6 +7,7 @@ level. Along the borders of cells, each polygon gets the corners of its neighbou
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -59,7 +60,8 @@ def cut_ground(
         high: largest x and y of it [m].
         height: height at positions (n, 2) [m], None where all is level.
     """
-    size = LARGEST * 2.0 ** np.ceil(np.log2(max(1.0, float((high - low).max()) / LARGEST)))
+    fraction, doublings = math.frexp(max(1.0, float((high - low).max()) / LARGEST))
+    size = math.ldexp(LARGEST, doublings - (fraction == 0.5))  # the next power of two
     corner = np.floor((low + high) / 2.0 - size / 2.0) + _ODD
     pieces: list[Cut] = []
     _cut(regions, corner, float(size), height, pieces)
@@ -117,8 +119,9 @@ def _uneven(corner: Array, size: float, height: Callable[[Array], Array] | None)
     at = np.linspace(0.0, size, count)
     grid = np.stack(np.meshgrid(at, at), axis=-1).reshape(-1, 2)
     z = height(corner + grid)
-    plane = np.column_stack((grid, np.ones(len(grid))))
-    return bool(np.abs(plane @ np.linalg.lstsq(plane, z, rcond=None)[0] - z).max() > _UNEVEN)
+    centred = grid - 0.5 * size  # its columns are orthogonal: the grid is regular
+    slopes = (centred * z[:, None]).sum(axis=0) / np.square(centred).sum(axis=0)
+    return bool(np.abs(z.mean() + (centred * slopes).sum(axis=1) - z).max() > _UNEVEN)
 
 
 def _rings(corner: Array, size: float) -> list[BaseGeometry]:

@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.ground.heights import HeightField, Zone
 from dorothie_gym.camera.ground.lookup import GROUND_SHEET, GroundArrays, material_at
 from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material
@@ -154,7 +155,7 @@ def add_tunnel(
     middle = sides[..., :2].mean(axis=1)
     sides = sides[shapely.contains_xy(inside, middle[:, 0], middle[:, 1])]
     way = sides[:, 1] - sides[:, 0]
-    way *= 2.0 * _OVERLAP / np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-9)[:, None]
+    way *= 2.0 * _OVERLAP / np.maximum(pn.hypot(way[:, 0], way[:, 1]), 1e-9)[:, None]
     sides = np.stack((sides[:, 0] - way, sides[:, 1] + way), axis=1)  # up to the walls over the mouths
     high = sides.copy()
     high[..., 2] += _headroom(field, high)
@@ -212,7 +213,7 @@ def _add_pillars(
         for station in np.arange(part.start + _PILLARS / 2.0, part.end, _PILLARS).tolist():
             at = lane.position(station)
             foot, head = float(field.ground(at[None])[0]), lane.height_at(station) - _DECK_THICKNESS
-            if head - foot < _TALLEST_WITHOUT or (stood and np.hypot(*(np.array(stood) - at).T).min() < _PILLARS / 4.0):
+            if head - foot < _TALLEST_WITHOUT or (stood and pn.hypot(*(np.array(stood) - at).T).min() < _PILLARS / 4.0):
                 continue
             kinds = [LOOKS[Material(material_at(ground, GROUND_SHEET, x, y))].kind for x, y in (at + reach).tolist()]
             if ObjectClass.ROAD in kinds or ObjectClass.ROAD_LINE in kinds:
@@ -242,7 +243,7 @@ def _inward(lines: Array) -> Array:
     """Returns unit vectors (n, 2) to the right of lines (n, 2, 3), on the map."""
     way = lines[:, 1, :2] - lines[:, 0, :2]
     across = np.stack((-way[:, 1], way[:, 0]), axis=-1)
-    return np.asarray(across / np.maximum(np.hypot(*across.T), 1e-9)[:, None])
+    return np.asarray(across / np.maximum(pn.hypot(*across.T), 1e-9)[:, None])
 
 
 def _add_quads(

@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.ground.heights import HeightField, Zone
 from dorothie_gym.camera.ground.materials import KERB_HEIGHT
 from dorothie_gym.camera.ground.partition import Area
@@ -181,7 +182,7 @@ def add_faces(builder: MeshBuilder, edges: Edges, tunnels: TunnelFloors | None =
         foot[~opening, :, 2] -= _FOUNDATION
         back = np.stack((foot[:, end], top[:, end], top[:, start], foot[:, start]), axis=1)[mouth]
         way = back[:, 0] - back[:, 3]
-        inwards = np.column_stack((way[:, 1], -way[:, 0])) / np.maximum(np.hypot(*way[:, :2].T), 1e-9)[:, None]
+        inwards = np.column_stack((way[:, 1], -way[:, 0])) / np.maximum(pn.hypot(*way[:, :2].T), 1e-9)[:, None]
         back[..., :2] += _THICKNESS * inwards[:, None]
         builder.triangles(back[:, [0, 1, 2]], colour=_WALL_COLOUR, kind=ObjectClass.WALL)
         builder.triangles(back[:, [0, 2, 3]], colour=_WALL_COLOUR, kind=ObjectClass.WALL)

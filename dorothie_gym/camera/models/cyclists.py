@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.models.solids import ModelBuilder, Palette, Rgb, Slot, dressed
 from dorothie_gym.maps.model import Array
@@ -85,7 +87,7 @@ def dressed_cyclist(form: Mesh, rider: Rider) -> Mesh:
 
 def _wheel(model: ModelBuilder, x: float) -> None:
     angles = np.linspace(0.0, 2.0 * np.pi, _SPOKES, endpoint=False)
-    circle = np.column_stack((np.cos(angles), np.zeros(_SPOKES), np.sin(angles)))
+    circle = np.column_stack((pn.cos(angles), np.zeros(_SPOKES), pn.sin(angles)))
     centre = np.array([x, 0.0, _WHEEL])
     for k in range(_SPOKES):
         a, b = circle[k], circle[(k + 1) % _SPOKES]
@@ -97,7 +99,7 @@ def _wheel(model: ModelBuilder, x: float) -> None:
 def _rider(model: ModelBuilder, turn: float) -> None:
     for side, angle in ((1.0, turn), (-1.0, turn + math.pi)):
         # turning forwards: from above to the front
-        pedal = np.array([-0.04 + _CRANK * math.sin(angle), side * 0.11, _BRACKET + _CRANK * math.cos(angle)])
+        pedal = np.array([-0.04 + _CRANK * pm.sin(angle), side * 0.11, _BRACKET + _CRANK * pm.cos(angle)])
         hip, ankle = _SADDLE + (0.0, side * 0.09, 0.02), pedal + (-0.05, 0.0, 0.09)
         knee = _joint(hip, ankle)
         model.limb(hip, knee, (0.09, 0.07), Slot.TROUSERS)
@@ -114,7 +116,7 @@ def _rider(model: ModelBuilder, turn: float) -> None:
 def _joint(hip: Array, ankle: Array) -> Array:
     """Returns the knee between hip and ankle, bent to the front."""
     way = ankle - hip
-    reach = min(float(np.linalg.norm(way)), 2.0 * _LIMB - 0.01)
-    bend = math.sqrt(_LIMB**2 - (reach / 2.0) ** 2)
+    reach = min(math.sqrt(float(pn.dot(way, way))), 2.0 * _LIMB - 0.01)
+    bend = math.sqrt(_LIMB * _LIMB - reach * reach / 4.0)
     forward = np.array([-way[2], 0.0, way[0]])
-    return (hip + ankle) / 2.0 + forward * (bend / float(np.linalg.norm(forward)))
+    return (hip + ankle) / 2.0 + forward * (bend / math.sqrt(float(pn.dot(forward, forward))))

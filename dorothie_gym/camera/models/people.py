@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.models.solids import ModelBuilder, Palette, Rgb, Slot, dressed
 from dorothie_gym.maps.model import Array
@@ -84,8 +85,8 @@ LOOKS = tuple(
 def person_form(outfit: Outfit, pose: int, *, coarse: bool = False) -> Mesh:
     """Returns a person without colours, in a phase of walking or standing."""
     model = ModelBuilder(ObjectClass.PEDESTRIAN)
-    swing = 0.0 if pose == STANDING else math.sin(2.0 * math.pi * pose / PHASES)
-    forward = 0.0 if pose == STANDING else math.cos(2.0 * math.pi * pose / PHASES)
+    swing = 0.0 if pose == STANDING else pm.sin(2.0 * math.pi * pose / PHASES)
+    forward = 0.0 if pose == STANDING else pm.cos(2.0 * math.pi * pose / PHASES)
     legs = [_leg(swing, forward), _leg(-swing, -forward)]
     hip = _SOLE - min(float(leg[2, 2]) for leg in legs)  # the lower foot is on the ground
     sides = 3 if coarse else 4
@@ -114,9 +115,9 @@ def _leg(swing: float, forward: float) -> Array:
     """Returns hip, knee and ankle (3, 3) below the middle of the hip, from the angle and the motion of the thigh."""
     thigh = _SWING * swing + 0.14 * max(0.0, forward)
     knee = _KNEE * max(0.0, forward) + 0.06 * abs(swing)
-    joint = np.array([_THIGH * math.sin(thigh), 0.0, -_THIGH * math.cos(thigh)])
+    joint = np.array([_THIGH * pm.sin(thigh), 0.0, -_THIGH * pm.cos(thigh)])
     shank = thigh - knee
-    return np.stack((np.zeros(3), joint, joint + (_SHANK * math.sin(shank), 0.0, -_SHANK * math.cos(shank))))
+    return np.stack((np.zeros(3), joint, joint + (_SHANK * pm.sin(shank), 0.0, -_SHANK * pm.cos(shank))))
 
 
 def _arm(
@@ -125,8 +126,8 @@ def _arm(
     angle = _ARM_SWING * swing
     bend = 0.12 if standing else 0.4
     shoulder = np.array([0.0, side * 0.215, hip + 0.52])
-    elbow = shoulder + (0.27 * math.sin(angle), side * 0.02, -0.27 * math.cos(angle))
-    hand = elbow + (0.25 * math.sin(angle + bend), -side * 0.01, -0.25 * math.cos(angle + bend))
+    elbow = shoulder + (0.27 * pm.sin(angle), side * 0.02, -0.27 * pm.cos(angle))
+    hand = elbow + (0.25 * pm.sin(angle + bend), -side * 0.01, -0.25 * pm.cos(angle + bend))
     if coarse:
         model.limb(shoulder, hand, (0.05, 0.035), Slot.TOP, sides=3)
         return

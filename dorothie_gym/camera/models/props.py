@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.models.solids import ModelBuilder, Palette, Slot, dressed
@@ -107,5 +108,5 @@ def _tree(model: ModelBuilder, kind: PropKind) -> None:
     depth = 0.34 * height
     for heading, high, shade in ((0.0, height - depth, 1.0), (2.1, height - 1.25 * depth, 0.86)):
         scale = 1.0 if shade == 1.0 else 0.9
-        centre = (0.1 * (scale < 1.0) * np.cos(heading), 0.1 * (scale < 1.0) * np.sin(heading), high)
+        centre = (0.1 * (scale < 1.0) * pn.cos(heading), 0.1 * (scale < 1.0) * pn.sin(heading), high)
         model.ball(centre, (scale * radius, scale * radius, depth), Slot.TOP, sides=8, rings=3, shade=shade)

@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass
@@ -120,11 +121,11 @@ class ModelBuilder:
         dx, dy, dz = dx / length, dy / length, dz / length
         # two directions across it: one as close to the y axis as can be, for limbs along y to the x axis
         other = np.array([-dz, 0.0, dx] if abs(dy) < 0.9 else [0.0, dz, -dy])
-        other /= math.sqrt(float(other @ other))
+        other /= math.sqrt(float(pn.dot(other, other)))
         ox, oy, oz = other.tolist()
         across = np.array([oy * dz - oz * dy, oz * dx - ox * dz, ox * dy - oy * dx])
         turns = _turns(sides) + math.pi / sides
-        ring = np.cos(turns)[:, None] * across + flat * np.sin(turns)[:, None] * other
+        ring = pn.cos(turns)[:, None] * across + flat * pn.sin(turns)[:, None] * other
         rings = first + radii[0] * ring, last + radii[1] * ring
         self._tube(np.stack(rings), slot, (first + last) / 2.0, shade)
         if closed:
@@ -140,7 +141,7 @@ class ModelBuilder:
         heights = np.pi * np.linspace(*part, rings + 2)[:, None]
         turns = _turns(sides)
         points = np.stack(
-            np.broadcast_arrays(np.sin(heights) * np.cos(turns), np.sin(heights) * np.sin(turns), np.cos(heights)),
+            np.broadcast_arrays(pn.sin(heights) * pn.cos(turns), pn.sin(heights) * pn.sin(turns), pn.cos(heights)),
             axis=-1,
         )
         self._tube(middle + points * np.asarray(radii, dtype=np.float64), slot, middle, shade)

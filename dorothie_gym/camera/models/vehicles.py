@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh, Surface
 from dorothie_gym.camera.models.solids import ModelBuilder, Palette, Rgb, Slot, dressed
@@ -183,7 +184,7 @@ def _mirror(model: ModelBuilder, x: float, side: float, z: float) -> None:
 def _wheel(model: ModelBuilder, x: float, side: float, radius: float) -> None:
     """Adds a tyre with its tread at the bottom, and a rim."""
     angles = np.linspace(0.0, 2.0 * np.pi, _WHEEL_SIDES, endpoint=False) + np.pi / _WHEEL_SIDES
-    circle = np.stack((np.cos(angles), np.sin(angles)), axis=-1) * radius / np.cos(np.pi / _WHEEL_SIDES)
+    circle = np.stack((pn.cos(angles), pn.sin(angles)), axis=-1) * radius / pn.cos(np.pi / _WHEEL_SIDES)
     outer = np.column_stack((x + circle[:, 0], np.full(_WHEEL_SIDES, side * (_SIDE - _SKIN)), radius + circle[:, 1]))
     hub = (x, 0.0, radius)
     model.face(outer, Slot.TYRE, hub)

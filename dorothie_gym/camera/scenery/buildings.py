@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, oriented
 from dorothie_gym.camera.patterns import BAYS
@@ -164,12 +165,12 @@ class _Quarters:
     def __init__(self, town: Town, clearance: Clearance) -> None:
         points = np.concatenate([lane.points[:, :2] for lane in town.lanes])
         self._middle = points.mean(axis=0)
-        self._radius = float(np.quantile(np.hypot(*(points - self._middle).T), 0.95))
+        self._radius = float(np.quantile(pn.hypot(*(points - self._middle).T), 0.95))
         self._clearance = clearance
 
     def at(self, place: Array) -> Quarter:
         """Returns the quarter at a place (2,) [m]."""
-        away = float(np.hypot(*(place - self._middle))) / max(self._radius, 1.0)
+        away = float(pn.hypot(*(place - self._middle))) / max(self._radius, 1.0)
         if away > _RIM or not len(self._clearance.blocks.query(shapely.Point(place), predicate="intersects")):
             return Quarter.SUBURB
         return Quarter.CENTRE if away < _CENTRE else Quarter.HOMES
@@ -187,7 +188,7 @@ class _Placed:
         free = np.ones(len(ground), dtype=bool)
         circles = self._circles[: len(self._ground)]
         middle, reach = centres.mean(axis=0), float(radii.max() + np.ptp(centres, axis=0).max())
-        near = np.flatnonzero(np.hypot(*(circles[:, :2] - middle).T) < circles[:, 2] + reach)
+        near = np.flatnonzero(pn.hypot(*(circles[:, :2] - middle).T) < circles[:, 2] + reach)
         for k in near.tolist():
             free &= ~shapely.intersects(ground, self._ground[k])
         return free
@@ -210,7 +211,7 @@ def _along(
     while at < stations[-1] - 3.0:
         spot = np.array([np.interp(at, stations, column) for column in frontage.points.T])
         heading = float(np.interp(at, stations, frontage.away))
-        away = np.array([np.cos(heading), np.sin(heading)])
+        away = np.array([pn.cos(heading), pn.sin(heading)])
         manner = _MANNERS[quarters.at(spot + 14.0 * away)]
         length, depth = rng.uniform(*manner.length), rng.uniform(*manner.depth)
         gap, empty = rng.uniform(*manner.gap), rng.random() > manner.built
@@ -228,14 +229,14 @@ def _along(
         middles = at + lengths / 2.0
         spots = np.stack([np.interp(middles, stations, column) for column in frontage.points.T], axis=-1)
         turns = np.interp(middles, stations, frontage.away)
-        ways = np.stack((np.cos(turns), np.sin(turns)), axis=-1)
+        ways = np.stack((pn.cos(turns), pn.sin(turns)), axis=-1)
         centres = spots + (setbacks + depths / 2.0)[:, None] * ways
         ground = rectangles(centres, turns, depths, lengths)
         free = middles + lengths / 2.0 <= stations[-1] + 4.0
         for tree in (clearance.ways, clearance.trees, clearance.parks, clearance.reserved):
             if free.any():
                 free[free] = free_of(ground[free], tree)
-        radii = np.hypot(lengths, depths) / 2.0
+        radii = pn.hypot(lengths, depths) / 2.0
         if free.any():
             free[free] = placed.free(ground[free], centres[free], radii[free])
         if not free.any():
@@ -296,7 +297,7 @@ def add_walls(
     upper = np.column_stack((outline, np.full(len(outline), high)))
     for k in range(len(outline)):
         after = (k + 1) % len(outline)
-        bays = max(1, round(float(np.hypot(*(outline[after] - outline[k]))) / bay))
+        bays = max(1, round(float(pn.hypot(*(outline[after] - outline[k]))) / bay))
         builder.quad(
             [lower[after], upper[after], upper[k], lower[k]], colour=colour, kind=ObjectClass.BUILDING,
             repeats=(bays / BAYS, storeys / rows), texture=texture,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.scenery.lots import Lot
 from dorothie_gym.maps.model import Array, Site
 from dorothie_gym.maps.town import Town
@@ -45,7 +46,7 @@ _BEHIND = (0.4, 1.2, 2.4, 4.0, 6.0, 9.0)  # [m] from the place of a landmark to 
 def rectangles(centres: Array, headings: Array, lengths: Array, widths: Array) -> NDArray[np.object_]:
     """Returns upright rectangles (n,) around centres (n, 2) [m], their lengths along headings (n,)."""
     local = _UNIT * np.stack((lengths, widths), axis=-1)[:, None]  # (n, 4, 2)
-    cos, sin = np.cos(headings)[:, None], np.sin(headings)[:, None]
+    cos, sin = pn.cos(headings)[:, None], pn.sin(headings)[:, None]
     x, y = local[..., 0] * cos - local[..., 1] * sin, local[..., 0] * sin + local[..., 1] * cos
     return np.asarray(shapely.polygons(np.stack((x, y), axis=-1) + centres[:, None]), dtype=np.object_)
 
@@ -88,8 +89,8 @@ class Clearance:
 
     def _lot(self, site: Site, taken: list[shapely.Polygon]) -> Lot:
         place, way = np.array(site.position), np.array(site.waypoint)
-        heading = float(np.arctan2(*(place - way)[::-1]))
-        towards = np.array([np.cos(heading), np.sin(heading)])
+        heading = float(pn.arctan2(*(place - way)[::-1]))
+        towards = np.array([pn.cos(heading), pn.sin(heading)])
         # the largest size first, at each size as close to the place as can be
         options = np.array([(*size, behind) for size in _LOTS for behind in _BEHIND])
         length, depth, behind = options.T
@@ -116,7 +117,7 @@ def free_of(polygons: NDArray[np.object_], tree: shapely.STRtree) -> NDArray[np.
 
 def _with_view(lot: Lot) -> shapely.Polygon:
     """Returns a lot with room at its sides and in front of it."""
-    ahead = float(np.hypot(lot.front[0] - lot.place[0], lot.front[1] - lot.place[1])) + 5.0
+    ahead = float(pn.hypot(lot.front[0] - lot.place[0], lot.front[1] - lot.place[1])) + 5.0
     side = lot.length / 2.0 + 2.5
     return shapely.Polygon(
         [lot.at(-ahead, -side), lot.at(-ahead, side), lot.at(lot.depth + 1.0, side), lot.at(lot.depth + 1.0, -side)]
@@ -130,7 +131,7 @@ def _sights(town: Town, site: Site, lot: Lot) -> list[shapely.Polygon]:
     for distance in _SEEN_FROM:
         eye = _before(town, site, distance)
         # the side of the lot that is closer to the car
-        near = min((side, -side), key=lambda right: math.dist(eye, lot.at(0.0, right)))
+        near = min((side, -side), key=lambda right: pm.dist(eye, lot.at(0.0, right)))
         found.append(shapely.Polygon([eye, lot.at(-_SIGN[0], near), lot.at(_SIGN[1], near)]).buffer(0.3))
     return found
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.atlas import BRAND_SIGNS, Texture
 from dorothie_gym.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface, joined, oriented
 from dorothie_gym.camera.models.people import STANDING, Look, Outfit, person_form
@@ -196,7 +197,7 @@ def _walls(works: _Works, deep: tuple[float, float], side: float, colour: Rgb) -
     width = 2.0 * side - 1.0
     panes = max(1, round(width / 3.0))
     x, y = works.lot.at(deep[0] - 0.02, 0.0)
-    right = np.array([-math.sin(works.lot.heading), math.cos(works.lot.heading)]) * (width / 2.0)
+    right = np.array([-pm.sin(works.lot.heading), pm.cos(works.lot.heading)]) * (width / 2.0)
     (a, b), low, high = (np.array([x, y]) - right, np.array([x, y]) + right), works.base + 0.15, works.base + 2.95
     works.builder.quad(
         [(*a, low), (*a, high), (*b, high), (*b, low)], colour=(255, 255, 255), kind=ObjectClass.BUILDING,

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.mesh import Mesh, new_mesh
 from dorothie_gym.maps.model import Array
 
@@ -53,7 +54,7 @@ def stamped(
     """
     count, size = len(places), template.size
     sizes = np.ones(count) if scales is None else np.asarray(scales, dtype=np.float64)
-    cos, sin, zero, one = np.cos(headings), np.sin(headings), np.zeros(count), np.ones(count)
+    cos, sin, zero, one = pn.cos(headings), pn.sin(headings), np.zeros(count), np.ones(count)
     turn = np.stack((cos, -sin, zero, sin, cos, zero, zero, zero, one), axis=-1).reshape(count, 3, 3)
 
     def turned(vectors: NDArray[np.float32]) -> Array:

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.atlas import STREET_NAMES, Texture
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface, joined
 from dorothie_gym.camera.scenery.clearance import Clearance, free_of
@@ -103,7 +105,7 @@ def _repeaters(layers: MapLayers, clearance: Clearance, ground: Heights, heads: 
         x, y = target.position(_FAR, target.width_at(0.0) / 2.0 + _FAR_ASIDE).tolist()
         others = [row.at for row in (*heads, *found)]
         room = free_of(np.array([shapely.Point(x, y).buffer(0.3)]), clearance.lanes)[0]
-        if room and all(math.dist((x, y), other) > _HEADS_APART for other in others):
+        if room and all(pm.dist((x, y), other) > _HEADS_APART for other in others):
             foot = _foot(layers, ground, (x, y), target.height_at(0.0))
             found.append(_Head(post.kind, (x, y), head.look, foot, head.signal))
     return found
@@ -115,7 +117,7 @@ def _pose(town: Town, layers: MapLayers, post: Post) -> tuple[float, float]:
     if not lanes:
         signal = next(s for s in town.signals if s.kind is post.kind and s.position[:2] == post.at)
         return signal.heading + math.pi, _nearest_height(town, post.at)
-    lane = min(lanes, key=lambda row: float(np.hypot(*(row.points[-1, :2] - post.at))))
+    lane = min(lanes, key=lambda row: float(pn.hypot(*(row.points[-1, :2] - post.at))))
     station = layers.stops.get(lane.id, lane.length)
     return lane.heading_at(station), lane.height_at(station)
 
@@ -123,7 +125,7 @@ def _pose(town: Town, layers: MapLayers, post: Post) -> tuple[float, float]:
 def _nearest_height(town: Town, at: tuple[float, float]) -> float:
     """Returns the height of the closest point of all lanes [m]."""
     points = np.concatenate([lane.points for lane in town.lanes])
-    return float(points[int(np.argmin(np.hypot(*(points[:, :2] - at).T))), 2])
+    return float(points[int(np.argmin(pn.hypot(*(points[:, :2] - at).T))), 2])
 
 
 def _signal_of(town: Town, post: Post) -> int:
@@ -160,7 +162,7 @@ def _traffic_light() -> tuple[Mesh, dict[Colour, tuple[int, int]]]:
 def _round(x: float, z: float, radius: float, corners: int, turn: float = 0.0) -> Array:
     """Returns corners (n, 3) of an upright polygon, from the right side upwards, for somebody who looks along x."""
     angles = turn + np.arange(corners) * (2.0 * math.pi / corners)
-    return np.column_stack((np.full(corners, x), radius * np.cos(angles), z + radius * np.sin(angles)))
+    return np.column_stack((np.full(corners, x), radius * pn.cos(angles), z + radius * pn.sin(angles)))
 
 
 def _polygon(
@@ -234,7 +236,7 @@ def plan_blades(layers: MapLayers, clearance: Clearance) -> list[Blade]:
 def _corner(lane: Lane, clearance: Clearance, others: list[Blade]) -> tuple[float, float] | None:
     for aside in _CORNER:
         x, y = lane.position(lane.length - 0.5, lane.width_at(lane.length) / 2.0 + aside).tolist()
-        apart = all(math.hypot(x - blade.at[0], y - blade.at[1]) > _CORNERS_APART for blade in others)
+        apart = all(pm.hypot(x - blade.at[0], y - blade.at[1]) > _CORNERS_APART for blade in others)
         if apart and free_of(np.array([shapely.Point(x, y).buffer(0.15)]), clearance.lanes)[0]:
             return x, y
     return None
@@ -250,7 +252,7 @@ def build_blades(layers: MapLayers, blades: list[Blade], ground: Heights) -> Mes
         for k, (street, look) in enumerate(blade.names):
             z = base + _BLADE_HEIGHT + k * (_BLADE[1] + 0.06) + _BLADE[1] / 2.0
             for turned in (look, look + math.pi):
-                c, s = math.cos(turned), math.sin(turned)
+                c, s = pm.cos(turned), pm.sin(turned)
                 builder.panel(
                     (blade.at[0] - 0.06 * c, blade.at[1] - 0.06 * s, z), turned, *_BLADE, colour=(235, 235, 235),
                     kind=ObjectClass.TRAFFIC_SIGN, texture=STREET_NAMES + street, surface=Surface.EMISSIVE,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import shapely
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface
 from dorothie_gym.camera.scenery.clearance import Clearance, free_of
 from dorothie_gym.camera.scenery.placing import Heights, feet_on, stamped
@@ -41,15 +41,15 @@ def lamp_places(layers: MapLayers, clearance: Clearance) -> Array:
         x, y, z, heading = (
             np.interp(at, stations, column) for column in (*line.points.T[:3], np.asarray(line.heading))
         )
-        out = line.sign * np.stack((-np.sin(heading), np.cos(heading)), axis=-1)
+        out = line.sign * np.stack((-pn.sin(heading), pn.cos(heading)), axis=-1)
         feet = np.stack((x, y), axis=-1) + _ASIDE * out
         free = free_of(np.asarray(shapely.buffer(shapely.points(feet), 0.2), dtype=np.object_), clearance.lanes)
         free &= ~layers.raised.hold(np.column_stack((x, y, z)))
         for foot, way in zip(feet[free], (-out)[free], strict=True):
             others = np.concatenate((posts, kept))
-            if not len(others) or np.hypot(*(others - foot).T).min() > _APART:
+            if not len(others) or pn.hypot(*(others - foot).T).min() > _APART:
                 kept = np.concatenate((kept, foot[None]))
-                rows.append((float(foot[0]), float(foot[1]), math.atan2(way[1], way[0])))
+                rows.append((float(foot[0]), float(foot[1]), pm.atan2(way[1], way[0])))
     return np.array(rows).reshape(-1, 3)
 
 
@@ -57,7 +57,7 @@ def build_lamps(places: Array, ground: Heights) -> tuple[Mesh, Array]:
     """Returns street lamps, and the positions of their lights (n, 3) [m]."""
     heights = feet_on(ground, places[:, :2])
     mesh = stamped(_lamp(), np.column_stack((places[:, :2], heights)), places[:, 2])
-    over = _ARM * np.stack((np.cos(places[:, 2]), np.sin(places[:, 2])), axis=-1)
+    over = _ARM * np.stack((pn.cos(places[:, 2]), pn.sin(places[:, 2])), axis=-1)
     return mesh, np.column_stack((places[:, :2] + over, heights + LIGHT_HEIGHT))
 
 

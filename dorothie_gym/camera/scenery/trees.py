@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface, joined
 from dorothie_gym.camera.scenery.placing import Heights, feet_on, stamped
@@ -29,7 +30,7 @@ def tree_places(layers: MapLayers) -> Array:
     shapes = layers.shapes
     trees = np.array([k for k, shape in enumerate(shapes) if shape.colour in _KINDS], dtype=np.int64)
     centres = np.array([shapes[k].points.mean(axis=0) for k in trees]).reshape(-1, 2)
-    radii = [np.hypot(*(shapes[k].points - centre).T).max() for k, centre in zip(trees, centres, strict=True)]
+    radii = [pn.hypot(*(shapes[k].points - centre).T).max() for k, centre in zip(trees, centres, strict=True)]
     painted = shapely.STRtree([shapely.Polygon(shape.points) for shape in shapes])
     tree, over = painted.query(shapely.points(centres), predicate="intersects")
     later = (over > trees[tree]) & ~np.isin(over, trees)
@@ -67,7 +68,7 @@ def tree_form(form: int) -> Mesh:
     _clump(builder, (0.0, 0.0, 1.75), (1.0, 0.85), colour, rng, sides=7)
     for k in range(2):
         heading = 2.6 * k + form
-        at = (0.42 * np.cos(heading), 0.42 * np.sin(heading), 2.25 + 0.2 * k)
+        at = (0.42 * pn.cos(heading), 0.42 * pn.sin(heading), 2.25 + 0.2 * k)
         _clump(builder, at, (0.56, 0.52), colour * (1.06 + 0.06 * k), rng, sides=5)
     return builder.build()
 
@@ -82,11 +83,11 @@ def _clump(
     turns = np.arange(sides) * (2.0 * np.pi / sides)
     rings = []
     for k, level in enumerate(levels):
-        out = np.sin(np.pi * level) * wide * (1.0 - 0.18 * rng.random(sides))
+        out = pn.sin(np.pi * level) * wide * (1.0 - 0.18 * rng.random(sides))
         if k == _WIDEST:
             out[0] = wide
-        up = np.full(sides, np.cos(np.pi * level) * high)
-        rings.append(np.column_stack((out * np.cos(turns + 0.3 * k), out * np.sin(turns + 0.3 * k), up)) + centre)
+        up = np.full(sides, pn.cos(np.pi * level) * high)
+        rings.append(np.column_stack((out * pn.cos(turns + 0.3 * k), out * pn.sin(turns + 0.3 * k), up)) + centre)
     corner = np.arange(sides)
     after = (corner + 1) % sides
     steps = corner / sides * 4.0

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.lint.fault import CAR_WIDTH, SMALLEST_TURN, Fault, FaultKind
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
@@ -35,7 +37,7 @@ def continuity_faults(town: Town) -> Iterator[Fault]:
         (x, y, z), (u, v, w) = source.points[-1], target.points[0]
         lanes, position = (source.id, target.id), (float(x), float(y))
         pair = f"lane {target.id} begins"
-        gap = math.hypot(u - x, v - y)
+        gap = pm.hypot(u - x, v - y)
         if gap > MAX_LINK_GAP + _ROUNDING:
             message = f"{pair} {gap:.2f} m from the end of lane {source.id}"
             yield Fault(kind=FaultKind.GAP, lanes=lanes, position=position, message=message)
@@ -77,8 +79,8 @@ def _bends(lane: Lane) -> Iterator[Fault]:
     if len(lane.points) < 3:
         return
     steps = np.diff(lane.points[:, :2], axis=0)
-    length = np.hypot(*steps.T)
-    turns = np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))  # (n-2,) at the inner points, positive right
+    length = pn.hypot(*steps.T)
+    turns = np.diff(np.unwrap(pn.arctan2(steps[:, 1], steps[:, 0])))  # (n-2,) at the inner points, positive right
     kinks = _kinks(turns, length)
     for run in _runs(np.flatnonzero(kinks), lane.stations[1:-1]):
         worst = int(run[np.argmax(np.abs(turns[run]))])
@@ -129,7 +131,7 @@ def _tight_curves(lane: Lane, turns: Array, length: Array) -> Iterator[Fault]:
         radius = float(np.sum(share[begin:end])) / turn
         # The car swings out and cuts the corner equally while its arc turns by the same angle: the best of the
         # arcs of its radius deviates by this distance.
-        apart = (SMALLEST_TURN - radius) * np.tan(0.25 * min(turn, 2.0 * np.pi - 0.1)) ** 2
+        apart = (SMALLEST_TURN - radius) * pn.tan(0.25 * min(turn, 2.0 * np.pi - 0.1)) ** 2
         if apart > MAX_DEPARTURE:
             message = (
                 f"lane {lane.id} turns by {np.degrees(turn):.0f} degrees on a radius of {radius:.1f} m,"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.lint.fault import HALF_WIDTH, Fault, FaultKind
 from dorothie_gym.maps.lint.samples import SAME_GROUND, SAMPLE_SPACING, LaneSamples
 from dorothie_gym.maps.model import Array, Junction, Lane, Sidewalk
@@ -67,7 +68,7 @@ class Corner:
         self._start, self._end = start, end
         self._kerbs = start.edges[1], end.edges[1]
         self._corner = corner
-        self._radius = 1.0 / np.tan(0.5 * turn)
+        self._radius = 1.0 / pn.tan(0.5 * turn)
         self._middle = self._radius * start.right - start.along
 
     def _drawing(self, drawn_out: float) -> Array:
@@ -77,7 +78,7 @@ class Corner:
             drawn_out: largest ratio of the longer part to the shorter one.
         """
         edges = np.column_stack((-self._start.along, self._end.along))
-        length = np.maximum([float(np.hypot(*(self._corner - kerb))) for kerb in self._kerbs], SHORTEST_EDGE)
+        length = np.maximum([float(pn.hypot(*(self._corner - kerb))) for kerb in self._kerbs], SHORTEST_EDGE)
         length = np.minimum(length, drawn_out * length.min())
         drawing: Array = edges @ np.diag(1.0 / length) @ np.linalg.inv(edges)
         return drawing
@@ -93,8 +94,8 @@ class Corner:
         (kerb, kerb_behind), start, end = self._kerbs, self._start, self._end
         drawing = self._drawing(1.0 if connector == self.connector else DRAWN_OUT)
         from_middle = (places - self._corner) @ drawing.T - self._middle
-        distance = np.maximum(np.hypot(*from_middle.T), 1e-9)
-        scale = np.hypot(*((from_middle / distance[:, None]) @ drawing).T)  # drawn length of a metre outwards
+        distance = np.maximum(pn.hypot(*from_middle.T), 1e-9)
+        scale = pn.hypot(*((from_middle / distance[:, None]) @ drawing).T)  # drawn length of a metre outwards
         rounded = (from_middle @ start.along > 0.0) & (from_middle @ end.along < 0.0)
         depth = self.beyond(places)
         depth = np.where(rounded, np.minimum(depth, (self._radius - distance) / scale), depth)
@@ -121,7 +122,7 @@ def end_of(town: Town, lane: int, point: int) -> LaneEndPose:
     """Returns the first (point 0) or last (point -1) end of a lane."""
     row = town.lanes[lane]
     heading = row.headings[point]
-    along = np.array([np.cos(heading), np.sin(heading)])
+    along = np.array([pn.cos(heading), pn.sin(heading)])
     return LaneEndPose(place=row.points[point, :2], along=along, width=float(row.widths[point]))
 
 
@@ -140,7 +141,7 @@ def corners(town: Town, connectors: Iterable[int], kerb_lanes: frozenset[int], e
         if not (before and after and kerb_lanes.issuperset(before) and kerb_lanes.issuperset(after)):
             continue
         start, end = end_of(town, before[0], -1), end_of(town, after[0], 0)
-        turn = float(np.arctan2(start.along @ -end.right, start.along @ end.along))
+        turn = float(pn.arctan2(start.along @ -end.right, start.along @ end.along))
         shifted = [LaneEndPose(place=pose.edges[1], along=pose.along, width=0.0) for pose in (start, end)]
         meeting = _meeting(*shifted)
         if meeting is None or not CORNER_TURNS[0] <= turn <= CORNER_TURNS[1]:
@@ -165,7 +166,7 @@ def outside(edges: Array, start: LaneEndPose, end: LaneEndPose, room: float, pla
     if corner is not None:
         bends = corner, corner
     else:  # S or U curve: both ends continue straight for at most half of the distance
-        reach = room + 0.5 * float(np.hypot(*(end.place - start.place)))
+        reach = room + 0.5 * float(pn.hypot(*(end.place - start.place)))
         bends = start.place + reach * start.along, end.place - reach * end.along
     aside = [
         bend + sign * room * pose.right for bend, pose in zip(bends, (start, end), strict=True) for sign in (-1, 1)
@@ -186,7 +187,7 @@ def _meeting(start: LaneEndPose, end: LaneEndPose) -> Array | None:
     if abs(cross) < 1e-6:
         return None
     ahead, behind = (gap[0] * e[1] - gap[1] * e[0]) / cross, (d[0] * gap[1] - d[1] * gap[0]) / cross
-    if min(ahead, behind) < 0.0 or max(ahead, behind) > FURTHEST_CORNER * float(np.hypot(*gap)):
+    if min(ahead, behind) < 0.0 or max(ahead, behind) > FURTHEST_CORNER * float(pn.hypot(*gap)):
         return None
     meeting: Array = start.place + ahead * d
     return meeting
@@ -301,7 +302,7 @@ def _pavement_faults(sidewalks: Sequence[Sidewalk], samples: LaneSamples) -> Ite
 def _along(sidewalk: Sidewalk) -> Array:
     """Returns samples along a pavement, at most `SAMPLE_SPACING` apart: rows of x, y, z, direction x, y, and width."""
     steps = np.diff(sidewalk.points[:, :2], axis=0)
-    length = np.hypot(*steps.T)
+    length = pn.hypot(*steps.T)
     station = np.concatenate(([0.0], np.cumsum(length)))
     s = np.linspace(0.0, station[-1], max(2, int(np.ceil(station[-1] / SAMPLE_SPACING)) + 1))
     segment = np.clip(np.searchsorted(station, s, side="right") - 1, 0, len(length) - 1)

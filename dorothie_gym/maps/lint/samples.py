@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 
@@ -67,7 +68,7 @@ def sample_lanes(town: Town) -> LaneSamples:
         owner=np.repeat(np.arange(len(rows)), counts),
         points=np.ascontiguousarray(table[:, :2]),
         heights=table[:, 2],
-        along=np.column_stack((np.cos(table[:, 3]), np.sin(table[:, 3]))),
+        along=np.column_stack((pn.cos(table[:, 3]), pn.sin(table[:, 3]))),
         widths=table[:, 4],
         first=np.concatenate(([0], np.cumsum(counts))),
     )

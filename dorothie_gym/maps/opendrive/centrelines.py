@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.parse import MAX_NUMBER
@@ -61,10 +62,10 @@ class RoadSamples:
         for section, lane in pieces:
             here = self.spans[section]
             lateral, width = self.centres[section][lane]
-            across = lateral * np.cos(self.tilt[here])
-            x = self.x[here] - across * np.sin(self.heading[here])
-            y = self.y[here] + across * np.cos(self.heading[here])
-            z = self.z[here] + lateral * np.sin(self.tilt[here])
+            across = lateral * pn.cos(self.tilt[here])
+            x = self.x[here] - across * pn.sin(self.heading[here])
+            y = self.y[here] + across * pn.cos(self.heading[here])
+            z = self.z[here] + lateral * pn.sin(self.tilt[here])
             rows.append(np.column_stack((x, -y, z, np.maximum(width, 0.0))))  # y south from here on
         return np.concatenate(rows)
 
@@ -117,16 +118,16 @@ def _without_wedges(line: Array, at_start: bool, at_end: bool) -> Array:
         return line
     first, last = wide[0] if at_start else 0, wide[-1] if at_end else len(line) - 1
     kept = line[first : last + 1]
-    return kept if np.hypot(*np.ptp(kept[:, :2], axis=0)) >= SHORTEST_LANE else line
+    return kept if pn.hypot(*np.ptp(kept[:, :2], axis=0)) >= SHORTEST_LANE else line
 
 
 def _fault(dense: Array) -> str:
     """Returns the reason why a centre line (n, 4) cannot be driven; empty if there is none."""
     if not np.all(np.abs(dense) <= MAX_NUMBER):  # also for NaN
         return "its centre line has a position that is no finite number; check geometry, offsets and widths"
-    if np.hypot(*np.ptp(dense[:, :2], axis=0)) < SHORTEST_LANE / 2:
+    if pn.hypot(*np.ptp(dense[:, :2], axis=0)) < SHORTEST_LANE / 2:
         return "its centre line shrinks to a point: the bend is too sharp for it"
-    jump = float(np.max(np.hypot(*np.diff(dense[:, :2], axis=0).T)))
+    jump = float(np.max(pn.hypot(*np.diff(dense[:, :2], axis=0).T)))
     return f"its centre line jumps by {jump:.1f} m; check geometry, offsets and widths" if jump > _LARGEST_JUMP else ""
 
 
@@ -176,14 +177,14 @@ def _lateral_places(
 
 def thin(line: Array) -> Array:
     """Thins a line (n, 4) to as few points as its curvature, width and height allow."""
-    step = np.hypot(*np.diff(line[:, :2], axis=0).T)
+    step = pn.hypot(*np.diff(line[:, :2], axis=0).T)
     line = line[np.concatenate(([True], step > 1e-6))]
-    station = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+    station = np.concatenate(([0.0], np.cumsum(pn.hypot(*np.diff(line[:, :2], axis=0).T))))
     count = max(2, int(np.ceil(station[-1] / _GRID_STEP)))
     grid = np.linspace(0.0, station[-1], count + 1)
     h = grid[1]
     bend = np.diff(_at(grid, station, line), n=2, axis=0) / h**2  # (count - 1, 4) second derivatives
-    curvature = np.hypot(bend[:, 0], bend[:, 1])
+    curvature = pn.hypot(bend[:, 0], bend[:, 1])
     sharpest = np.max(np.column_stack((curvature, np.abs(bend[:, 2:]))), axis=1)
     longest = np.where(curvature > _STRAIGHT_CURVATURE, _LONGEST_CURVE_STEP, _LONGEST_STEP)
     spacing = np.clip(np.sqrt(8.0 * _CHORD_ERROR / np.maximum(sharpest, 1e-9)), _SHORTEST_STEP, longest)
@@ -226,12 +227,12 @@ def _join(lines: list[Array], ends: list[int]) -> None:
     if np.ptp(places[open_, :3], axis=0).max() > _LARGEST_STITCH or np.max(np.abs(shift)) <= 1e-9:
         return
     for end, move, width in zip(ends, shift, places[:, 3], strict=True):
-        if np.hypot(*move[:2]) <= max(_LARGEST_STITCH, places[:, 3].max() - width):
+        if pn.hypot(*move[:2]) <= max(_LARGEST_STITCH, places[:, 3].max() - width):
             _move_end(lines[end // 2], bool(end % 2), move)
 
 
 def _move_end(line: Array, at_end: bool, move: Array) -> None:
-    station = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+    station = np.concatenate(([0.0], np.cumsum(pn.hypot(*np.diff(line[:, :2], axis=0).T))))
     away = station[-1] - station if at_end else station
-    reach = min(_STITCH_LENGTH * max(1.0, float(np.hypot(*move[:2]))), station[-1])
-    line[:, :3] += (0.5 + 0.5 * np.cos(np.pi * np.minimum(away / reach, 1.0)))[:, None] * move
+    reach = min(_STITCH_LENGTH * max(1.0, float(pn.hypot(*move[:2]))), station[-1])
+    line[:, :3] += (0.5 + 0.5 * pn.cos(np.pi * np.minimum(away / reach, 1.0)))[:, None] * move

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import NO_STREET, Array, Crosswalk, Lane, Sidewalk, Signal, SignalKind
 from dorothie_gym.maps.opendrive.centrelines import RoadSamples, thin
@@ -143,7 +144,7 @@ def _signal(
     s = np.clip(np.array([record.s]), 0.0, road.length)
     x, y, heading = (float(v[0]) for v in road.line.place(s))
     z = float(road.elevation.at(s)[0]) + record.z
-    position = (x - record.t * np.sin(heading), -(y + record.t * np.cos(heading)), z)
+    position = (x - record.t * pn.sin(heading), -(y + record.t * pn.cos(heading)), z)
     if ruled:  # exporters disagree about orientation and hOffset; a signal faces those who have to heed it
         facing = float(lanes[ruled[0]].headings[-1]) + np.pi
     else:
@@ -168,12 +169,12 @@ def _outline(road: RoadRecord, crossing: CrosswalkRecord) -> np.ndarray[tuple[in
     if crossing.on_road:
         s, t = crossing.corners.T
         x, y, heading = road.line.place(np.clip(s, 0.0, road.length))
-        return np.column_stack((x - t * np.sin(heading), -(y + t * np.cos(heading))))
+        return np.column_stack((x - t * pn.sin(heading), -(y + t * pn.cos(heading))))
     x, y, heading = road.line.place(np.clip(np.array([crossing.s]), 0.0, road.length))
-    x, y = x - crossing.t * np.sin(heading), y + crossing.t * np.cos(heading)
+    x, y = x - crossing.t * pn.sin(heading), y + crossing.t * pn.cos(heading)
     angle = heading + crossing.heading
     u, v = crossing.corners.T
-    return np.column_stack((x + u * np.cos(angle) - v * np.sin(angle), -(y + u * np.sin(angle) + v * np.cos(angle))))
+    return np.column_stack((x + u * pn.cos(angle) - v * pn.sin(angle), -(y + u * pn.sin(angle) + v * pn.cos(angle))))
 
 
 # --- Sidewalks -------------------------------------------------------------------------------------------------------
@@ -236,16 +237,16 @@ def _stretches(road: RoadRecord, samples: RoadSamples, left: bool) -> Iterator[A
 def _wide_parts(line: Array) -> list[Array]:
     """Returns the parts of a middle line with sufficient width, split at jumps in the profiles."""
     wide = line[:, 3] >= NARROWEST_SIDEWALK
-    step = np.hypot(*np.diff(line[:, :2], axis=0).T)
+    step = pn.hypot(*np.diff(line[:, :2], axis=0).T)
     edges = np.flatnonzero(np.diff(wide) | (step > LARGEST_JUMP)) + 1
     return [part for part in np.split(line, edges) if part[0, 3] >= NARROWEST_SIDEWALK]
 
 
 def _gap(a: Array, b: Array) -> float:
-    return float(np.hypot(*(a[:2] - b[:2])))
+    return float(pn.hypot(*(a[:2] - b[:2])))
 
 
 def _finished(lines: list[Array]) -> Iterator[Array]:
     for line in lines:
-        if float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum()) >= SHORTEST_SIDEWALK:
+        if float(pn.hypot(*np.diff(line[:, :2], axis=0).T).sum()) >= SHORTEST_SIDEWALK:
             yield thin(line)

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array
 
 # 32 Gauss-Legendre nodes integrate cos and sin of the heading to rounding error up to four full turns per element.
@@ -46,8 +47,8 @@ class Arc:
     def place(self, distance: Array, length: float) -> tuple[Array, Array, Array]:
         """See `Primitive.place`."""
         half = 0.5 * self.curvature * distance
-        chord = distance * np.sinc(half / np.pi)  # np.sinc(x) = sin(pi x) / (pi x), exact for curvature 0
-        return chord * np.cos(half), chord * np.sin(half), 2.0 * half
+        chord = _chord(distance, half)
+        return chord * pn.cos(half), chord * pn.sin(half), 2.0 * half
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,8 @@ class Spiral:
             return along * (self.start + 0.5 * rate * along)
 
         inner = heading(0.5 * distance[:, None] * (_NODES + 1.0))  # (n, nodes)
-        u = 0.5 * distance * (np.cos(inner) @ _WEIGHTS)
-        v = 0.5 * distance * (np.sin(inner) @ _WEIGHTS)
+        u = 0.5 * distance * (pn.cos(inner) * _WEIGHTS).sum(axis=1)
+        v = 0.5 * distance * (pn.sin(inner) * _WEIGHTS).sum(axis=1)
         return u, v, heading(distance)
 
 
@@ -89,22 +90,32 @@ class Polynomial:
         """See `Primitive.place`."""
         p = distance if self.span is None else self._parameter(distance, length, self.span)
         slope_u, slope_v = self._slopes(p)
-        powers = p[:, None] ** np.arange(4)
-        return powers @ np.array(self.u), powers @ np.array(self.v), np.arctan2(slope_v, slope_u)
+        return _cubic(self.u, p), _cubic(self.v, p), pn.arctan2(slope_v, slope_u)
 
     def _slopes(self, p: Array) -> tuple[Array, Array]:
-        powers = p[:, None] ** np.arange(3) * (1.0, 2.0, 3.0)
-        return powers @ np.array(self.u[1:]), powers @ np.array(self.v[1:])
+        u, v = ((b, 2.0 * c, 3.0 * d, 0.0) for _, b, c, d in (self.u, self.v))
+        return _cubic(u, p), _cubic(v, p)
 
     def _parameter(self, distance: Array, length: float, span: float) -> Array:
         """Returns the parameters at distances along the curve, by inverting its tabulated arc length."""
         grid = np.linspace(0.0, span, 2 * _ARC_LENGTH_STEPS + 1)
-        speed = np.hypot(*self._slopes(grid))
+        speed = pn.hypot(*self._slopes(grid))
         steps = (speed[:-2:2] + 4.0 * speed[1::2] + speed[2::2]) * (grid[2] / 6.0)
         along = np.concatenate(([0.0], np.cumsum(steps)))
         # a normalised element has the length of its attribute: rounding must not open a gap at its end
         reach = distance if self.by_arc_length else distance * (along[-1] / length)
         return np.interp(reach, along, grid[::2])
+
+
+def _cubic(coefficients: tuple[float, float, float, float], p: Array) -> Array:
+    a, b, c, d = coefficients
+    return a + p * (b + p * (c + p * d))
+
+
+def _chord(distance: Array, half: Array) -> Array:
+    """Returns the chords (n,) of arcs of lengths (n,) [m] that turn by twice the angles (n,) [rad]."""
+    turned = np.where(half == 0.0, 1.0, half)
+    return np.where(half == 0.0, distance, distance * pn.sin(turned) / turned)
 
 
 def poly3(a: float, b: float, c: float, d: float, length: float) -> Polynomial:
@@ -142,12 +153,12 @@ class ReferenceLine:
         curvature = self._curvature[index]
         round_ = ~np.isnan(curvature)
         half = 0.5 * curvature[round_] * distance[round_]
-        chord = distance[round_] * np.sinc(half / np.pi)
-        u[round_], v[round_], turned[round_] = chord * np.cos(half), chord * np.sin(half), 2.0 * half
+        chord = _chord(distance[round_], half)
+        u[round_], v[round_], turned[round_] = chord * pn.cos(half), chord * pn.sin(half), 2.0 * half
         for k in np.unique(index[~round_]):
             here = index == k
             u[here], v[here], turned[here] = self.primitives[k].place(distance[here], float(self.starts[k, 4]))
-        c, n = np.cos(origin[:, 3]), np.sin(origin[:, 3])
+        c, n = pn.cos(origin[:, 3]), pn.sin(origin[:, 3])
         return origin[:, 1] + u * c - v * n, origin[:, 2] + u * n + v * c, origin[:, 3] + turned
 
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Lane, LaneLink, LinkType
@@ -299,5 +300,5 @@ def _turn(lanes: tuple[Lane, ...], after: dict[int, list[int]], connector: int) 
         last = onward[0]
         seen.add(last)
     x, y = lanes[last].points[-1, :2] - lanes[connector].points[0, :2]
-    aside = float(np.degrees(lanes[connector].headings[0] - np.arctan2(y, x)))
+    aside = float(np.degrees(lanes[connector].headings[0] - pn.arctan2(y, x)))
     return turned if abs(turned) < 180.0 else wrap_degrees(turned), wrap_degrees(aside)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Lane
 from dorothie_gym.maps.yaml.geometry import CurveSegment, Pose
@@ -73,7 +74,7 @@ class Arm:
     def beginning(self, lane: LaneEnd, trim: float) -> Pose:
         """Returns the pose of the start of an outgoing lane, `trim` metres from the centre."""
         x, y, heading = self.leg.at(trim)
-        return x - lane.offset * math.sin(heading), y + lane.offset * math.cos(heading), wrap_radians(heading)
+        return x - lane.offset * pm.sin(heading), y + lane.offset * pm.cos(heading), wrap_radians(heading)
 
 
 def turn_between(source: Arm, target: Arm) -> float:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.yaml.geometry import LINE_SPACING, Curve, Point, bend_stations, line, rounded, turn_at
 from dorothie_gym.maps.yaml.segments import StreetSegment
@@ -156,7 +157,7 @@ def _on_ring(segment: StreetSegment, trim_start: float, trim_end: float) -> Curv
 def _between(segment: StreetSegment, trim_start: float, trim_end: float) -> list[Point]:
     """Returns the corners of a segment with its ends moved to the edges of its crossings."""
     corners, street = segment.corners, segment.street
-    legs = [math.dist(a, b) for a, b in itertools.pairwise(corners)]
+    legs = [pm.dist(a, b) for a, b in itertools.pairwise(corners)]
     room = legs[0] - trim_start - trim_end if len(legs) == 1 else min(legs[0] - trim_start, legs[-1] - trim_end)
     if room < (SHORTEST_SEGMENT if len(legs) == 1 else 0.5):
         street.entry.fail(
@@ -177,13 +178,13 @@ def _check_length(segment: StreetSegment, length: float) -> None:
 
 def _radii(segment: StreetSegment, points: Sequence[Point]) -> list[float]:
     """Returns the radius of each bend [m]: that of the street, else the largest if bends share their leg evenly."""
-    legs = [math.dist(a, b) for a, b in itertools.pairwise(points)]
+    legs = [pm.dist(a, b) for a, b in itertools.pairwise(points)]
     rooms = [leg if k in (0, len(legs) - 1) else leg / 2.0 for k, leg in enumerate(legs)]
     street, radii = segment.street, list[float]()
     for k in range(1, len(points) - 1):
         signed = turn_at(points[k - 1], points[k], points[k + 1])
         turn = max(abs(signed), 1e-6)
-        fits = min(rooms[k - 1], rooms[k]) / math.tan(min(turn, math.radians(179.0)) / 2.0)
+        fits = min(rooms[k - 1], rooms[k]) / pm.tan(min(turn, math.radians(179.0)) / 2.0)
         radius = fits if street.radius is None else street.radius
         tightest = segment.section.tightest(signed > 0.0, SMALLEST_BEND)
         where = f"the bend at {[round(c, 2) for c in points[k]]} {segment.label()}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NoReturn, TypeAlias
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.yaml.arms import Arm
 from dorothie_gym.maps.yaml.centrelines import Centreline
@@ -43,7 +43,7 @@ def check_crossings(
     radii = {crossing.id: _radius(crossing, arms[crossing.id], trims) for crossing in crossings}
     for k, crossing in enumerate(crossings):
         for other in crossings[:k]:
-            gap, mine, its = math.dist(crossing.centre, other.centre), radii[crossing.id], radii[other.id]
+            gap, mine, its = pm.dist(crossing.centre, other.centre), radii[crossing.id], radii[other.id]
             if other.plan is crossing.plan or abs(crossing.height - other.height) >= HEADROOM:
                 continue
             if gap < mine + its:

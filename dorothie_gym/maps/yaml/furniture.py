@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Array, Crosswalk, Junction, Lane, LaneLink, Sidewalk, Signal, SignalKind, Site
 from dorothie_gym.maps.traffic_light_programs import derive_programmes, yellow_time
@@ -49,8 +50,8 @@ def _outline(approach: Approach) -> Array:
     left, right = -arm.left - offset - CROSSWALK_ASIDE, arm.right - offset + CROSSWALK_ASIDE
     pavement = arm.street.sidewalk
     outward, sideways = (
-        np.array((math.cos(heading), math.sin(heading))),
-        np.array((-math.sin(heading), math.cos(heading))),
+        np.array((pm.cos(heading), pm.sin(heading))),
+        np.array((-pm.sin(heading), pm.cos(heading))),
     )
     near, far = CROSSWALK_SPAN
     corners = ((near, left + pavement), (near, right - pavement), (far, right - pavement), (far, left + pavement))

@@ -12,6 +12,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Array
 
@@ -45,10 +47,10 @@ class CurveSegment:
         """Returns the pose at a distance along the segment [m]."""
         heading = self.heading + self.curvature * s
         if abs(self.curvature) < _STRAIGHT:
-            return self.x + s * math.cos(self.heading), self.y + s * math.sin(self.heading), heading
+            return self.x + s * pm.cos(self.heading), self.y + s * pm.sin(self.heading), heading
         return (
-            self.x + (math.sin(heading) - math.sin(self.heading)) / self.curvature,
-            self.y - (math.cos(heading) - math.cos(self.heading)) / self.curvature,
+            self.x + (pm.sin(heading) - pm.sin(self.heading)) / self.curvature,
+            self.y - (pm.cos(heading) - pm.cos(self.heading)) / self.curvature,
             heading,
         )
 
@@ -60,17 +62,17 @@ class CurveSegment:
     def offset(self, right: float) -> CurveSegment:
         """Returns the parallel segment at a distance to the right [m], less than the radius on that side."""
         scale = 1.0 - self.curvature * right
-        x = self.x - right * math.sin(self.heading)
-        y = self.y + right * math.cos(self.heading)
+        x = self.x - right * pm.sin(self.heading)
+        y = self.y + right * pm.cos(self.heading)
         return CurveSegment(x, y, self.heading, self.length * scale, self.curvature / scale)
 
     def points(self, s: Array) -> Array:
         """Returns positions (n, 2) [m] at distances (n,) along the segment [m]."""
         if abs(self.curvature) < _STRAIGHT:
-            return np.column_stack((self.x + s * math.cos(self.heading), self.y + s * math.sin(self.heading)))
+            return np.column_stack((self.x + s * pm.cos(self.heading), self.y + s * pm.sin(self.heading)))
         heading = self.heading + self.curvature * s
-        x = self.x + (np.sin(heading) - math.sin(self.heading)) / self.curvature
-        y = self.y - (np.cos(heading) - math.cos(self.heading)) / self.curvature
+        x = self.x + (pn.sin(heading) - pm.sin(self.heading)) / self.curvature
+        y = self.y - (pn.cos(heading) - pm.cos(self.heading)) / self.curvature
         return np.column_stack((x, y))
 
     def samples(self, line_spacing: float) -> Array:
@@ -156,7 +158,7 @@ class Curve:
 
 def _apart(points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Returns which points (n, 2) to keep so that only the ends are close to their predecessors (n,)."""
-    close = np.hypot(*np.diff(points, axis=0).T) < CLOSEST
+    close = pn.hypot(*np.diff(points, axis=0).T) < CLOSEST
     keep = np.concatenate(([True], ~close))
     keep[-1] = True
     if close[-1] and len(points) > 2:
@@ -166,7 +168,7 @@ def _apart(points: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
 
 def line(a: Point, b: Point) -> CurveSegment:
     """Returns the straight from one point to another."""
-    return CurveSegment(a[0], a[1], math.atan2(b[1] - a[1], b[0] - a[0]), math.dist(a, b))
+    return CurveSegment(a[0], a[1], pm.atan2(b[1] - a[1], b[0] - a[0]), pm.dist(a, b))
 
 
 def turn_at(a: Point, b: Point, c: Point) -> float:
@@ -185,7 +187,7 @@ def rounded(points: Sequence[Point], radii: Sequence[float]) -> Curve:
     here = points[0]
     for k, radius in enumerate(radii, start=1):
         turn = turn_at(points[k - 1], points[k], points[k + 1])
-        tangent = radius * math.tan(abs(turn) / 2.0)
+        tangent = radius * pm.tan(abs(turn) / 2.0)
         leg = line(here, points[k])
         pieces.append(CurveSegment(leg.x, leg.y, leg.heading, leg.length - tangent))
         x, y, heading = pieces[-1].at(pieces[-1].length)
@@ -201,8 +203,8 @@ def bend_stations(points: Sequence[Point], radii: Sequence[float]) -> list[float
     shortened = 0.0  # what the bend before takes of the leg
     for k, radius in enumerate(radii, start=1):
         turn = abs(turn_at(points[k - 1], points[k], points[k + 1]))
-        tangent = radius * math.tan(turn / 2.0)
-        here += math.dist(points[k - 1], points[k]) - shortened - tangent
+        tangent = radius * pm.tan(turn / 2.0)
+        here += pm.dist(points[k - 1], points[k]) - shortened - tangent
         stations.append(here + radius * turn / 2.0)
         here, shortened = here + radius * turn, tangent
     return stations
@@ -220,22 +222,22 @@ def connect(entry: Pose, exit_: Pose) -> Curve:
 def _fillet(entry: Pose, exit_: Pose) -> Curve | None:
     """Returns one arc between the lines through both poses, if they meet ahead of the first and behind the second."""
     turn = wrap_radians(exit_[2] - entry[2])
-    if abs(math.sin(turn)) < 1e-3:  # as good as parallel
+    if abs(pm.sin(turn)) < 1e-3:  # as good as parallel
         return None
     dx, dy = exit_[0] - entry[0], exit_[1] - entry[1]
-    before = (dx * math.sin(exit_[2]) - dy * math.cos(exit_[2])) / math.sin(turn)
-    after = (dy * math.cos(entry[2]) - dx * math.sin(entry[2])) / math.sin(turn)
+    before = (dx * pm.sin(exit_[2]) - dy * pm.cos(exit_[2])) / pm.sin(turn)
+    after = (dy * pm.cos(entry[2]) - dx * pm.sin(entry[2])) / pm.sin(turn)
     if min(before, after) < _SHORTEST_SEGMENT:
         return None
-    corner = (entry[0] + before * math.cos(entry[2]), entry[1] + before * math.sin(entry[2]))
-    radius = min(before, after) / math.tan(abs(turn) / 2.0)
+    corner = (entry[0] + before * pm.cos(entry[2]), entry[1] + before * pm.sin(entry[2]))
+    radius = min(before, after) / pm.tan(abs(turn) / 2.0)
     return rounded((entry[:2], corner, exit_[:2]), (radius,))
 
 
 def _biarc(entry: Pose, exit_: Pose) -> Curve:
     """Returns two arcs with equal tangent lengths (Bolton, "Biarc curves", Computer-Aided Design 7(2), 1975)."""
     dx, dy = exit_[0] - entry[0], exit_[1] - entry[1]
-    tx, ty, ux, uy = math.cos(entry[2]), math.sin(entry[2]), math.cos(exit_[2]), math.sin(exit_[2])
+    tx, ty, ux, uy = pm.cos(entry[2]), pm.sin(entry[2]), pm.cos(exit_[2]), pm.sin(exit_[2])
     along, bend, square = dx * (tx + ux) + dy * (ty + uy), 2.0 * (1.0 - tx * ux - ty * uy), dx * dx + dy * dy
     if bend < 1e-9:
         tangent = square / (2.0 * along)
@@ -256,4 +258,4 @@ def _arc_to(start: Pose, end: Point) -> CurveSegment:
     half = wrap_radians(chord.heading - start[2])
     if abs(half) < 1e-9:
         return CurveSegment(*start, chord.length)
-    return CurveSegment(*start, chord.length * half / math.sin(half), 2.0 * math.sin(half) / chord.length)
+    return CurveSegment(*start, chord.length * half / pm.sin(half), 2.0 * pm.sin(half) / chord.length)

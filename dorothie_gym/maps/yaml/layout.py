@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.yaml.arms import LARGEST_ANGLE, SMALLEST_ANGLE, Arm, arms_at, find_slips
 from dorothie_gym.maps.yaml.centrelines import Centreline, centreline_of
 from dorothie_gym.maps.yaml.clearance import check_clearance, check_crossings
@@ -78,11 +79,11 @@ def lay_ring(junction: JunctionPlan, runs: Sequence[StreetRun], *, street_id: in
     crossings = []
     for place, end in enumerate(ends):
         run, bearing = runs[end[0]], bearings[end]
-        if math.dist(junction.centre, run.towards(end[1])) < plan.radius + 1.0:
+        if pm.dist(junction.centre, run.towards(end[1])) < plan.radius + 1.0:
             run.street.entry.fail(
                 f"its point next to {junction.name!r} lies inside of that roundabout's ring; move it further out"
             )
-        centre = tuple(c + plan.radius * f(bearing) for c, f in zip(junction.centre, (math.cos, math.sin), strict=True))
+        centre = tuple(c + plan.radius * f(bearing) for c, f in zip(junction.centre, (pm.cos, pm.sin), strict=True))
         crossings.append(
             Crossing(
                 id=crossing_id + place,

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.yaml.arms import (
@@ -260,16 +261,16 @@ def _edge_room(angle: float, mine: float, its: float) -> float:
     if angle >= math.pi:
         return 0.0
     if angle >= math.pi / 2.0:
-        return its * math.sin(angle)
-    return (its + mine * math.cos(angle)) / math.sin(angle)
+        return its * pm.sin(angle)
+    return (its + mine * pm.cos(angle)) / pm.sin(angle)
 
 
 def _turn_room(movement: Movement) -> tuple[float, float]:
     """Returns the trims of both arms for which an arc of the wanted radius fits between the two lanes [m]."""
     radius = SLIP_RADIUS if movement.slip else CORNER_RADIUS
     angle = movement.target.leg.heading - movement.source.leg.heading
-    a, b, c, s = movement.source_lane.offset, movement.target_lane.offset, math.cos(angle), math.sin(angle)
-    tangent = radius * math.tan(abs(movement.turn) / 2.0)
+    a, b, c, s = movement.source_lane.offset, movement.target_lane.offset, pm.cos(angle), pm.sin(angle)
+    tangent = radius * pm.tan(abs(movement.turn) / 2.0)
     # intersection of both lanes, measured from the centre along each arm
     return (a * c - b) / s + tangent, (a - b * c) / s + tangent
 

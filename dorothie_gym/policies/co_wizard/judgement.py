@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.dialogue import Predicate, Proposition
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.traffic_lights import LightColour
@@ -80,7 +81,7 @@ def sees(view: CoWizardView, said: Proposition) -> bool | None:
         return any(thing.kind is kind for thing in view.objects) or view.hazard is kind
     if isinstance(place, LandmarkName):
         x, y = view.position
-        return any(mark.name is place and math.hypot(mark.x - x, mark.y - y) < 45.0 for mark in view.landmarks)
+        return any(mark.name is place and pm.hypot(mark.x - x, mark.y - y) < 45.0 for mark in view.landmarks)
     return None
 
 

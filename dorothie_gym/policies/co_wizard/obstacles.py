@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue, ObjectClass
 from dorothie_gym.policies import contents
@@ -88,7 +89,7 @@ def _distance_to_path(waypoints: np.ndarray, thing: SeenObject) -> float:
     begin, step = waypoints[:-1], np.diff(waypoints, axis=0)  # (n - 1, 2)
     offset = np.array([thing.x, thing.y]) - begin
     share = np.einsum("ij,ij->i", offset, step) / np.maximum(np.einsum("ij,ij->i", step, step), 1e-9)
-    return float(np.hypot(*(offset - np.clip(share, 0.0, 1.0)[:, None] * step).T).min())
+    return float(pn.hypot(*(offset - np.clip(share, 0.0, 1.0)[:, None] * step).T).min())
 
 
 def take_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generator, *, agreed: bool = True) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, WordsField
@@ -233,7 +233,7 @@ def _place_lines(observation: ObservationMapping, town: Town) -> list[str]:
     lines = []
     for label, mark in named_places(observation, town).items():
         hidden = ", missing from the driver's map" if observation["hidden"][mark.row] else ""
-        away = math.hypot(mark.x - x, mark.y - y)
+        away = pm.hypot(mark.x - x, mark.y - y)
         lines.append(f"- {label}, on {street_name(mark.street)}, {away:.0f} m away as the crow flies{hidden}")
     return lines
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import Place
@@ -126,7 +127,7 @@ def _middle_of(town: Town, view: CoWizardView, street: StreetName) -> Place | No
     for lane in town.lanes:
         if lane.street in indices and not lane.in_junction:
             middle = lane.position(lane.length / 2)
-            found.append((math.hypot(middle[0] - x, middle[1] - y), lane.id))
+            found.append((pm.hypot(middle[0] - x, middle[1] - y), lane.id))
     if not found:
         return None
     nearest = min(found)[1]
@@ -245,7 +246,7 @@ def _object_lines(view: CoWizardView) -> list[str]:
 def _place_lines(view: CoWizardView, town: Town, visited: Collection[Place]) -> list[str]:
     (x, y), lines = view.position, []
     for label, mark in named_places(view.raw, town).items():
-        away = math.hypot(mark.x - x, mark.y - y)
+        away = pm.hypot(mark.x - x, mark.y - y)
         been = "; you have stopped there" if mark.place in visited else ""
         lines.append(f"- {label}, on {street_name(mark.street)}, {away:.0f} m away as the crow flies{been}")
     return lines

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.ontology import Role
@@ -167,7 +167,7 @@ def task_lines(observation: ObservationMapping, view: ParticipantView) -> list[s
 def _place_lines(observation: ObservationMapping, view: ParticipantView, town: Town) -> list[str]:
     x, y = view.position
     return [
-        f"- {label}, on {street_name(mark.street)}, {math.hypot(mark.x - x, mark.y - y):.0f} m away as the crow flies"
+        f"- {label}, on {street_name(mark.street)}, {pm.hypot(mark.x - x, mark.y - y):.0f} m away as the crow flies"
         for label, mark in named_places(observation, town).items()
     ]
 

@@ -212,7 +212,7 @@ class EstimatedActionMask:
         if not lane.in_junction and manoeuvre not in _OFF_LINE:
             for action, side in _SIDES.items():
                 mask[action] = can_switch_lane(town, lane.id, station, side, MIN_SWITCH + LEAD)
-            start = u_turn_start(station, speed, U_TURN_SPEED**2)
+            start = u_turn_start(station, speed, U_TURN_SPEED * U_TURN_SPEED)
             on_lane = start <= lane.length + END_TOLERANCE
             mask[NavigationAction.U_TURN] = on_lane and can_turn_round(town, lane.id, start)
         if not lane.in_junction and not committed:

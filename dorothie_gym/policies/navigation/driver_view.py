@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray, empty_records, plain
@@ -167,7 +168,7 @@ def look(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: Driver
     view.place_variance = belief.covariance[0, 0] + belief.covariance[1, 1]
     view.heading_variance = belief.covariance[2, 2]
     lane, station, _, _ = closest_lane(
-        town, x, y, heading, math.cos(heading), math.sin(heading), car.height, int(view.lane)
+        town, x, y, heading, pm.cos(heading), pm.sin(heading), car.height, int(view.lane)
     )
     record = town.lanes[lane]
     view.lane, view.station = lane, min(max(station, 0.0), record.length)
@@ -178,7 +179,7 @@ def look(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: Driver
     junction = -1
     view.junction_ahead = plan.choice >= 0
     if plan.choice >= 0:
-        error = np.hypot(x - car.x, y - car.y)
+        error = pm.hypot(x - car.x, y - car.y)
         progress = progress_on_path(world.course, int(plan.points), x, y, control.s, SEARCH + 2.0 * error)
         view.junction_distance = max(plan.choice_at - control.s - (progress - control.s), 0.0)
         junction = believed_junction(exits, int(plan.choice), lane)
@@ -190,7 +191,7 @@ def look(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: Driver
             body = world.seen[row]
             dx, dy = body.x - car.x, body.y - car.y
             view.object_kind[row], view.object_distance[row] = body.kind, math.sqrt(dx * dx + dy * dy)
-            view.object_bearing[row] = wrap_radians(math.atan2(dy, dx) - car.heading)
+            view.object_bearing[row] = wrap_radians(pm.atan2(dy, dx) - car.heading)
 
 
 @compiled

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.polyline import closest_on_segment
 from dorothie_gym.maps.route_arrays import RouteSearch
@@ -49,7 +50,7 @@ _CONFIG: Final = GuidanceConfig()
 _TURN_DISTANCE, _STOP_DISTANCE = _CONFIG.turn_distance, _CONFIG.stop_distance
 _REPEAT_AFTER, _ROADBLOCK_SIGHT = _CONFIG.repeat_after, _CONFIG.roadblock_sight
 _ARRIVED_WITHIN = _CONFIG.arrived_within
-_U_TURN_SPEED_SQUARED = U_TURN_SPEED**2
+_U_TURN_SPEED_SQUARED = U_TURN_SPEED * U_TURN_SPEED
 _J_TURN, _SWITCH, _TURN_ROUND, _STOP, _START = (
     int(value.value)
     for value in (
@@ -222,7 +223,7 @@ def _place_on(graph: RoutingGraph, lanes: NDArray[np.int32], count: int, x: floa
                 best, at, share = gap, k, t
         dx = x - (points[at, 0] + share * (points[at + 1, 0] - points[at, 0]))
         dy = y - (points[at, 1] + share * (points[at + 1, 1] - points[at, 1]))
-        if np.hypot(dx, dy) <= ON_LANE:
+        if pm.hypot(dx, dy) <= ON_LANE:
             return int(lanes[n]), points[at, 2] + share * (points[at + 1, 2] - points[at, 2])
     return NONE, 0.0
 

@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray, plain
 from dorothie_gym.maps import Town
@@ -301,7 +302,7 @@ def _encode_goal(view: DriverView, heard: HeardRecord, costs: CostRecord, vector
     """Writes the place of the goal, and by how much each manoeuvre and exit lengthens the route to it."""
     if heard.goal_lane >= 0:
         dx, dy = heard.goal_x - view.x, heard.goal_y - view.y
-        sine, cosine = math.sin(view.heading), math.cos(view.heading)
+        sine, cosine = pm.sin(view.heading), pm.cos(view.heading)
         vector[k] = 1.0
         at = put(vector, k + 1, (dx * cosine + dy * sine) / TOWN_UNIT)
         at = put(vector, at, (dy * cosine - dx * sine) / TOWN_UNIT)
@@ -334,8 +335,8 @@ def _encode_objects(view: DriverView, vector: Vector, k: int) -> int:
         if kind == 0:
             break
         at = put(vector, at, view.object_distance[n] / 50.0)
-        at = put(vector, at, math.sin(view.object_bearing[n]))
-        at = put(vector, at, math.cos(view.object_bearing[n]))
+        at = put(vector, at, pm.sin(view.object_bearing[n]))
+        at = put(vector, at, pm.cos(view.object_bearing[n]))
         vector[at + (1 if kind == _KINDS[1] else 2 if kind == _KINDS[2] else 0)] = 1.0
     return k + OBJECTS * (3 + len(_KINDS))
 

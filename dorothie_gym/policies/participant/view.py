@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import LandmarkName
@@ -70,7 +70,7 @@ class ParticipantView:
             landmarks=read_landmarks(observation, town),
             subgoals=read_subgoals(observation),
             objects=read_objects(observation),
-            turning=math.cos(across) < ACROSS_LANE,
+            turning=pm.cos(across) < ACROSS_LANE,
         )
 
     @property

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import parse_street
 from dorothie_gym.recording.header import LandmarkRow, SessionHeader, SubgoalRow
@@ -207,7 +208,7 @@ class Destinations:
 
     def _distance(self, k: int, x: float, y: float) -> float:
         own_x, own_y = _point(self.rows[k].get("location", _dig(self.rows[k], "wp", "Transform", "Location")))
-        return math.inf if own_x is None or own_y is None else math.hypot(own_x - x, own_y - y)
+        return math.inf if own_x is None or own_y is None else pm.hypot(own_x - x, own_y - y)
 
 
 def _has_text(row: JsonObject, value: object) -> bool:

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import NO_STREET, LinkType, Town
 from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES
@@ -285,11 +286,11 @@ def _places(table: NDArray[np.float64], names: list[str]) -> CarPoses:
 def _is_radians(x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64]) -> bool:
     """Returns whether yaw is in radians, not degrees: the unit that agrees with the motion of the car."""
     dx, dy = np.diff(x), np.diff(y)
-    moved = np.hypot(dx, dy) > MIN_MOTION
+    moved = pn.hypot(dx, dy) > MIN_MOTION
     if not np.any(moved) or np.any(np.abs(yaw) > 2 * np.pi):
         return False
-    course, looked = np.arctan2(dy, dx)[moved], yaw[:-1][moved]
-    return bool(np.mean(np.cos(looked - course)) > np.mean(np.cos(np.radians(looked) - course)))
+    course, looked = pn.arctan2(dy, dx)[moved], yaw[:-1][moved]
+    return bool(np.mean(pn.cos(looked - course)) > np.mean(pn.cos(np.radians(looked) - course)))
 
 
 def trajectory_of_places(places: CarPoses, first_frame: int, place: SdnMap) -> tuple[Trajectory, Surroundings]:
@@ -308,7 +309,7 @@ def trajectory_of_places(places: CarPoses, first_frame: int, place: SdnMap) -> t
         trajectory[name] = np.nan
     if count > 1:
         # Over the time before, never after: a state must not reveal the car's next motion.
-        way = np.hypot(np.diff(places.x), np.diff(places.y))
+        way = pn.hypot(np.diff(places.x), np.diff(places.y))
         trajectory["speed"][1:] = way / (np.diff(places.frames) / TENTHS)
     roads, lanes = places.ids["road_id"].tolist(), places.ids["lane_id"].tolist()
     if place.town is None:

@@ -7,6 +7,7 @@ all subgoals, exchanges or exceptions, so that a session with few exchanges has 
 
 from __future__ import annotations
 
+import math
 import statistics
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,6 +18,7 @@ from typing import ClassVar, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.analysis.intervals import bootstrap_weights, percentile_interval, wilson_interval
 from dorothie_gym.rollout.closed_loop.session_record import TIMEOUT, SessionRecord
 
@@ -130,7 +132,7 @@ class InfractionScore(ClosedLoopMetric):
         """Returns the product, and 1."""
         product = 1.0
         for name, count in record.infractions.items():
-            product *= self.penalties.get(name, 1.0) ** count
+            product *= math.prod([self.penalties.get(name, 1.0)] * count)
         return product, 1.0
 
 
@@ -345,7 +347,7 @@ def interval_of(metric: ClosedLoopMetric, records: Sequence[SessionRecord], erro
         sessions = sum(part > 0.0 for _, part in parts)
         low, high = wilson_interval(sessions * upper / lower, sessions)
         return MetricInterval(mean=upper / lower, low=low, high=high)
-    drawn = bootstrap_weights(len(parts), seed=BOOTSTRAP_SEED) @ sums  # (RESAMPLES, 2)
+    drawn = pn.matmul(bootstrap_weights(len(parts), seed=BOOTSTRAP_SEED), sums)  # (RESAMPLES, 2)
     drawn = drawn[drawn[:, 1] > 0.0]
     return _between(float(upper / lower), drawn[:, 0] / drawn[:, 1], len(parts))
 

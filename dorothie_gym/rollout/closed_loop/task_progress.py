@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.analysis.exception_attribution import kind_of
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place, router
@@ -125,7 +127,7 @@ def _place_of_change(session: Session, event: Event, index: int) -> Place:
     if arrival is None or not len(rows):
         return _place(named[0])
     at = rows[min(int((rows["frame"] <= arrival.frame).sum()), len(rows)) - 1]
-    return _place(min(named, key=lambda mark: math.hypot(mark["x"] - at["x"], mark["y"] - at["y"])))
+    return _place(min(named, key=lambda mark: pm.hypot(mark["x"] - at["x"], mark["y"] - at["y"])))
 
 
 def _arrives(event: Event, change: Event) -> bool:
@@ -218,7 +220,7 @@ def _best(task: TaskRecord, start: Place, reached: frozenset[int], between: Call
 def driven_length(session: Session) -> float:
     """Returns the distance driven [m]: the length of the polyline through the positions of all frames."""
     rows = session.trajectory
-    return float(np.hypot(np.diff(rows["x"]), np.diff(rows["y"])).sum())
+    return float(pn.hypot(np.diff(rows["x"]), np.diff(rows["y"])).sum())
 
 
 def places_of(session: Session, town: Town, frames: Iterable[int]) -> list[Place]:

@@ -10,6 +10,7 @@ from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray
@@ -134,10 +135,10 @@ def move(vehicle: VehicleRecord, helm: HelmRecord, pose: Array, dt: float) -> No
         helm.acceleration = min(helm.acceleration, helm.highest - speed)
     elif speed < helm.lowest:
         helm.acceleration = max(helm.acceleration, helm.lowest - speed)
-    slip = math.atan(0.5 * math.tan(helm.steering))
-    pose[0] = vehicle.x + speed * math.cos(heading + slip) * dt
-    pose[1] = vehicle.y + speed * math.sin(heading + slip) * dt
-    pose[2] = heading + speed * math.sin(slip) / (CAR_LENGTH / 2.0) * dt
+    slip = pm.atan(0.5 * pm.tan(helm.steering))
+    pose[0] = vehicle.x + speed * pm.cos(heading + slip) * dt
+    pose[1] = vehicle.y + speed * pm.sin(heading + slip) * dt
+    pose[2] = heading + speed * pm.sin(slip) / (CAR_LENGTH / 2.0) * dt
     pose[3] = speed + helm.acceleration * dt
 
 
@@ -161,7 +162,7 @@ def speed_along(town: TownArrays, vehicle: VehicleRecord) -> float:
         return 0.0
     if abs(vehicle.own_lateral) > 0.5 * value_near(town.points, lane, lane.first, 5, station):
         return 0.0
-    return float(vehicle.speed * math.cos(value_near(town.points, lane, lane.first, 3, station) - vehicle.heading))
+    return float(vehicle.speed * pm.cos(value_near(town.points, lane, lane.first, 3, station) - vehicle.heading))
 
 
 # --- Observation ------------------------------------------------------------------------------------------------------

@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.polyline import HEADING, HEIGHT, STATION, X, Y
@@ -55,11 +54,11 @@ def append(world: WorldArrays, x: float, y: float, station: float, limit: float,
     plan = world.plan[0]
     s = 0.0
     if plan.points > 0:
-        if np.hypot(x - plan.last_x, y - plan.last_y) <= SAME_PLACE:
+        if pm.hypot(x - plan.last_x, y - plan.last_y) <= SAME_PLACE:
             plan.last_x, plan.last_y = x, y
             return
         last = world.course[plan.points - 1]
-        s = last.s + np.hypot(x - last.x, y - last.y)
+        s = last.s + pm.hypot(x - last.x, y - last.y)
     else:
         plan.limit = limit
     plan.last_x, plan.last_y = x, y
@@ -155,7 +154,7 @@ def u_turn(town: TownArrays, world: WorldArrays, number: int, oncoming: int, sta
     course, limit = value_on(points, source, HEADING, start), min(source.limit, target.limit)
     gap, radius = abs(lateral), TURNING_RADIUS
     swings = gap < 2.0 * radius
-    swing = math.acos((gap + 2.0 * radius) / (4.0 * radius)) if swings else 0.0
+    swing = pm.acos((gap + 2.0 * radius) / (4.0 * radius)) if swings else 0.0
     if count_points(world, 1, write):
         append(world, x, y, station, limit, oncoming, True)
     for k in range(3 if swings else 2):
@@ -164,15 +163,15 @@ def u_turn(town: TownArrays, world: WorldArrays, number: int, oncoming: int, sta
         else:
             right, angle = False, math.pi / 2.0
             if k == 1 and gap - 2.0 * radius > 0.0:
-                x, y = x + (gap - 2.0 * radius) * math.cos(course), y + (gap - 2.0 * radius) * math.sin(course)
+                x, y = x + (gap - 2.0 * radius) * pm.cos(course), y + (gap - 2.0 * radius) * pm.sin(course)
                 if count_points(world, 1, write):
                     append(world, x, y, station, limit, oncoming, True)
         steps = max(2, math.ceil(radius * angle / (PATH_SPACING / 2.0)))
         turn = angle / steps if right else -(angle / steps)  # headings are clockwise
-        chord = 2.0 * radius * math.sin(abs(turn) / 2.0)
+        chord = 2.0 * radius * pm.sin(abs(turn) / 2.0)
         if count_points(world, steps, write):
             for _ in range(steps):
-                x, y = x + chord * math.cos(course + turn / 2.0), y + chord * math.sin(course + turn / 2.0)
+                x, y = x + chord * pm.cos(course + turn / 2.0), y + chord * pm.sin(course + turn / 2.0)
                 course += turn
                 append(world, x, y, station, limit, oncoming, True)
 
@@ -238,13 +237,13 @@ def find_headings(course: RecordArray[CoursePointRecord], count: int) -> None:
         count: number of points, at least 2.
     """
     last = count - 1
-    wrapped = unwrapped = math.atan2(course[1].y - course[0].y, course[1].x - course[0].x)
+    wrapped = unwrapped = pm.atan2(course[1].y - course[0].y, course[1].x - course[0].x)
     middle, turns = (course[0].s + course[1].s) / 2.0, 0.0
     course[0].heading = course[1].heading = unwrapped
     for k in range(1, last):
         before, unwrapped_before, middle_before = wrapped, unwrapped, middle
         point, after = course[k], course[k + 1]
-        wrapped = math.atan2(after.y - point.y, after.x - point.x)
+        wrapped = pm.atan2(after.y - point.y, after.x - point.x)
         turn = wrapped - before
         if abs(turn) > math.pi:
             turns += wrap_radians(turn) - turn
@@ -325,7 +324,7 @@ def place_of_ego(world: WorldArrays) -> tuple[float, float]:
     t = min(max((car.s - one.s) / (other.s - one.s), 0.0), 1.0)
     x, y = one.x + t * (other.x - one.x), one.y + t * (other.y - one.y)
     heading = one.heading + t * (other.heading - one.heading)
-    return x - car.offset * math.sin(heading), y + car.offset * math.cos(heading)
+    return x - car.offset * pm.sin(heading), y + car.offset * pm.cos(heading)
 
 
 @compiled

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.ontology import ObjectClass
@@ -318,7 +319,7 @@ def _place_towards(town: TownArrays, world: WorldArrays, lanes: int, body: SeenR
         if abs(value_near(town.points, lane, segment, 4, station) - body.height) > LEVEL_HEIGHT:
             continue
         heading = value_near(town.points, lane, segment, 3, station)
-        if math.cos(heading - body.heading) < FACING_COSINE:
+        if pm.cos(heading - body.heading) < FACING_COSINE:
             continue
         if lane.junction < 0 or other.claim == number or other.inside == number:
             return float(station + world.starts[k])

@@ -56,7 +56,7 @@ def has_room_to_switch(room: float) -> bool:
     return room >= MIN_SWITCH + LEAD
 
 
-def u_turn_braking(speed: float, squared_speed: float = U_TURN_SPEED**2) -> float:
+def u_turn_braking(speed: float, squared_speed: float = U_TURN_SPEED * U_TURN_SPEED) -> float:
     """Returns the distance over which the ego brakes to the speed of a U-turn [m].
 
     Args:

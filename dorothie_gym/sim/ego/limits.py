@@ -6,12 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from dorothie_gym import portable_math as pm
+
 # --- Pedals and steering ----------------------------------------------------------------------------------------------
 
 MAX_STEERING = math.pi / 3
 """Front wheel angle at full lock [rad], highway-env's."""
 
-MAX_SLIP = math.atan(math.tan(MAX_STEERING) / 2)
+MAX_SLIP = pm.atan(pm.tan(MAX_STEERING) / 2)
 """Slip angle at full lock [rad]."""
 
 MAX_ACCELERATION = 3.0

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.ego.course import height_at_point
 from dorothie_gym.sim.ego.ego_hazards import look
@@ -56,10 +57,10 @@ def drift(car: EgoRecord, time: float, heading: float, speed: float) -> float:
     """Returns the angle of the ego's course to its heading in wind, positive right [rad]; see `Wind.drift`."""
     swing = 0.0
     for k in range(len(PERIODS)):
-        swing += math.sin(2.0 * math.pi * time / PERIODS[k] + car.wind_phase[k])
+        swing += pm.sin(2.0 * math.pi * time / PERIODS[k] + car.wind_phase[k])
     wind = GALE * car.wind * max(1.0 + GUSTINESS * math.sqrt(2.0 / len(PERIODS)) * swing, 0.0)
     angle = car.wind_heading - heading
-    across, along = wind * math.sin(angle), wind * math.cos(angle) - speed
+    across, along = wind * pm.sin(angle), wind * pm.cos(angle) - speed
     force = AIR_DENSITY / 2.0 * FRONTAL_AREA * SIDE_FORCE * math.sqrt(across * across + along * along) * across
     return float(force / CORNERING_STIFFNESS)
 
@@ -126,7 +127,7 @@ def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
     vehicle.acceleration, vehicle.slip = acceleration, slip_of(car.steer * MAX_STEERING)
     vehicle.desired, car.before = car.cruise, vehicle.speed
     if car.wind > 0.0 and vehicle.speed > 0.0:
-        aside = vehicle.speed * dt * math.tan(drift(car, clock.time, vehicle.heading, vehicle.speed))
+        aside = vehicle.speed * dt * pm.tan(drift(car, clock.time, vehicle.heading, vehicle.speed))
         vehicle.x -= aside * vehicle.sin
         vehicle.y += aside * vehicle.cos
 
@@ -167,9 +168,7 @@ def _control(world: WorldArrays, target: float, dt: float) -> None:
         slope = (error - car.lateral_last) / dt if car.lateral_last < math.inf else 0.0
         car.lateral_last = error
         back = LATERAL.proportional * error + LATERAL.integral * car.lateral_sum + LATERAL.derivative * slope
-    wanted = heading_at(world, car.s + 0.5 * vehicle.speed * dt) + math.atan2(
-        back * RETURN_GAIN, max(vehicle.speed, 1.0)
-    )
+    wanted = heading_at(world, car.s + 0.5 * vehicle.speed * dt) + pm.atan2(back * RETURN_GAIN, max(vehicle.speed, 1.0))
     slip = min(max(wrap_radians(wanted - vehicle.heading), -MAX_SLIP), MAX_SLIP)
     error = target - vehicle.speed
     limit = LONGITUDINAL.integral_limit
@@ -180,7 +179,7 @@ def _control(world: WorldArrays, target: float, dt: float) -> None:
         pull = min(pull, -1.0) if vehicle.speed > 0.0 else -MAX_BRAKING
     car.throttle = min(max(pull / MAX_ACCELERATION, 0.0), 1.0)
     car.brake = min(max(-pull / MAX_BRAKING, 0.0), 1.0)
-    car.steer = min(max(math.atan(2.0 * math.tan(slip)) / MAX_STEERING, -1.0), 1.0)
+    car.steer = min(max(pm.atan(2.0 * pm.tan(slip)) / MAX_STEERING, -1.0), 1.0)
 
 
 @inlined

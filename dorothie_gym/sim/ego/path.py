@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.copying import shared
@@ -178,13 +179,13 @@ def find_sweeps(
         if k > first:
             way, turn = course[k].s - course[k - 1].s, course[k].heading - course[k - 1].heading
             off -= turn
-            off -= math.sin(off) * min(way / (0.5 * length), 1.0)
+            off -= pm.sin(off) * min(way / (0.5 * length), 1.0)
             bend = turn / way
-        sine, cosine = abs(math.sin(off)), math.cos(off)
+        sine, cosine = abs(pm.sin(off)), pm.cos(off)
         across, along = 0.5 * (length * sine + width * cosine), 0.5 * (length * cosine - width * sine)
         more = 0.5 * bend * along * along
         sweep = sweeps[k - first]
-        sweep.cos, sweep.sin = math.cos(course[k].heading), math.sin(course[k].heading)
+        sweep.cos, sweep.sin = pm.cos(course[k].heading), pm.sin(course[k].heading)
         sweep.left = min(max(across + more, 0.5 * width), WIDEST_SWEEP)
         sweep.right = min(max(across - more, 0.5 * width), WIDEST_SWEEP)
 

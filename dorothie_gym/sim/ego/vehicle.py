@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -10,6 +9,7 @@ import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.records import fields, plain
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
@@ -75,7 +75,7 @@ class Car(Lookups, Vehicle):
     @heading.setter
     def heading(self, heading: float) -> None:
         row = self._row
-        row["heading"], row["cos"], row["sin"] = heading, math.cos(heading), math.sin(heading)
+        row["heading"], row["cos"], row["sin"] = heading, pm.cos(heading), pm.sin(heading)
         self.refresh()
 
     @property

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.polyline import HEADING, STATION, X, Y
@@ -55,7 +53,7 @@ def position_on(points: Array, lane: LaneRecord, station: float) -> tuple[float,
     if over == 0.0:
         return x, y
     heading = interpolated(points, lane, segment, HEADING, s)
-    return x + over * math.cos(heading), y + over * math.sin(heading)
+    return x + over * pm.cos(heading), y + over * pm.sin(heading)
 
 
 @compiled
@@ -66,6 +64,6 @@ def project_on(town: TownArrays, number: int, x: float, y: float) -> tuple[float
     at, share, _ = closest_segment(points, first, last, x, y)
     dx, dy = points[at + 1, X] - points[at, X], points[at + 1, Y] - points[at, Y]
     aside_x, aside_y = x - (points[at, X] + share * dx), y - (points[at, Y] + share * dy)
-    distance = float(np.hypot(aside_x, aside_y))
+    distance = float(pm.hypot(aside_x, aside_y))
     station = points[at, STATION] + share * (points[at + 1, STATION] - points[at, STATION])
     return station, distance if dx * aside_y - dy * aside_x >= 0.0 else -distance

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import allocating, compiled, inlined
 from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.maps.model import Array
@@ -52,7 +53,7 @@ def build_cells(points: Array, lanes: RecordArray[LaneRecord]) -> LaneCells:
         points: (p, 6) as in `polyline.LaneTable`.
         lanes: lanes of the town.
     """
-    order = np.argsort(lanes["rank"]).astype(np.int64)
+    order = np.argsort(lanes["rank"], kind="stable").astype(np.int64)
     low = np.array([lanes["left_edge"].min(), lanes["low_edge"].min()]) - CELL_REACH - LOOKUP_CELL
     high = np.array([lanes["right_edge"].max(), lanes["high_edge"].max()]) + CELL_REACH + LOOKUP_CELL
     columns, rows = (int(n) for n in np.ceil((high - low) / LOOKUP_CELL))
@@ -129,8 +130,8 @@ def _write(entry: CellEntryRecord, points: Array, lane: int, first: int, last: i
         low, high = min(low, points[k, 3]), max(high, points[k, 3])
     middle, spread = 0.5 * (low + high), 0.5 * (high - low)
     entry.lane, entry.first, entry.last = lane, first, last
-    entry.cos, entry.sin = math.cos(middle), math.sin(middle)
-    entry.limit = math.cos(spread + TURNED) - SLACK if spread + TURNED < math.pi else -2.0
+    entry.cos, entry.sin = pm.cos(middle), pm.sin(middle)
+    entry.limit = pm.cos(spread + TURNED) - SLACK if spread + TURNED < math.pi else -2.0
     entry.along_low = entry.across_low = math.inf
     entry.along_high = entry.across_high = -math.inf
     for k in range(first, last + 2):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections import defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
@@ -13,6 +12,7 @@ import numpy as np
 from highway_env.road.lane import LineType
 from highway_env.road.road import RoadNetwork
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane, LinkType
 from dorothie_gym.maps.polyline import HEIGHT, LaneTable
@@ -61,7 +61,7 @@ def _end(lane: Lane) -> int:
 def _offset(lane: Lane, other: Lane, end: int) -> tuple[float, float]:
     """Returns the offset of another lane's end (0 or -1) ahead and to the right of a lane's end [m]."""
     dx, dy = (float(d) for d in other.points[end, :2] - lane.points[end, :2])
-    c, n = math.cos(lane.headings[end]), math.sin(lane.headings[end])
+    c, n = pm.cos(lane.headings[end]), pm.sin(lane.headings[end])
     return dx * c + dy * n, dy * c - dx * n
 
 

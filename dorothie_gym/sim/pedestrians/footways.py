@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from dorothie_gym import portable_arrays as pn
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.lane_neighbours import LaneEdges, leftmost, oncoming_lanes, rightmost
@@ -204,7 +205,7 @@ def _offset(points: Array, lane: LaneRecord, stations: Array, side: float) -> Ar
     x, y, heading, height, width = (np.interp(stations, own[:, 2], own[:, k]) for k in (0, 1, 3, 4, 5))
     lateral = side * (width / 2 + KERB)
     return np.column_stack(
-        (x - lateral * np.sin(heading), y + lateral * np.cos(heading), stations, heading, height, 0.0 * x)
+        (x - lateral * pn.sin(heading), y + lateral * pn.cos(heading), stations, heading, height, 0.0 * x)
     )
 
 
@@ -219,7 +220,7 @@ def _across(points: Array, lanes: RecordArray[LaneRecord], town: Town, walk: Str
     stations = np.linspace(0.0, lanes[far].length, int(lanes[far].length) + 2)
     kerb = _offset(points, lanes[far], stations, side)
     dx, dy = (kerb[None, :, k] - row[:, None, k] for k in (0, 1))
-    cos, sin = np.cos(row[:, 3, None]), np.sin(row[:, 3, None])
+    cos, sin = pn.cos(row[:, 3, None]), pn.sin(row[:, 3, None])
     along, left = np.abs(dx * cos + dy * sin), dx * sin - dy * cos
     along[(left < NARROWEST_ROAD) | (left > WIDEST_ROAD)] = np.inf
     nearest = along.argmin(axis=1)
@@ -230,7 +231,7 @@ def _across(points: Array, lanes: RecordArray[LaneRecord], town: Town, walk: Str
 
 def _far(row: Array, across: Array) -> Array:
     """Returns the places across the road (n, 3) [m]."""
-    return np.column_stack((row[:, 0] + across * np.sin(row[:, 3]), row[:, 1] - across * np.cos(row[:, 3]), row[:, 4]))
+    return np.column_stack((row[:, 0] + across * pn.sin(row[:, 3]), row[:, 1] - across * pn.cos(row[:, 3]), row[:, 4]))
 
 
 def _finished(row: Array, across: Array) -> Array:

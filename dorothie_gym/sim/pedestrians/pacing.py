@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.state.body_records import PedestrianRecord, SizedBody
@@ -132,7 +133,7 @@ def walk_towards(
     if _touches_vehicle(world, walker, walker.x + reach * dx, walker.y + reach * dy):
         return False
     walker.cos, walker.sin, walker.speed = dx, dy, step / time
-    walker.heading = math.atan2(dy, dx)
+    walker.heading = pm.atan2(dy, dx)
     return True
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.pedestrians.footways import KEEP_RIGHT, enter_next, find_segment, locate, place_beside, side_kept
@@ -276,6 +277,6 @@ def place_walker(town: TownArrays, walker: PedestrianRecord) -> None:
     find_segment(town, walker)
     walker.x, walker.y, walker.cos, walker.sin = place_beside(town, walker, walker.station, side_kept(way))
     locate(town, walker)
-    walker.heading = math.atan2(walker.sin, walker.cos)
+    walker.heading = pm.atan2(walker.sin, walker.cos)
     walker.left_x, walker.left_y = walker.x, walker.y
     walker.speed = 0.0

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.records import RecordArray, empty_records, filled_records
 from dorothie_gym.maps.lane_neighbours import LaneEdges
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array, Crosswalk, Lane, Sidewalk
@@ -104,7 +106,7 @@ def _pavement(points: Array, width: float) -> Array:
     """Returns x, y, station, heading, height and width of the points (n, 3) of a pavement."""
     steps = np.diff(points[:, :2], axis=0)
     stations = np.concatenate(([0.0], np.cumsum(np.sqrt((steps * steps).sum(axis=1)))))
-    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    headings = np.unwrap(pn.arctan2(steps[:, 1], steps[:, 0]))
     heading = np.concatenate((headings, headings[-1:]))
     return np.column_stack((points[:, :2], stations, heading, points[:, 2], np.full(len(stations), width)))
 
@@ -140,7 +142,7 @@ def _corners(sidewalks: Sequence[Sidewalk], edges: LaneEdges) -> _Corners:
             continue
         other, points = way
         pair = min(one, other), max(one, other)
-        if np.hypot(*(places[one] - places[other])[:2]) < SAME_END:
+        if pn.hypot(*(places[one] - places[other])[:2]) < SAME_END:
             found.onward[ends[one]] = ends[other]
             continue
         if pair not in numbers:
@@ -155,7 +157,7 @@ def _near(ends: Sequence[_End], places: Array) -> list[list[int]]:
     """Returns the ends near each end, nearest first, without those of its own pavement unless they coincide."""
     near: list[list[tuple[float, int]]] = [[] for _ in ends]
     for one, other in sorted(cKDTree(places[:, :2]).query_pairs(LONGEST_CORNER)):
-        gap = float(np.hypot(*(places[one] - places[other])[:2]))
+        gap = float(pn.hypot(*(places[one] - places[other])[:2]))
         if abs(places[one, 2] - places[other, 2]) < LEVEL_HEIGHT and (ends[one][0] != ends[other][0] or gap < SAME_END):
             near[one].append((gap, other))
             near[other].append((gap, one))
@@ -168,7 +170,7 @@ def _way_on(places: Array, one: int, others: Sequence[int], edges: LaneEdges) ->
         for other in others:
             line = places[[one, other]]
             across = line[1, :2] - line[0, :2]
-            length = float(np.hypot(*across))
+            length = float(pn.hypot(*across))
             if length < SAME_END:
                 return other, line
             if bow != 0.0:
@@ -196,7 +198,7 @@ def _crossings(
     for k, (kerbs, sides) in enumerate(found):
         ends = _as_far_as(kerbs, np.array([_at(town.sidewalks[walk], s) for _, walk, s in sides]))
         across = ends[1, :2] - ends[0, :2]
-        length = float(np.hypot(*across))
+        length = float(pn.hypot(*across))
         crossings[k].x, crossings[k].y = ends[:, 0], ends[:, 1]
         crossings[k].length, crossings[k].height = length, float(ends[:, 2].mean())
         crossings[k].cos, crossings[k].sin = across / max(length, 1e-6)
@@ -215,8 +217,8 @@ def _ends(network: TownNetwork, crosswalk: Crosswalk) -> Array:
     middle = crosswalk.outline.mean(axis=0)[:2]
     lane = network.get_lane(network.get_closest_lane_index(middle)).town_lane
     heading = lane.heading_at(lane.project(middle)[0])
-    across = np.array([-math.sin(heading), math.cos(heading)])
-    reach = (crosswalk.outline[:, :2] - middle) @ across
+    across = np.array([-pm.sin(heading), pm.cos(heading)])
+    reach = ((crosswalk.outline[:, :2] - middle) * across).sum(axis=1)
     ends: Array = middle + np.array([reach.min(), reach.max()])[:, None] * across
     return ends
 
@@ -228,7 +230,7 @@ def _as_far_as(ends: Array, places: Array) -> Array:
     it.
     """
     middle, across = ends.mean(axis=0), ends[1] - ends[0]
-    reach = (places[:, :2] - middle) @ across / (across @ across)
+    reach = ((places[:, :2] - middle) * across).sum(axis=1) / (across * across).sum()
     return np.column_stack((middle + reach[:, None] * across, places[:, 2]))
 
 
@@ -244,7 +246,7 @@ def _nearest_walk(rows: Array, owners: NDArray[np.int64], place: Array) -> tuple
     squared = np.maximum(d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1], 1e-12)
     share = np.clip(((place - a[:, :2]) * d[:, :2]).sum(axis=1) / squared, 0.0, 1.0)
     nearest = a + share[:, None] * d
-    gaps = np.hypot(nearest[:, 0] - place[0], nearest[:, 1] - place[1])
+    gaps = pn.hypot(nearest[:, 0] - place[0], nearest[:, 1] - place[1])
     gaps[owners[1:] != owners[:-1]] = math.inf  # from one pavement to the next there is nothing
     at = int(gaps.argmin())
     return float(gaps[at]), int(owners[at]), float(nearest[at, 2])

@@ -15,6 +15,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
@@ -66,7 +67,7 @@ def measure(track: Array, k: int, draws: Array, dt: float, truth: Array) -> tupl
     way = math.sqrt(dx * dx + dy * dy)
     if way <= STANDS:
         return 0.0, 0.0, 0.0
-    c, s, root = math.cos(track[k, 2]), math.sin(track[k, 2]), math.sqrt(way)
+    c, s, root = pm.cos(track[k, 2]), pm.sin(track[k, 2]), math.sqrt(way)
     ahead = (dx * c + dy * s) * truth[0] + SLIP * root * draws[2]
     right = (dy * c - dx * s) * truth[0] + SKID * root * draws[3]
     turn = track[k + 1, 2] - track[k, 2] + truth[1] * dt + GYRO_NOISE * math.sqrt(dt) * draws[1]
@@ -94,7 +95,7 @@ def reckon(mean: Array, covariance: Array, ahead: float, right: float, turn: flo
         return
     scale = mean[3]
     ahead, right = ahead / scale, right / scale
-    c, s = math.cos(mean[2]), math.sin(mean[2])
+    c, s = pm.cos(mean[2]), pm.sin(mean[2])
     dx, dy = ahead * c - right * s, ahead * s + right * c
     for j in range(LOCALIZER_STATES):
         p[0, j] -= dy * p[2, j] + dx / scale * p[3, j]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.copying import Lookups
@@ -297,9 +298,9 @@ def _share(bits: int) -> float:
 def _normal(state: int) -> tuple[float, int]:
     """Returns a standard normal number (Box and Muller 1958), bounded by MOST_SIGMAS, and the next state."""
     state = _signed(state + _GOLDEN)
-    radius = math.sqrt(-2.0 * math.log(1.0 - _share(_mixed(state))))
+    radius = math.sqrt(-2.0 * pm.log(1.0 - _share(_mixed(state))))
     state = _signed(state + _GOLDEN)
-    number = radius * math.cos(2.0 * math.pi * _share(_mixed(state)))
+    number = radius * pm.cos(2.0 * math.pi * _share(_mixed(state)))
     return min(max(number, -MOST_SIGMAS), MOST_SIGMAS), state
 
 

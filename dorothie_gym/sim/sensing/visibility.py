@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled
 from dorothie_gym.copying import shared
 
@@ -32,7 +33,7 @@ SHORTEST_SIGHT = 16.5
 """Shortest range of perception [m]: that of short-range radar, which neither weather nor darkness hinders; room to
 stop from walking pace and to turn round before a roadblock."""
 
-FIVE_PERCENT = math.log(20.0)
+FIVE_PERCENT = pm.log(20.0)
 """Optical depth that leaves 5 % of the contrast."""
 
 FULL_LIGHT = 300.0
@@ -77,7 +78,7 @@ def fog_extinction(density: float, falloff: float) -> float:
         density: above that of a clear noon, in [0, 1].
         falloff: how fast it thins out with height, CARLA's parameter; the density is that at the ground.
     """
-    return FIVE_PERCENT / DENSEST_FOG * density * math.exp(-falloff * EYE_HEIGHT / FOG_SCALE_HEIGHT)
+    return FIVE_PERCENT / DENSEST_FOG * density * pm.exp(-falloff * EYE_HEIGHT / FOG_SCALE_HEIGHT)
 
 
 def rain_extinction(rate: float) -> float:
@@ -88,7 +89,7 @@ def rain_extinction(rate: float) -> float:
     Args:
         rate: of the rain [mm/h].
     """
-    return float(FIVE_PERCENT / _RAIN_RANGE * (rate / 25.4) ** _RAIN_EXPONENT)
+    return float(FIVE_PERCENT / _RAIN_RANGE * pm.power(rate / 25.4, _RAIN_EXPONENT))
 
 
 def daylight(altitude: float, cloudiness: float) -> float:
@@ -102,14 +103,14 @@ def daylight(altitude: float, cloudiness: float) -> float:
         cloudiness: share of the sky in [0, 1].
     """
     angles, lux = zip(*_CLEAR_SKY, strict=True)
-    clear = math.exp(float(np.interp(altitude, angles, np.log(lux))))
-    return float(clear * (1.0 - 0.75 * cloudiness**3.4))
+    clear = pm.exp(float(np.interp(altitude, angles, [pm.log(each) for each in lux])))
+    return float(clear * (1.0 - 0.75 * pm.power(cloudiness, 3.4)))
 
 
 @compiled
 def transmission(fog: float, fog_start: float, rain: float, distance: float) -> float:
     """Returns the share of the contrast that the air leaves over a distance [m]; the rest as in `Visibility`."""
-    return math.exp(-fog * max(distance - fog_start, 0.0) - rain * distance)
+    return pm.exp(-fog * max(distance - fog_start, 0.0) - rain * distance)
 
 
 @compiled

@@ -7,12 +7,12 @@ way of NumPy's records.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.state.world_arrays import WorldArrays
@@ -86,7 +86,7 @@ def heading_field(dtype: np.dtype[np.void]) -> Field[float]:
 
     def write(view: BodyView[object], value: float) -> None:
         store(view, value)
-        view.cos, view.sin = math.cos(value), math.sin(value)
+        view.cos, view.sin = pm.cos(value), pm.sin(value)
 
     return property(read, write)
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.records import RecordArray, empty_records, filled_records
 from dorothie_gym.copying import shared
@@ -287,7 +288,7 @@ def _lines(town: Town) -> RecordArray[StopLineRecord]:
     for record, lane in zip(records, sorted(found), strict=True):
         end, heading = town.lanes[lane].points[-1], float(town.lanes[lane].headings[-1])
         record.x, record.y, record.height = end
-        record.cos, record.sin = math.cos(heading), math.sin(heading)
+        record.cos, record.sin = pm.cos(heading), pm.sin(heading)
         record.half_width = float(town.lanes[lane].widths[-1]) / 2
         record.lane, record.signal = lane, found[lane].id
         record.is_stop = found[lane].kind is SignalKind.STOP

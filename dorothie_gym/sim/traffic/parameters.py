@@ -7,6 +7,8 @@ import math
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
+from dorothie_gym import portable_math as pm
+
 # --- highway-env's Intelligent Driver Model, lane changes and controllers -------------------------------------------
 
 ACC_MAX = float(IDMVehicle.ACC_MAX)
@@ -48,7 +50,7 @@ TAU_PURSUIT = float(IDMVehicle.TAU_PURSUIT)
 LARGEST_HEADING = math.pi / 4
 """Largest angle to the lane that is steered for [rad], `ControlledVehicle.steering_control`."""
 
-MAX_SLIP_SINE = math.sin(math.atan(0.5 * math.tan(float(IDMVehicle.MAX_STEERING_ANGLE))))
+MAX_SLIP_SINE = pm.sin(pm.atan(0.5 * pm.tan(float(IDMVehicle.MAX_STEERING_ANGLE))))
 """Sine of the slip angle at full lock of the steering wheel."""
 
 MAX_SPEED = float(Vehicle.MAX_SPEED)

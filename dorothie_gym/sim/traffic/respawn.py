@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.network.lane_lookup import value_near
@@ -209,7 +210,7 @@ def is_free(
     x = value_near(points, lane, lane.first, 0, station)
     y = value_near(points, lane, lane.first, 1, station)
     heading = value_near(points, lane, lane.first, 3, station)
-    cos, sin = math.cos(heading), math.sin(heading)
+    cos, sin = pm.cos(heading), pm.sin(heading)
     for j in range(len(world.vehicles)):
         other = world.vehicles[j]
         if j != body and other.kind != Kind.EMPTY and _is_close(other.x - x, other.y - y, cos, sin):
@@ -234,7 +235,7 @@ def put_on_lane(town: TownArrays, vehicle: VehicleRecord, number: int, station: 
     heading = value_near(points, lane, lane.first, 3, station)
     vehicle.lane = number
     keep_side(vehicle, lane)
-    vehicle.cos, vehicle.sin = math.cos(heading), math.sin(heading)
+    vehicle.cos, vehicle.sin = pm.cos(heading), pm.sin(heading)
     vehicle.x = value_near(points, lane, lane.first, 0, station) - vehicle.to_right * vehicle.sin
     vehicle.y = value_near(points, lane, lane.first, 1, station) + vehicle.to_right * vehicle.cos
     vehicle.height = value_near(points, lane, lane.first, 4, station)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.network.lane_lookup import project, value_near, wrap_radians
@@ -95,7 +96,7 @@ def brake_to(speed: float, distance: float) -> float:
 
 # --- Lane keeping and motion ------------------------------------------------------------------------------------------
 
-STEEP = math.sin(LARGEST_HEADING)
+STEEP = pm.sin(LARGEST_HEADING)
 
 
 @inlined
@@ -126,7 +127,7 @@ def slip_towards(
     elif back <= -STEEP:
         back = -LARGEST_HEADING
     else:
-        back = math.asin(back)
+        back = pm.asin(back)
     rate = KP_HEADING * wrap_radians(ahead + back - vehicle.heading)
     return float(min(max(vehicle.length / 2.0 / speed * rate, -MAX_SLIP_SINE), MAX_SLIP_SINE))
 
@@ -134,13 +135,13 @@ def slip_towards(
 @compiled
 def steering_angle(slip: float) -> float:
     """Returns the angle of the front wheel [rad] that belongs to the sine of a slip angle."""
-    return math.atan(2.0 * slip / math.sqrt(1.0 - slip * slip))
+    return pm.atan(2.0 * slip / math.sqrt(1.0 - slip * slip))
 
 
 @compiled
 def slip_of(steering: float) -> float:
     """Returns the sine of the slip angle that belongs to an angle of the front wheel [rad]."""
-    tangent = 0.5 * math.tan(steering)
+    tangent = 0.5 * pm.tan(steering)
     return tangent / math.sqrt(1.0 + tangent * tangent)
 
 
@@ -160,7 +161,7 @@ def move(vehicle: VehicleRecord, dt: float) -> None:
         vehicle.x += speed * (vehicle.cos * straight - vehicle.sin * slip) * dt
         vehicle.y += speed * (vehicle.sin * straight + vehicle.cos * slip) * dt
         vehicle.heading += speed * slip / (vehicle.length / 2.0) * dt
-        vehicle.cos, vehicle.sin = math.cos(vehicle.heading), math.sin(vehicle.heading)
+        vehicle.cos, vehicle.sin = pm.cos(vehicle.heading), pm.sin(vehicle.heading)
         vehicle.odometer += abs(speed) * dt
     vehicle.speed = speed + acceleration * dt
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
+from dorothie_gym import portable_arrays as pn
+from dorothie_gym import portable_math as pm
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import PhysicalAction
@@ -34,10 +35,10 @@ def planners(name: str) -> Iterator[LocalPlanner]:
 
 
 @pytest.mark.parametrize("name", TOWNS)
-def test_headings_of_a_path_are_those_of_the_c_library_on_every_processor(name: str) -> None:
+def test_headings_of_a_path_are_those_of_its_steps(name: str) -> None:
     for path in (planner.path for planner in planners(name)):
         steps = np.diff(path.points, axis=0).tolist()
-        directions = np.unwrap([math.atan2(dy, dx) for dx, dy in steps])  # NumPy's own arctan2 depends on the processor
+        directions = np.unwrap([pm.atan2(dy, dx) for dx, dy in steps])
         middles = (path.s[:-1] + path.s[1:]) / 2
         assert path.headings[1:-1].tolist() == np.interp(path.s, middles, directions)[1:-1].tolist()
         for end, inner in ((0, 1), (-1, -2)):
@@ -79,7 +80,7 @@ def test_points_of_a_path_lie_on_its_lanes_and_their_distances_add_up(name: str)
     for planner in planners(name):
         path = planner.path
         kinds.add(planner.manoeuvre[0])
-        np.testing.assert_array_equal(path.s[1:], np.cumsum(np.hypot(*np.diff(path.points, axis=0).T)))
+        np.testing.assert_array_equal(path.s[1:], np.cumsum(pn.hypot(*np.diff(path.points, axis=0).T)))
         for k in np.flatnonzero(~path.manoeuvre)[::7]:
             lane = town.lanes[path.lanes[k]]
             assert path.points[k].tolist() == lane.position(path.stations[k]).tolist()

@@ -1,0 +1,69 @@
+"""Sessions of every kind have equal bits with the abilities of other processors, in fresh processes and caches."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy._core._multiarray_umath as numpy_features  # not public: numpy has no other list of its routines
+import pytest
+
+from dorothie_gym.compilation import compiled_folder
+from dorothie_gym.user_cache import CACHE_VARIABLE
+from tests.portability.digests import KINDS
+
+ROOT = Path(__file__).parents[2]
+
+SIMD = [name for name in numpy_features.__cpu_dispatch__ if numpy_features.__cpu_features__[name]]
+"""Vector routines of numpy above its baseline that this processor has."""
+
+SETTINGS: dict[str, dict[str, str]] = {
+    "without AVX-512": {
+        "NPY_DISABLE_CPU_FEATURES": " ".join(name for name in SIMD if "512" in name or name == "X86_V4")
+    },
+    "numpy's baseline": {"NPY_DISABLE_CPU_FEATURES": " ".join(SIMD)},
+    "machine code for any processor": {"NUMBA_CPU_NAME": "generic"},
+    "C library and BLAS without FMA": {
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX2_Usable,-FMA_Usable",
+        "OPENBLAS_CORETYPE": "Prescott",
+    },
+}
+
+
+def digests(cache: Path, **variables: str) -> dict[str, str]:
+    """Plays all kinds of sessions in a new process with caches of its own, except that of the machine code."""
+    environment = {**os.environ, **variables, CACHE_VARIABLE: str(cache), "PYTHONPATH": str(ROOT)}
+    if (folder := compiled_folder()) is not None:
+        environment["NUMBA_CACHE_DIR"] = str(folder)
+    command = [sys.executable, "-m", "tests.portability.digests"]
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    found: dict[str, str] = json.loads(done.stdout)
+    return found
+
+
+@pytest.fixture
+def reference(tmp_path: Path) -> dict[str, str]:
+    """Digests on this processor as it is, computed once for all workers."""
+    kept = Path(os.environ[CACHE_VARIABLE]) / "digests.json"
+    with kept.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not kept.exists():
+            kept.write_text(json.dumps(digests(tmp_path / "reference")))
+    found: dict[str, str] = json.loads(kept.read_text())
+    return found
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1800)  # machine code for any processor is compiled once
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the settings name abilities of x86-64")
+@pytest.mark.parametrize("name", SETTINGS)
+def test_all_sessions_are_equal(name: str, reference: dict[str, str], tmp_path: Path) -> None:
+    found = digests(tmp_path / "cache", **SETTINGS[name])
+    assert set(found) <= set(KINDS) and len(found) >= 8
+    assert {kind for kind in reference if reference[kind] != found[kind]} == set()
