@@ -15,6 +15,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from dorothie_gym.copying import Lookups
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS, UNBOUNDED
+from dorothie_gym.spaces.shared_text import SharedText
 
 AnySpace: TypeAlias = spaces.Space[Any]
 """Space whose kind of values is not known statically."""
@@ -104,7 +105,7 @@ class FieldSpec:
             case FieldKind.FLAGS:
                 return spaces.MultiBinary(self.shape[0] if len(self.shape) == 1 else self.shape)
             case FieldKind.TEXT:
-                return spaces.Text(high, min_length=low, charset=TEXT_CHARACTERS)
+                return SharedText(high, min_length=low, charset=TEXT_CHARACTERS)
 
 
 def real(
