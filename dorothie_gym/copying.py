@@ -11,10 +11,11 @@ A `State` holds what changes in one object. It is cheaper than a copy, and any n
 from __future__ import annotations
 
 import enum
+import hashlib
 import io
 import pickle
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from types import FunctionType, NotImplementedType
 from typing import ClassVar, Final, Generic, TypeVar
 
@@ -95,13 +96,58 @@ class State:
             found = self._fits.get(name)
             if found is not wanted and found != wanted:
                 raise StateError(
-                    f"the state is one of {name} {short_repr(found)}, not {short_repr(wanted)}: "
+                    f"the state is one of {_difference(name, found, wanted)}: "
                     "restore it in an environment that was made with the same arguments"
                 )
         return _Unpickler(self._values, [owner, *self._shared]).load()
 
     def __repr__(self) -> str:
         return f"<State of {self.nbytes} bytes>"
+
+
+def _difference(name: str, found: object, wanted: object) -> str:
+    """Returns what a value is and ought to be, with the first field, key or item in which they differ."""
+    for part, one, other in _parts(found, wanted):
+        if one is not other and one != other:
+            return _difference(f"{name}, {part}" if "," not in name else f"{name}.{part}", one, other)
+    return f"{name} {short_repr(found)}, not {short_repr(wanted)}"
+
+
+def _parts(found: object, wanted: object) -> Iterator[tuple[str, object, object]]:
+    """Yields the parts that two values have in common, by name; none of values that are of different kinds."""
+    if type(found) is not type(wanted):
+        return
+    if is_dataclass(found):
+        for field in fields(found):
+            yield field.name, getattr(found, field.name), getattr(wanted, field.name)
+    elif isinstance(found, Mapping) and isinstance(wanted, Mapping):
+        for key in [key for key in found if key in wanted]:
+            yield str(key), found[key], wanted[key]
+    elif isinstance(found, list | tuple) and isinstance(wanted, list | tuple):
+        for number, (one, other) in enumerate(zip(found, wanted, strict=False)):
+            yield f"item {number}", one, other
+
+
+def digest_of(value: object) -> str:
+    """Returns a digest of the content of nested dataclasses, sequences, arrays and plain values, in hexadecimal."""
+    digest = hashlib.sha256()
+    _feed(digest, value)
+    return digest.hexdigest()
+
+
+def _feed(digest: hashlib._Hash, value: object) -> None:
+    if isinstance(value, np.ndarray):
+        digest.update(f"{value.dtype.str}{value.shape}".encode() + np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, list | tuple):
+        digest.update(f"[{len(value)}".encode())
+        for item in value:
+            _feed(digest, item)
+    elif is_dataclass(value):
+        digest.update(f"({type(value).__name__}".encode())
+        for field in fields(value):
+            _feed(digest, getattr(value, field.name))
+    else:
+        digest.update(f"{value!r};".encode())
 
 
 @shared

@@ -109,7 +109,7 @@ class SessionEngine(Restorable):
 
     def compatibility(self) -> dict[str, object]:
         """Returns the town and the settings."""
-        return {**super().compatibility(), "the town": self.town, "the settings": self.config}
+        return {**super().compatibility(), "the town": self.town.identity, "the settings": self.config}
 
     @property
     def engine(self) -> SessionEngine:

@@ -107,4 +107,8 @@ class BatchedEnv(Restorable, Generic[C, B]):
 
     def compatibility(self) -> dict[str, object]:
         """Returns the kind of environment, the towns and the settings."""
-        return {**super().compatibility(), "the towns": self.towns, "the settings": self.config}
+        towns = [town.identity for town in self.towns]
+        return {
+            **super().compatibility(), "the number of environments": len(towns), "the towns": towns,
+            "the settings": self.config,
+        }  # fmt: skip

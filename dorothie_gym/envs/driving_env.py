@@ -72,7 +72,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
 
     def compatibility(self) -> dict[str, object]:
         """Returns the kind of environment, the town and the settings."""
-        return {**super().compatibility(), "the town": self.town, "the settings": self.config}
+        return {**super().compatibility(), "the town": self.town.identity, "the settings": self.config}
 
     # --- Episodes -----------------------------------------------------------------------------------------------------
 

@@ -11,9 +11,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import AECEnv, ParallelEnv
-from pettingzoo.utils.conversions import parallel_to_aec
+from pettingzoo.utils.conversions import parallel_to_aec_wrapper
+from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
-from dorothie_gym.copying import Restorable
+from dorothie_gym.copying import Restorable, State
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.engine.scenario import ResetOptions, Scenario, scenario_option
@@ -104,6 +105,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         self._view = SessionView(render_mode, frames_per_second=rate, render_view=render_view)
         self.possible_agents = [str(role) for role in AGENT_ROLES]
         self.agents: list[str] = []
+        self.turns: TurnBasedDuoWizard | None = None
         self.observation_spaces = {str(role): deepcopy(self.engine.observation_space(role)) for role in AGENT_ROLES}
         self.action_spaces = {str(role): deepcopy(action_space(role, self.limits)) for role in AGENT_ROLES}
 
@@ -187,19 +189,24 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         return np.concatenate(([session.world.time, *car.position, car.heading, car.speed], padded))
 
     def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the environment and in its engine."""
-        return {**super().mutable_values(), "engine": self.engine.mutable_values()}
+        """Returns what changes in the environment and in its engine, and where the agents take turns."""
+        turns = None if self.turns is None else self.turns.turn_values()
+        return {**super().mutable_values(), "engine": self.engine.mutable_values(), "turns": turns}
 
     def apply_values(self, values: dict[str, object]) -> None:
         """Applies the values of the environment and of its engine."""
-        engine = values.pop("engine")
+        engine, turns = values.pop("engine"), values.pop("turns")
         assert isinstance(engine, dict)
         super().apply_values(values)
         self.engine.apply_values(engine)
+        if self.turns is not None:
+            assert isinstance(turns, dict)  # equal forms are compatible only
+            self.turns.apply_turn_values(turns)
 
     def compatibility(self) -> dict[str, object]:
-        """Returns the kind of environment, and what has to be equal in the engine."""
-        return {**self.engine.compatibility(), **super().compatibility()}
+        """Returns the kind of environment, whether its agents take turns, and what has to be equal in the engine."""
+        form = "parallel" if self.turns is None else "turn-based"
+        return {**self.engine.compatibility(), **super().compatibility(), "the form": form}
 
     # --- the engine inside ------------------------------------------------------------------------------------------
 
@@ -256,13 +263,42 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         return self.engine.summary()
 
 
+class TurnBasedDuoWizard(parallel_to_aec_wrapper[str, Observation, ActionDict | None]):
+    """PettingZoo's turn-based form of a `DuoWizardEnv`, whose states hold whose turn it is and the actions so far."""
+
+    env: DuoWizardEnv
+
+    def __init__(self, parallel: DuoWizardEnv) -> None:
+        # PettingZoo declares actions that may be None, for agents that are done
+        super().__init__(parallel)  # pyright: ignore[reportArgumentType]
+        self._constant = frozenset((*vars(self), "_constant"))
+        parallel.turns = self
+
+    def clone_state(self) -> State:
+        """Returns the present state, see `DuoWizardEnv.clone_state`."""
+        return self.env.clone_state()
+
+    def restore_state(self, state: State) -> None:
+        """Goes back to a state, see `DuoWizardEnv.restore_state`."""
+        self.env.restore_state(state)
+
+    def turn_values(self) -> dict[str, object]:
+        """Returns what changes beside the session: whose turn it is, the actions of the others, results to be seen."""
+        return {name: value for name, value in vars(self).items() if name not in self._constant}
+
+    def apply_turn_values(self, values: dict[str, object]) -> None:
+        """Applies the values that `turn_values` has returned."""
+        for name in self.turn_values():
+            delattr(self, name)
+        self.__dict__.update(values)
+
+
 parallel_env = raw_env = DuoWizardEnv
 
 
 def env(**arguments: Any) -> AECEnv[str, Observation, ActionDict | None]:
     """Returns the environment in PettingZoo's turn-based form; arguments as of `DuoWizardEnv`."""
-    # PettingZoo declares actions that may be None, for agents that are done
-    return parallel_to_aec(parallel_env(**arguments))  # pyright: ignore[reportArgumentType]
+    return OrderEnforcingWrapper(TurnBasedDuoWizard(parallel_env(**arguments)))
 
 
-__all__ = ["DuoWizardEnv", "env", "parallel_env", "raw_env"]
+__all__ = ["DuoWizardEnv", "TurnBasedDuoWizard", "env", "parallel_env", "raw_env"]

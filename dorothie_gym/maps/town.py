@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.copying import shared
+from dorothie_gym.copying import digest_of, shared
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.lane_graph import LaneGraph, build_lane_graph
 from dorothie_gym.maps.model import (
@@ -42,6 +43,19 @@ def check_extent(town: Town, source: str) -> None:
             "town",
             f"spans {town.extent / 1000.0:g} km; at most {MAX_EXTENT / 1000.0:g} km can be simulated: remove far roads",
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TownIdentity:
+    """What distinguishes a town from others.
+
+    Attributes:
+        name: its name.
+        content: digest of its parts, in hexadecimal.
+    """
+
+    name: str
+    content: str
 
 
 @shared
@@ -89,6 +103,13 @@ class Town:
         self.crosswalks = tuple(crosswalks)
         self.sidewalks = tuple(sidewalks)
         self.programmes = tuple(programmes)
+
+    @cached_property
+    def identity(self) -> TownIdentity:
+        """Name and content: equal for towns with equal parts, which copies of a town in other processes are."""
+        parts = [self.lanes, self.links, self.junctions, self.streets, self.sites]
+        beside = [self.signals, self.crosswalks, self.sidewalks, self.programmes]
+        return TownIdentity(name=self.name, content=digest_of([*parts, *beside]))
 
     @property
     def kilometres(self) -> float:

@@ -109,6 +109,12 @@ class Session:
             name = f"{self.header.town}-{self.header.storyboard}-{self.header.seed}"
             object.__setattr__(self, "name", safe_name(name))
 
+    def __getstate__(self) -> dict[str, object]:
+        """Returns the attributes, read-only mappings as dictionaries: they cannot be pickled."""
+        return {
+            name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in vars(self).items()
+        }
+
     @classmethod
     def load(cls, path: Path | str) -> Session:
         """Returns the session of a folder in the native layout (`docs/session-format.md`); see also `read_session`.

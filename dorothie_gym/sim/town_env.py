@@ -425,8 +425,10 @@ class TownEnv(Restorable, TimeLimited, AbstractEnv):
         return {name: value for name, value in self.__dict__.items() if name not in _CONSTANT}
 
     def compatibility(self) -> dict[str, object]:
-        """Returns the kind of environment and the settings."""
-        return {**super().compatibility(), "the settings": self.config}
+        """Returns the kind of environment, the town and the settings."""
+        town = load_town(self.config["town"]) if self._network is None else self._network.town
+        settings = {name: value for name, value in self.config.items() if name != "town"}
+        return {**super().compatibility(), "the town": town.identity, "the settings": settings}
 
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "viewer": None, "_record_video_wrapper": None}

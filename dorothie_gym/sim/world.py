@@ -129,7 +129,7 @@ class World(Lookups, Restorable):
 
     def compatibility(self) -> dict[str, object]:
         """Returns the town and the settings."""
-        return {**super().compatibility(), "the town": self.town, "the settings": self.config}
+        return {**super().compatibility(), "the town": self.town.identity, "the settings": self.config}
 
     @cached_property
     def _scratch(self) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:

@@ -280,8 +280,12 @@ class TownVectorEnv(Restorable, VectorEnv[NDArray[np.float32], ActionArray, NDAr
         super().apply_values(values)
 
     def compatibility(self) -> dict[str, object]:
-        """Returns the kind of environment, their number and the settings."""
-        return {**super().compatibility(), "num_envs": self.num_envs, "the settings": self.config}
+        """Returns the kind of environment, their number, the town and the settings."""
+        town = self._network.town.identity
+        return {
+            **super().compatibility(), "the number of environments": self.num_envs, "the town": town,
+            "the settings": {name: value for name, value in self.config.items() if name != "town"},
+        }  # fmt: skip
 
     # --- Gymnasium's interface ----------------------------------------------------------------------------------------
 
