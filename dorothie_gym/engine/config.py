@@ -22,6 +22,11 @@ _SIGNS = ((Role.PARTICIPANT, 1.0), (Role.CO_WIZARD, 1.0), (Role.AD_WIZARD, -1.0)
 """Roles and the sign of the shared reward terms: the Ad-Wizard plays against the others."""
 
 
+def term_names(role: Role) -> tuple[str, ...]:
+    """Returns the names of the terms of a role's reward, in order."""
+    return ("subgoal", "success", "collision", "time", "refusal", *(() if role is Role.AD_WIZARD else ("talk",)))
+
+
 @shared
 @dataclass(frozen=True, kw_only=True)
 class RewardWeights:

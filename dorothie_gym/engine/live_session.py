@@ -243,6 +243,11 @@ class LiveSession:
         return self._log.refused
 
     @property
+    def refusals(self) -> Mapping[Role, Mapping[str, str]]:
+        """Reason for the refusal of each kind of action (`REFUSABLE`) at the last decision, or "", by role."""
+        return self._log.refusals
+
+    @property
     def said(self) -> Sequence[Utterance]:
         """All utterances that are over."""
         return self._dialogue.said
@@ -284,7 +289,7 @@ class LiveSession:
         outcome = self._exceptions.execute(action)
         name = action.exception.name.lower()
         if isinstance(outcome, str):
-            self._log.refuse(Role.AD_WIZARD, name, outcome)
+            self._log.refuse(Role.AD_WIZARD, "exception", name, outcome)
             return ""
         if action.exception is not ExceptionKind.MESSAGE:
             self._log.counts["exceptions"] += 1
@@ -304,7 +309,7 @@ class LiveSession:
             return False
         reason = self._dialogue.say(role, action.speech, self.world.time)
         if reason is not None:
-            self._log.refuse(role, "speech", reason)
+            self._log.refuse(role, "speech", "speech", reason)
         return reason is None
 
     def _play_co_wizard(self, action: RoleAction) -> None:
@@ -318,7 +323,7 @@ class LiveSession:
         action = physical.action
         reason = self.world.ego.apply(action, angle=physical.angle, up=physical.up)
         if reason is not None:
-            self._log.refuse(Role.CO_WIZARD, action.label, reason)
+            self._log.refuse(Role.CO_WIZARD, "physical", action.label, reason)
             return
         self._log.counts["physical_actions"] += 1
         angle = physical.angle if action in (PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH) else None
@@ -330,8 +335,8 @@ class LiveSession:
         """Carries out a belief update of the Co-Wizard; returns the reason of a refusal."""
         outcome = self.beliefs.update(mental, self.world.localizer, self.world.sight)
         if isinstance(outcome, str):
-            self._log.refuse(Role.CO_WIZARD, mental.action.label, outcome)
-            return self._log.refused[Role.CO_WIZARD][-1]
+            self._log.refuse(Role.CO_WIZARD, "mental", mental.action.label, outcome)
+            return self._log.refusals[Role.CO_WIZARD]["mental"]
         self.world.ego.set_goals(self.beliefs.goal_places())
         self._log.add(EventType.BELIEF_UPDATE, Role.CO_WIZARD, {"action": mental.action.label, **outcome})
         return None

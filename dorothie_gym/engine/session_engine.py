@@ -11,7 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.copying import Restorable
-from dorothie_gym.engine.config import EnvConfig, RewardTerms
+from dorothie_gym.engine.config import EnvConfig, RewardTerms, term_names
 from dorothie_gym.engine.live_session import LiveSession, StepBegun
 from dorothie_gym.engine.masks import RoleMask
 from dorothie_gym.engine.observations import LazyObservations
@@ -244,17 +244,18 @@ class SessionEngine(Restorable):
         return self.session.masks.mask(role)
 
     def info(self, role: Role, terms: RewardTerms | None = None) -> StepInfo:
-        """Returns the info dictionary of a role; the caller owns everything in it.
+        """Returns the info dictionary of a role, always with the same keys; the caller owns everything in it.
 
         Args:
             role: the role.
-            terms: reward terms of the last decision; None for a session that has just begun.
+            terms: reward terms of the last decision; None for a session that has just begun, whose terms are 0.
         """
         session = self.session
         return {
             "action_mask": session.masks.mask(role),
-            "reward_terms": dict(terms) if terms else {},
-            "refused": session.refused[role].copy(),
+            "reward_terms": dict(terms) if terms else dict.fromkeys(term_names(role), 0.0),
+            "refused": {kind: bool(reason) for kind, reason in session.refusals[role].items()},
+            "refusal_reason": "; ".join(session.refused[role]),
             "infractions": dict(session.infractions),
         }
 

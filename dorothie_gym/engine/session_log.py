@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NotRequired, TypeAlias, TypedDict
+from types import MappingProxyType
+from typing import Final, NotRequired, TypeAlias, TypedDict
 
 from dorothie_gym import portable_math as pm
 from dorothie_gym.engine.dialogue_channel import DialogueChannel
@@ -66,12 +67,22 @@ class SessionSummary(SessionCounts):
     usage: NotRequired[Mapping[str, Mapping[str, object]]]
 
 
+REFUSABLE: Final[Mapping[Role, tuple[str, ...]]] = MappingProxyType(
+    {
+        Role.PARTICIPANT: ("speech",),
+        Role.CO_WIZARD: ("speech", "mental", "physical"),
+        Role.AD_WIZARD: ("exception",),
+    }
+)
+"""Kinds of actions of each role that can be refused, the keys of `info["refused"]`; a decision has one of each."""
+
+
 class EventLog:
     """Events and refusals of the last decision, and counts of the session.
 
     Attributes:
         events: events of the last decision.
-        refused: reasons for the refusals of the last decision, by role.
+        refusals: reason for the refusal of each kind of action at the last decision, by role; "" where none was.
         counts: counts of what the roles did so far.
     """
 
@@ -83,7 +94,12 @@ class EventLog:
     def clear(self) -> None:
         """Begins another decision."""
         self.events: list[Event] = []
-        self.refused: dict[Role, list[str]] = {Role.PARTICIPANT: [], Role.CO_WIZARD: [], Role.AD_WIZARD: []}
+        self.refusals = {role: dict.fromkeys(kinds, "") for role, kinds in REFUSABLE.items()}
+
+    @property
+    def refused(self) -> dict[Role, list[str]]:
+        """Reasons for the refusals of the last decision, by role."""
+        return {role: [reason for reason in kinds.values() if reason] for role, kinds in self.refusals.items()}
 
     def add(
         self,
@@ -102,9 +118,10 @@ class EventLog:
         """Logs an event of the world."""
         self.add(_WORLD_EVENTS[event.kind], Role.AGENT, event.data, frame=event.frame)
 
-    def refuse(self, role: Role, action: str, reason: str) -> None:
-        """Logs the refusal of an action."""
-        self.refused[role].append(f"{action}: {reason}")
+    def refuse(self, role: Role, kind: str, action: str, reason: str) -> None:
+        """Logs the refusal of an action of one of the role's kinds."""
+        assert self.refusals[role][kind] == ""  # one action of each kind in a decision
+        self.refusals[role][kind] = f"{action}: {reason}"
         self.counts["refusals"] += 1
         self.add(EventType.REFUSAL, role, {"action": action, "reason": reason})
 

@@ -234,8 +234,8 @@ class DrivingBatch(DrivingRows):
             live.begin_decision()
             reason = live.update_beliefs(note)
             self._move_in(number)
-        face.refused = [] if reason is None else [reason]
-        self._decisions["refused"][number] = len(face.refused)
+        face.refused = reason or ""
+        self._decisions["refused"][number] = reason is not None
         if not face.notes:
             self._noted.discard(number)
 

@@ -120,17 +120,21 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         )  # fmt: skip
 
     def _info(self) -> StepInfo:
-        """Returns the info of the last decision, as a new dictionary."""
+        """Returns the info of the last decision, as a new dictionary; what belongs to the end is "" or 0 before."""
         batch = self.batch
         outcome = batch.outcomes[0]
+        reasons = batch.refusals(0)
         info: StepInfo = {
             "reward_terms": dict(zip(TERMS, outcome["terms"].tolist(), strict=True)),
-            "refused": batch.refused(0),
+            "refused": {kind: bool(reason) for kind, reason in reasons.items()},
+            "refusal_reason": "; ".join(filter(None, reasons.values())),
             "infractions": dict(zip(INFRACTIONS, batch.infractions[0].tolist(), strict=True)),
         }
-        if self._ending:
-            info["is_success"], info["reason"] = bool(batch.successes[0]), self._ending.label
-            info["subgoals"] = {"live": int(batch.live_subgoals[0]), "reached": int(outcome["reached"])}
+        over = bool(self._ending)
+        info["is_success"], info["reason"] = over and bool(batch.successes[0]), self._ending.label
+        info["subgoals"] = {
+            "live": int(batch.live_subgoals[0]) * over, "reached": int(outcome["reached"]) * over
+        }  # fmt: skip
         return info
 
     # --- Pictures -----------------------------------------------------------------------------------------------------

@@ -55,6 +55,10 @@ INFRACTIONS: Final = tuple(kind.value for kind in INFRACTION_KINDS)
 """Names of the infractions that infos count."""
 
 
+REFUSED: Final = ("mental", "physical")
+"""Kinds of actions that may be refused: belief updates, which are made automatically, and what drives."""
+
+
 @dataclass
 class DrivingFace:
     """What a session of a batch has besides its row.
@@ -66,7 +70,7 @@ class DrivingFace:
         goals: goals of the Co-Wizard as long as there is no `live`.
         notes: belief updates that wait to be sent.
         version: version of the task that the row knows.
-        refused: reasons for the refusals of belief updates at the last decision.
+        refused: reason for the refusal of the belief update at the last decision that had one; "" if it had an effect.
         seen: observations for the Ad-Wizard's next action, if they were built before the path was replaced.
     """
 
@@ -76,7 +80,7 @@ class DrivingFace:
     goals: tuple[LandmarkName, ...] = ()
     notes: list[Mental] = field(default_factory=list)
     version: int = -1
-    refused: list[str] = field(default_factory=list)
+    refused: str = ""
     seen: LazyObservations | None = None
 
 
@@ -257,14 +261,16 @@ class DrivingRows(Lookups):
         """Memory of the arrays of all environments [bytes]."""
         return sum(array.nbytes for stack in self._stacks for array in stack)
 
-    def refused(self, number: int) -> list[str]:
-        """Returns the reasons for the refusals of an environment at its last decision."""
+    def refusals(self, number: int) -> dict[str, str]:
+        """Returns the reason for the refusal of each of `REFUSED` at the last decision of an environment, or ""."""
         face, state = self.faces[number], self._decisions[number]
-        reasons = list(face.refused) if face is not None and state["refused"] else []
+        reasons = dict.fromkeys(REFUSED, "")
+        if face is not None and state["refused"]:
+            reasons["mental"] = face.refused
         if state["refusal"] > 0:
             known = state["refusal"] != CRUISE_LIMIT
             reason = REASONS[Refusal(int(state["refusal"]))] if known else CRUISE_REFUSAL
-            reasons.append(f"{PhysicalAction(int(state['order'])).label}: {reason}")
+            reasons["physical"] = f"{PhysicalAction(int(state['order'])).label}: {reason}"
         return reasons
 
     @property

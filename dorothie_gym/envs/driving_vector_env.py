@@ -20,7 +20,7 @@ from dorothie_gym.engine.scenario import Scenario, check_options, scenario_optio
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.driving_batch import DrivingBatch
 from dorothie_gym.envs.driving_cameras import DriverObservation
-from dorothie_gym.envs.driving_rows import INFRACTIONS
+from dorothie_gym.envs.driving_rows import INFRACTIONS, REFUSED
 from dorothie_gym.envs.driving_view import DrivingView
 from dorothie_gym.envs.episode import TERMS, Ending
 from dorothie_gym.envs.navigation_config import NavigationConfig
@@ -45,8 +45,8 @@ class DrivingVectorEnv(
     """
 
     CHANGES: ClassVar[Sequence[str]] = (
-        "_observations", "_rewards", "_terminations", "_truncations", "_terms", "_infractions", "_refused", "_subgoals",
-        "_success", "_reasons", "_begun", "_generators", "_seeds",
+        "_observations", "_rewards", "_terminations", "_truncations", "_terms", "_infractions", "_refused",
+        "_refusal_reasons", "_subgoals", "_success", "_reasons", "_begun", "_generators", "_seeds",
     )  # fmt: skip
 
     def __init__(
@@ -71,7 +71,9 @@ class DrivingVectorEnv(
         self._infractions = np.zeros((num_envs, len(INFRACTIONS)), dtype=np.int64)
         self._subgoals = np.zeros((num_envs, 2), dtype=np.int64)
         self._success = np.zeros(num_envs, dtype=np.bool_)
-        self._refused, self._reasons = np.full(num_envs, None), np.full(num_envs, None)
+        self._refused = np.zeros((num_envs, len(REFUSED)), dtype=np.bool_)
+        self._refusal_reasons = np.full(num_envs, "", dtype=object)
+        self._reasons = np.full(num_envs, "", dtype=object)
         self._begun = np.zeros(num_envs, dtype=np.bool_)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int] = [-1] * num_envs
@@ -204,15 +206,16 @@ class DrivingVectorEnv(
         endings = outcomes["ending"]
         over, truncated = endings > 0, endings == Ending.OUT_OF_TIME
         self._truncations[numbers], self._terminations[numbers] = truncated, over & ~truncated
-        reasons: list[list[str]] = [[] for _ in range(len(changed))]
+        self._refused[numbers], self._refusal_reasons[numbers] = False, ""
         for row in np.flatnonzero(batch.any_refused[rows]).tolist():
-            reasons[row] = batch.refused(row if isinstance(rows, slice) else rows[row])
-        self._refused[numbers] = np.fromiter(reasons, dtype=object, count=len(reasons))
+            reasons = list(batch.refusals(row if isinstance(rows, slice) else rows[row]).values())
+            self._refused[changed[row]] = [bool(reason) for reason in reasons]
+            self._refusal_reasons[changed[row]] = "; ".join(filter(None, reasons))
         if over.any():
             self._success[numbers] = batch.successes[rows]
             self._subgoals[numbers, 0] = batch.live_subgoals[rows]
             self._subgoals[numbers, 1] = outcomes["reached"]
-            self._reasons[numbers] = None
+            self._reasons[numbers] = ""
             for row in np.flatnonzero(over).tolist():
                 self._reasons[changed[row]] = Ending(endings[row]).label
 
@@ -250,20 +253,20 @@ class DrivingVectorEnv(
         return {**infos, "final_obs": final, "_final_obs": over, "final_info": ended, "_final_info": over.copy()}
 
     def _infos(self, mask: NDArray[np.bool_]) -> Infos:
-        """Returns the infos of the environments of a mask."""
+        """Returns the infos of the environments of a mask; what belongs to the end of an episode is "" or 0 before."""
         terms = {name: self._terms[:, k] for k, name in enumerate(TERMS)}
         infractions = {name: self._infractions[:, k] for k, name in enumerate(INFRACTIONS)}
-        infos = masked_infos(
+        over = self._terminations | self._truncations
+        subgoals = {"live": self._subgoals[:, 0] * over, "reached": self._subgoals[:, 1] * over}
+        return masked_infos(
             {
                 "reward_terms": masked_infos(terms, mask),
-                "refused": self._refused,
+                "refused": masked_infos({kind: self._refused[:, k] for k, kind in enumerate(REFUSED)}, mask),
+                "refusal_reason": self._refusal_reasons,
                 "infractions": masked_infos(infractions, mask),
+                "is_success": self._success & over,
+                "reason": np.where(over, self._reasons, ""),
+                "subgoals": masked_infos(subgoals, mask),
             },
             mask,
         )
-        ended = mask & (self._terminations | self._truncations)
-        subgoals = masked_infos({"live": self._subgoals[:, 0], "reached": self._subgoals[:, 1]}, ended)
-        return {
-            **infos,
-            **masked_infos({"is_success": self._success, "reason": self._reasons, "subgoals": subgoals}, ended),
-        }

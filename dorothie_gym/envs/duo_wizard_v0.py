@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -32,6 +33,7 @@ from dorothie_gym.spaces import (
     StepInfo,
     action_space,
 )
+from dorothie_gym.spaces.limits import UNBOUNDED
 from dorothie_gym.tasks import StoryboardTemplate
 
 _METADATA: dict[str, object] = {"name": "duo_wizard_v0", **METADATA, "is_parallelizable": True}
@@ -178,6 +180,15 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
     def close(self) -> None:
         """Closes the window, if there is one."""
         self._view.close()
+
+    @cached_property
+    def state_space(self) -> spaces.Box:
+        """Space of `state()`, as PettingZoo's environments have it: (5 + subgoals,) float64."""
+        high = np.ones(5 + self.limits.subgoals)
+        high[:5] = UNBOUNDED
+        low = -high
+        low[0], low[5:] = 0.0, 0.0
+        return spaces.Box(low, high, dtype=np.float64)
 
     def state(self) -> NDArray[np.float64]:
         """Returns the true state as numbers: time [s], pose [m, m, rad], speed [m/s], flags of reached subgoals."""

@@ -14,12 +14,13 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from dorothie_gym.engine.channel_kind import ChannelKind
-from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.config import EnvConfig, term_names
 from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.pictures import OBSERVERS, picture_spaces
 from dorothie_gym.engine.scenario import Scenario, scenario_option
 from dorothie_gym.engine.session_batch import SessionBatch
 from dorothie_gym.engine.session_engine import SessionEngine, StepOutcome
+from dorothie_gym.engine.session_log import REFUSABLE
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.errors import short_repr
@@ -301,7 +302,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
 
     def _infos(self, mask: Flags, outcomes: Mapping[int, StepOutcome]) -> dict[str, Infos]:
-        """Returns the infos of the environments of a mask, by agent; reward terms of those that have an outcome."""
+        """Returns the infos of the environments of a mask, by agent; reward terms of those without an outcome are 0."""
         infos: dict[str, Infos] = {}
         (infractions,) = self._gathered([{"": batch.infractions.copy()} for batch in self.batches]).values()
         infractions[~mask] = 0
@@ -311,22 +312,26 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         rows, numbers = np.flatnonzero(stepped).tolist(), np.flatnonzero(mask).tolist()
         for agent, role in _AGENTS.items():
             masks = self._gathered([batch.views.masks[role].copy() for batch in self.batches])
-            refused = np.full(self.num_envs, None, dtype=object)
+            refused = np.zeros((self.num_envs, len(REFUSABLE[role])), dtype=np.bool_)
+            reasons = np.full(self.num_envs, None, dtype=object)
             for number in numbers:
-                refused[number] = self.engines[number].session.refused[role].copy()
-            info = infos[agent] = {
+                found = self.engines[number].session.refusals[role].values()
+                refused[number] = [bool(reason) for reason in found]
+                reasons[number] = "; ".join(filter(None, found))
+            infos[agent] = info = {
                 "action_mask": {**masks, **dict.fromkeys(self.batches[0].views.unmasked[role])},
                 "_action_mask": mask.copy(),
-                "refused": refused,
+                "refused": _columns(REFUSABLE[role], refused, mask),
                 "_refused": mask.copy(),
+                "refusal_reason": reasons,
+                "_refusal_reason": mask.copy(),
                 "infractions": _columns(_KINDS, infractions.copy(), mask),
                 "_infractions": mask.copy(),
             }
-            if rows:
-                names = tuple(outcomes[rows[0]].reward_terms[role])
-                table = np.zeros((self.num_envs, len(names)))
-                table[rows] = [[*outcomes[number].reward_terms[role].values()] for number in rows]
-                info["reward_terms"], info["_reward_terms"] = _columns(names, table, stepped), stepped.copy()
+            table = np.zeros((self.num_envs, len(term_names(role))))
+            for number in rows:
+                table[number] = [*outcomes[number].reward_terms[role].values()]
+            info["reward_terms"], info["_reward_terms"] = _columns(term_names(role), table, mask), mask.copy()
         return infos
 
 

@@ -43,12 +43,12 @@ class Ending(enum.IntEnum):
 
     @property
     def label(self) -> str:
-        """Reason as `info["reason"]` has it."""
+        """Reason as `info["reason"]` has it; "" for none."""
         return _LABELS[self]
 
 
 _LABELS = {
-    Ending.ARRIVED: "arrived", Ending.LEFT_ROAD: "left the road", Ending.GAVE_UP: "gave up",
+    Ending.NONE: "", Ending.ARRIVED: "arrived", Ending.LEFT_ROAD: "left the road", Ending.GAVE_UP: "gave up",
     Ending.OUT_OF_TIME: "out of time",
 }  # fmt: skip
 _NONE, _ARRIVED, _LEFT_ROAD, _GAVE_UP, _OUT_OF_TIME = (int(ending) for ending in Ending)

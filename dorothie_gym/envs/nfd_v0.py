@@ -21,7 +21,7 @@ class NfDEnv(TeacherForcedEnv):
 
     ## Rewards
     The mean of two terms: `action`, 1 if the action is right; `joint`, 1 if also the angle is within 15 degrees on the
-    circle. Where the recording has no angle there is no `joint`, and the reward is `action`.
+    circle. Where the recording has no angle, `joint` is NaN, and the reward is `action`.
 
     ## Episode End
     As of `TeacherForcedEnv`.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar
@@ -23,6 +24,7 @@ from dorothie_gym.envs.history_space import (
     history_space,
 )
 from dorothie_gym.maps import Town
+from dorothie_gym.ontology import LABELS
 from dorothie_gym.recording import (
     ANGLE_TOLERANCE,
     DecisionPoint,
@@ -65,6 +67,11 @@ class PointRules(ABC, Generic[PointT]):
     def score(self, action: ActionMapping, point: PointT) -> dict[str, float]:
         """Returns the reward terms of a prediction, by name; undefined terms are omitted."""
 
+    @property
+    @abstractmethod
+    def no_label(self) -> Label:
+        """What stands for the correct prediction before there was one: -1 for numbers of classes, and zeros."""
+
 
 class ActRules(PointRules[InferencePoint]):
     """UfN and RfN: `move` is 1 for the correct move, `slots` is F1 over the (slot, value) pairs of the point.
@@ -78,6 +85,11 @@ class ActRules(PointRules[InferencePoint]):
     def action_space(self) -> spaces.Dict:
         """Action space with `move` and `slots`."""
         return act_space()
+
+    @property
+    def no_label(self) -> Label:
+        """Move -1 and no slots."""
+        return {"move": -1, "slots": np.zeros(len(LABELS), dtype=np.int8)}
 
     def label(self, point: InferencePoint) -> Label:
         """Returns the act of the point."""
@@ -103,6 +115,11 @@ class DecisionRules(PointRules[DecisionPoint]):
     def action_space(self) -> spaces.Dict:
         """Action space with `action` and `angle`."""
         return decision_space()
+
+    @property
+    def no_label(self) -> Label:
+        """Action -1 and angle 0."""
+        return {"action": -1, "angle": 0}
 
     def label(self, point: DecisionPoint) -> Label:
         """Returns the action of the point and its angle in whole degrees, 0 if the recording lacks the angle."""
@@ -160,7 +177,8 @@ class PointEnv(Restorable, gym.Env[Observation, ActionDict]):
         super().reset(seed=seed)
         self._points = self._begin(seed, options or {})
         self._point = next(self._points)
-        return self._observe(), self._info()
+        score = {"index": -1, "label": self.rules.no_label, "reward_terms": dict.fromkeys(self.rules.terms, 0.0)}
+        return self._observe(), {**self._info(), **score, **self._metrics()}
 
     def step(self, action: ActionDict) -> tuple[Observation, float, bool, bool, StepInfo]:
         """Scores the prediction at the current point and moves to the next.
@@ -175,12 +193,13 @@ class PointEnv(Restorable, gym.Env[Observation, ActionDict]):
         check_action(action, self.rules.action_space)
         terms = self.rules.score(action, point)
         self._point = next(self._points, None)
+        self._judge(action, point)
         info = {
             **self._info(),
             "index": point.index,
             "label": self.rules.label(point),
-            "reward_terms": terms,
-            **self._judge(action, point),
+            "reward_terms": {name: terms.get(name, math.nan) for name in self.rules.terms},
+            **self._metrics(),
         }
         return self._observe(), sum(terms.values()) / len(terms), self._point is None, False, info
 
@@ -206,8 +225,11 @@ class PointEnv(Restorable, gym.Env[Observation, ActionDict]):
     def _info(self) -> StepInfo:
         """Returns the entries of the infos besides the score."""
 
-    def _judge(self, action: ActionMapping, point: Point) -> StepInfo:
-        """Returns additional info entries for a prediction."""
+    def _judge(self, action: ActionMapping, point: Point) -> None:  # most have nothing to note
+        """Notes a prediction."""
+
+    def _metrics(self) -> StepInfo:
+        """Returns the entries of the infos that follow from all predictions so far."""
         return {}
 
     def _view(self) -> PointView:

@@ -49,8 +49,9 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
     terms with the opposite sign.
 
     ## Episode End
-    Terminates when the destination is reached; truncates after `config.max_seconds` or `max_cycles` decisions. The last
-    info has `is_success`: whether every live subgoal was reached without a collision caused by the ego.
+    Terminates when the destination is reached; truncates after `config.max_seconds` or `max_cycles` decisions.
+    `info["is_success"]` tells at the end whether every live subgoal was reached without a collision caused by the ego,
+    and is False before.
 
     ## Arguments
     - `role`: role of the agent, `"participant"`, `"co_wizard"` or `"ad_wizard"`.
@@ -125,7 +126,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         observation = observations.of(self._observing)[self.role]
         self._view.begin(self.engine.session)
         self._show(observation)
-        return observation, self.engine.info(self.role)
+        return observation, {**self.engine.info(self.role), "is_success": False}
 
     def step(self, action: ActionMapping) -> tuple[Observation, float, bool, bool, StepInfo]:
         """Plays one decision of all roles.
@@ -142,8 +143,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         outcome = self.engine.step(actions)
         terms = outcome.reward_terms[self.role]
         info = self.engine.info(self.role, terms)
-        if self.engine.over:
-            info["is_success"] = self.engine.session.success
+        info["is_success"] = self.engine.over and self.engine.session.success
         reward = float(sum(terms.values()))
         observation = self.engine.observations.of((self.role,) if self.engine.over else self._observing)[self.role]
         self._show(observation)

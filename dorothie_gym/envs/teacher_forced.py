@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import ClassVar, Final
 
 import numpy as np
@@ -77,8 +79,9 @@ class TeacherForcedEnv(PointEnv):
     - `render_mode`: None or `"ansi"`.
 
     `reset(options={"session": number or name})` selects the session, which is drawn at random otherwise; sessions
-    without a point of the task are skipped. The infos hold `session` (name); after a step also `index` (number of the
-    event), `label` (the correct action), `reward_terms`, and `metrics` of the episode so far (None: not defined yet).
+    without a point of the task are skipped. The infos hold `session` (name) and, of the last step, `index` (number of
+    the event), `label` (the correct action) and `reward_terms` (NaN: not defined), and `metrics` of the episode so far
+    (NaN: not defined yet). After a reset, index and classes are -1 and the terms 0.
 
     Raises:
         SessionError: if there are no sessions, one cannot be read, or none has a point of the task.
@@ -137,14 +140,18 @@ class TeacherForcedEnv(PointEnv):
         assert self._session is not None  # an episode has begun
         return {"session": self._session.name}
 
-    def _judge(self, action: ActionMapping, point: Point) -> StepInfo:
+    def _judge(self, action: ActionMapping, point: Point) -> None:
         self._done.append((action, point))
+
+    def _metrics(self) -> StepInfo:
         actions, points = [action for action, _ in self._done], [point for _, point in self._done]
+        if not points:
+            return {"metrics": dict.fromkeys(_DECISION_METRICS if self.task is Task.NFD else _ACT_METRICS, math.nan)}
         if self.task is Task.NFD:
             found = _decision_metrics(actions, [point for point in points if isinstance(point, DecisionPoint)])
         else:
             found = _act_metrics(actions, [point for point in points if isinstance(point, InferencePoint)])
-        return {"metrics": {key: None if np.isnan(value) else value for key, value in found.items()}}
+        return {"metrics": found}
 
 
 class _Library(Lookups):
@@ -219,17 +226,21 @@ def _check_size(session: Session, limits: SpaceLimits) -> None:
             raise ValueError(f"session {session.name} has {count} {name}; SpaceLimits.{name} is {size}: raise it")
 
 
+_ACT_METRICS: Final = MappingProxyType(
+    {"move_accuracy": MoveAccuracy(), "slot_f1": SlotF1(), "slot_score_paper": SlotScorePaper()}
+)
+_DECISION_METRICS: Final = MappingProxyType(
+    {"action_accuracy": ActionAccuracy(), "argument_accuracy": ArgumentAccuracy(), "joint_accuracy": JointAccuracy()}
+)
+
+
 def _act_metrics(actions: Sequence[ActionMapping], points: Sequence[InferencePoint]) -> dict[str, float]:
     predicted = ActPredictions(
         moves=np.array([action["move"] for action in actions], dtype=np.int64),
         slots=np.array([action["slots"] for action in actions], dtype=np.bool_),
     )
     labels = act_labels(points)
-    return {
-        "move_accuracy": MoveAccuracy().compute(predicted, labels),
-        "slot_f1": SlotF1().compute(predicted, labels),
-        "slot_score_paper": SlotScorePaper().compute(predicted, labels),
-    }
+    return {name: float(metric.compute(predicted, labels)) for name, metric in _ACT_METRICS.items()}
 
 
 def _decision_metrics(actions: Sequence[ActionMapping], points: Sequence[DecisionPoint]) -> dict[str, float]:
@@ -238,8 +249,4 @@ def _decision_metrics(actions: Sequence[ActionMapping], points: Sequence[Decisio
         angles=np.array([action["angle"] for action in actions], dtype=np.float64),
     )
     labels = action_labels(points)
-    return {
-        "action_accuracy": ActionAccuracy().compute(predicted, labels),
-        "argument_accuracy": ArgumentAccuracy().compute(predicted, labels),
-        "joint_accuracy": JointAccuracy().compute(predicted, labels),
-    }
+    return {name: float(metric.compute(predicted, labels)) for name, metric in _DECISION_METRICS.items()}

@@ -194,7 +194,7 @@ def _check_equal(where: str, k: int, one: tuple[ByAgent, ByAgent], other: tuple[
     (observations, infos), (others, other_infos) = one, other
     field = first_unequal(observations[CO_WIZARD], others[CO_WIZARD])
     assert field is None, f"{where}, decision {k}: the Co-Wizard's observation {field} differs"
-    for key in ("action_mask", "refused"):
+    for key in ("action_mask", "refused", "refusal_reason"):
         field = first_unequal(infos[CO_WIZARD][key], other_infos[CO_WIZARD][key], key)
         assert field is None, f"{where}, decision {k}: the Co-Wizard's info {field} differs"
 

@@ -134,6 +134,11 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
         """Closes the window, if open."""
         self.env.close()
 
+    @property
+    def state_space(self) -> spaces.Box:
+        """Space of `state()`, see `DuoWizardEnv.state_space`."""
+        return self.env.state_space
+
     def state(self) -> NDArray[np.float64]:
         """Returns the true state as a vector, see `DuoWizardEnv.state`."""
         return self.env.state()

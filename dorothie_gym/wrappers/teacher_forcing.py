@@ -59,7 +59,8 @@ class TeacherForcing(PointEnv):
     - `render_mode`: None or "ansi".
 
     `reset(seed=...)` plays the same session as `DuoWizardEnv` and `play_session` with this seed. The infos hold
-    `session` (its name) and `seed`; after a step `index` (number of the event), `label` and `reward_terms`.
+    `session` (its name) and `seed`; of the last step `index` (number of the event), `label` and `reward_terms`, as in
+    `TeacherForcedEnv`.
 
     Raises:
         ValueError: if `task`, `policies`, `render_mode` or an action is invalid; the message names the field.

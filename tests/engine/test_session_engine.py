@@ -58,10 +58,11 @@ def test_utterance_is_delivered_after_its_last_word(env: DuoWizardEnv) -> None:
 def test_physical_action_that_changes_nothing_is_refused_and_not_counted(env: DuoWizardEnv) -> None:
     start = CoWizardAction(physical=Physical(action=PhysicalAction.START))
     *_, infos = step(env, start)
-    assert infos["co_wizard"]["refused"] == ["Start: the car is not stopped"]
+    assert infos["co_wizard"]["refused"] == {"speech": False, "mental": False, "physical": True}
+    assert infos["co_wizard"]["refusal_reason"] == "Start: the car is not stopped"
     assert env.summary()["physical_actions"] == 0
     *_, infos = step(env, CoWizardAction(physical=Physical(action=PhysicalAction.STOP)))
-    assert not infos["co_wizard"]["refused"]
+    assert not any(infos["co_wizard"]["refused"].values())
     assert env.summary()["physical_actions"] == 1
 
 

@@ -99,8 +99,9 @@ def plain_info(info: dict[str, Any], number: int) -> dict[str, Any]:
     found = info_of(info, number)
     if "plan" in found["action_mask"]:
         found["action_mask"]["plan"] = tuple(found["action_mask"]["plan"])
+    found["refused"] = {kind: bool(refused) for kind, refused in found["refused"].items()}
     found["infractions"] = {kind: int(count) for kind, count in found["infractions"].items()}
-    found["reward_terms"] = {name: float(value) for name, value in found.get("reward_terms", {}).items()}
+    found["reward_terms"] = {name: float(value) for name, value in found["reward_terms"].items()}
     return found
 
 

@@ -36,7 +36,7 @@ def check_hidden_places_are_not_visible(env: DuoWizardEnv, play: Any, seed: int,
         role = str(Role.CO_WIZARD)
         for field, value in observations[role].items():
             np.testing.assert_array_equal(others[role][field], value, err_msg=f"{field}, decision {k}")
-        for field in ("action_mask", "refused"):
+        for field in ("action_mask", "refused", "refusal_reason"):
             np.testing.assert_equal(other_infos[role][field], infos[role][field])
         # the participant observes the difference, so the test would detect a leak
         assert not np.array_equal(others["participant"]["landmarks"], observations["participant"]["landmarks"])
@@ -82,7 +82,7 @@ def check_tasks_are_not_visible(env: DuoWizardEnv, play: Any, seed: int, decisio
     for k, ((observations, infos), (others, other_infos)) in enumerate(zip(*runs, strict=False)):
         for field, value in observations[role].items():
             np.testing.assert_array_equal(others[role][field], value, err_msg=f"{field}, decision {k}")
-        for field in ("action_mask", "refused"):
+        for field in ("action_mask", "refused", "refusal_reason"):
             np.testing.assert_equal(other_infos[role][field], infos[role][field])
         assert others["participant"]["story"] != observations["participant"]["story"]
 

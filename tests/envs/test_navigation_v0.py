@@ -92,7 +92,7 @@ def test_masked_actions_are_not_refused(settings: dict[str, Any]) -> None:
         for _ in range(80):
             action = NavigationAction(rng.choice(np.flatnonzero(info["action_mask"])))
             _, _, terminated, truncated, info = env.step(action)
-            assert not info["refused"], action.name
+            assert not any(info["refused"].values()), action.name
             if terminated or truncated:
                 break
 
@@ -105,7 +105,7 @@ def test_planned_turn_may_be_repeated(env: NavigationEnv) -> None:
         planned = planner.turn_ahead
         _, _, _, _, info = env.step(NavigationAction.turn(int(turns[0])) if len(turns) else NavigationAction.NOTHING)
         if planned is not None and planned == planner.turn_ahead and len(turns):
-            assert info["refused"] == [] and info["reward_terms"]["action"] == 0.0
+            assert not any(info["refused"].values()) and info["reward_terms"]["action"] == 0.0
             again += 1
     assert again > 5
 
@@ -114,7 +114,7 @@ def test_infeasible_action_is_refused(env: NavigationEnv) -> None:
     _, info = env.reset(seed=0)
     assert not info["action_mask"][NavigationAction.START]
     _, _, _, _, info = env.step(NavigationAction.START)
-    assert len(info["refused"]) == 1 and info["reward_terms"]["refusal"] < 0.0
+    assert info["refused"]["physical"] and not info["refused"]["mental"] and info["reward_terms"]["refusal"] < 0.0
 
 
 def test_the_reward_is_the_sum_of_its_terms(env: NavigationEnv) -> None:

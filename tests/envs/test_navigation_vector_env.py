@@ -212,7 +212,7 @@ def test_masks_are_those_of_infos() -> None:
         np.testing.assert_array_equal(env.action_masks(), infos["action_mask"].astype(bool))
         rng = np.random.default_rng(2)
         _, _, _, _, infos = env.step(np.array([rng.choice(np.flatnonzero(mask)) for mask in env.action_masks()]))
-        assert not any(infos["refused"])
+        assert not any(any(infos["refused"][kind]) for kind in ("mental", "physical"))
 
 
 def test_obedient_driver_succeeds_in_a_batch() -> None:

@@ -1,10 +1,13 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
+from dorothie_gym import IdenticalSpaces
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs import duo_wizard_v0
 from dorothie_gym.sim.config import WorldConfig
@@ -19,6 +22,7 @@ with warnings.catch_warnings():
         parallel_seed_test,
         render_test,
         seed_test,
+        state_test,
     )
 
 CYCLES = 60
@@ -67,6 +71,17 @@ def test_parallel_api_with_arguments(arguments: dict[str, Any]) -> None:
 
 def test_aec_api() -> None:
     api_test(turns(), num_cycles=CYCLES)
+
+
+@pytest.mark.parametrize("wrapped", [lambda env: env, IdenticalSpaces], ids=["plain", "identical spaces"])
+def test_state_lies_in_its_space(wrapped: Callable[[Any], Any]) -> None:
+    state_test(turns(), wrapped(parallel()), num_cycles=CYCLES)
+    env = wrapped(parallel())
+    assert env.state_space is env.state_space and env.state_space.shape == (13,)
+    env.reset(seed=1)
+    state = env.state()
+    assert state.dtype == env.state_space.dtype and state in env.state_space and state[0] == 0.0
+    assert np.isfinite(env.state_space.sample()).all()
 
 
 def test_equal_seeds_give_equal_aec_sessions() -> None:
