@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dorothie_gym.cli.options import AsJson
-from dorothie_gym.cli.output import check_file, fail, print_json, reporting_errors, session_progress, stdout
+from dorothie_gym.cli.options import AsJson, Players
+from dorothie_gym.cli.output import (
+    FAILED,
+    check_file,
+    exit_interrupted,
+    fail,
+    print_json,
+    reporting_errors,
+    session_progress,
+    stdout,
+)
+from dorothie_gym.processors import available_processors
+
+if TYPE_CHECKING:
+    from dorothie_gym.rollout.closed_loop.submission import SubmissionCheck
 
 FAULTY = 1
 """Exit code for a rollout that cannot be submitted."""
@@ -20,19 +34,23 @@ def submit(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a rollout (`rollout --out DIR`).")],
     out: Annotated[Path, typer.Option(metavar="FILE.json", help="File to write.")] = Path("submission.json"),
     sample: Annotated[
-        str, typer.Option(metavar="N|all", help="Number of sessions to simulate again from their actions.")
-    ] = "10",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the sample.")] = 0,
+        str, typer.Option(metavar="N|all", help="Number of sessions to play again; the others are read and measured.")
+    ] = ALL,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the sample; by default a random one, which nobody can know.")
+    ] = None,
     check: Annotated[
         Path | None,
         typer.Option(metavar="FILE.json", help="Compare this submission with the folder instead of writing one."),
     ] = None,
+    workers: Players = None,
     as_json: AsJson = False,
 ) -> None:
     """Check a rollout for the leaderboard, and write its submission with hashes; exit code 1 if there are faults.
 
-    Towns, seeds and settings must be those of the leaderboard; every session is measured again, and a sample is
-    simulated again from its seed and recorded actions.
+    Towns, seeds and settings must be those of the leaderboard. Every session is drawn and played again from its seed
+    by the scripted partners, with the recorded actions of the Co-Wizard, or by its policy if the package has it.
+    What nothing can check is listed as claimed.
     """
     if sample != ALL and not (sample.isdecimal() and 1 <= int(sample) <= 10**6):
         fail(f"--sample is {sample!r}; give a number of sessions, or all")
@@ -43,14 +61,7 @@ def submit(
         from dorothie_gym.recording.json_io import to_page
         from dorothie_gym.rollout.closed_loop import submission
 
-        with session_progress(quiet=as_json) as on_session:
-            found = submission.check_submission(
-                folder,
-                sample=None if sample == ALL else int(sample),
-                seed=seed,
-                protocol=submission.PROTOCOL,
-                on_session=on_session,
-            )
+        found = _check(folder, None if sample == ALL else int(sample), seed, workers, quiet=as_json)
         faults = found.faults
         if found.submission is not None and check is not None:
             faults = submission.differences_from(check, found.submission)
@@ -58,16 +69,61 @@ def submit(
             write_atomically(out, to_page(found.submission))
     written = None if faults or check is not None else str(out)
     if as_json:
-        print_json({"faults": list(faults), "resimulated": list(found.resimulated), "submission": written})
-    else:
-        console = stdout()
-        for fault in faults:
-            console.print(fault, markup=False, soft_wrap=True)
-        console.print(
-            f"{len(found.resimulated)} sessions simulated again; "
-            + (f"{len(faults)} faults" if faults else f"no fault. Written: {out}" if written else "no fault"),
-            markup=False,
-            soft_wrap=True,
+        print_json(
+            {
+                "faults": list(faults),
+                "resimulated": list(found.resimulated),
+                "sessions": found.sessions,
+                "seed": found.seed,
+                "co_wizard_played": found.played,
+                "claims": list(found.claims),
+                "submission": written,
+            }
         )
+    else:
+        _print(found, faults, written)
     if faults:
         raise typer.Exit(FAULTY)
+
+
+def _check(folder: Path, sample: int | None, seed: int | None, workers: int | None, *, quiet: bool) -> SubmissionCheck:
+    from dorothie_gym.cli.warm_up import compile_first
+    from dorothie_gym.errors import ProcessError
+    from dorothie_gym.rollout.closed_loop import submission
+
+    try:
+        compile_first(pictures=False)
+        with session_progress(quiet=quiet) as on_session:
+            return submission.check_submission(
+                folder,
+                sample=sample,
+                seed=seed,
+                protocol=submission.PROTOCOL,
+                workers=workers or available_processors(),
+                on_session=on_session,
+            )
+    except KeyboardInterrupt:
+        exit_interrupted("Interrupted; nothing was written.")
+    except ProcessError as error:
+        fail(str(error), FAILED)
+
+
+def _print(found: SubmissionCheck, faults: Sequence[str], written: str | None) -> None:
+    console = stdout()
+    for fault in faults:
+        console.print(fault, markup=False, soft_wrap=True)
+    console.print(
+        f"{len(found.resimulated)} sessions simulated again; "
+        + (f"{len(faults)} faults" if faults else f"no fault. Written: {written}" if written else "no fault"),
+        markup=False,
+        soft_wrap=True,
+    )
+    if faults:
+        return
+    drawn = "" if found.seed is None else f", drawn with seed {found.seed}"
+    whose = "by its own policy" if found.played else "by its recorded actions"
+    console.print(
+        f"Simulated: {len(found.resimulated)} of {found.sessions} sessions{drawn}; the Co-Wizard acted {whose}.",
+        markup=False, soft_wrap=True,
+    )  # fmt: skip
+    console.print(f"Claimed, not checked: {', '.join(found.claims) or 'nothing'}", markup=False, soft_wrap=True)

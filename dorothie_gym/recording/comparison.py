@@ -276,11 +276,13 @@ def _shown(value: object) -> str:
 
 
 def _first_row(one: NDArray[np.generic], other: NDArray[np.generic]) -> int | None:
-    """Returns the first row whose bits differ."""
+    """Returns the first row whose bits differ, of two columns of one length."""
+    if not len(one):
+        return None
     if one.dtype == object or other.dtype == object:
         return next((k for k, (a, b) in enumerate(zip(one, other, strict=True)) if a != b), None)
     bits = [np.ascontiguousarray(values).view(np.uint8).reshape(len(values), -1) for values in (one, other)]
     if one.dtype != other.dtype:
-        return 0 if len(one) else None
+        return 0
     differing = np.flatnonzero((bits[0] != bits[1]).any(axis=1))
     return int(differing[0]) if len(differing) else None

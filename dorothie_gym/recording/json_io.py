@@ -87,6 +87,11 @@ def to_page(value: object) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
 
 
+def same_json(first: object, second: object) -> bool:
+    """Returns whether two values are written alike in JSON, whatever the order of keys; 15 and 15.0 are not."""
+    return to_line(canonical(first, "value")) == to_line(canonical(second, "value"))
+
+
 def from_line(text: str, where: str) -> dict[str, JsonValue]:
     """Returns the JSON object of a text.
 
