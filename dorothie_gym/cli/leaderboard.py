@@ -71,13 +71,20 @@ def leaderboard(
         int, typer.Option(min=1, help="Number of sessions of each row.", rich_help_panel=_PANEL)
     ] = 100,
     max_seconds: MaxSeconds = None,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="Play all sessions of the protocol again, as `submit` does; otherwise figures are claims."
+        ),
+    ] = False,
     workers: Players = None,
     ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Rank policies by their rollouts, on a page with intervals, cost and commands, and in a picture.
 
-    With --play, one command makes the whole page again: it plays all rows with seed 0, then writes the page.
+    With --play, one command makes the whole page again: it plays all rows with seed 0, then writes the page. What
+    nothing has checked is marked as claimed.
     """
     with reporting_errors():
         from dorothie_gym.errors import RolloutError
@@ -97,11 +104,16 @@ def leaderboard(
             entries = read_entries(folders)
         except RolloutError as error:
             fail(str(error))
+        if check:
+            entries = _checked(entries, workers, quiet=as_json)
         picture = draw_leaderboard(entries, out.with_suffix(".png"))
         definitions = DEFINITIONS if (out.parent / DEFINITIONS).is_file() else None
         out.write_text(leaderboard_page(entries, picture.name, definitions), encoding="utf-8")
     if as_json:
-        rows = [{"policy": entry.policy, "towns": entry.part, **entry.table.to_json()} for entry in entries]
+        rows = [
+            {"policy": entry.policy, "towns": entry.part, "claims": list(entry.claims), **entry.table.to_json()}
+            for entry in entries
+        ]
         print_json({"page": str(out), "picture": str(picture), "sha256": figures_sha256(entries), "rows": rows})
         return
     _print(entries, out, picture)
@@ -114,8 +126,31 @@ def _print(entries: Sequence[LeaderboardEntry], out: Path, picture: Path) -> Non
     for entry in entries:
         success = entry.table.figures["success"]["mean"]
         share = "-" if success is None else f"{100 * success:.1f} %"
-        console.print(f"{entry.part:8} {labels[entry.policy]}: success {share}", markup=False, soft_wrap=True)
+        claims = f" (claimed: {', '.join(entry.claims)})" if entry.claims else ""
+        console.print(f"{entry.part:8} {labels[entry.policy]}: success {share}{claims}", markup=False, soft_wrap=True)
     console.print(f"Written: {out}, {picture}", style="dim", markup=False, soft_wrap=True)
+
+
+def _checked(
+    entries: Sequence[LeaderboardEntry], workers: int | None, *, quiet: bool
+) -> tuple[LeaderboardEntry, ...]:  # fmt: skip
+    """Returns the rollouts with the outcome of their check; exits if one has faults."""
+    from dorothie_gym.cli.warm_up import compile_first
+    from dorothie_gym.errors import ProcessError, RolloutError
+    from dorothie_gym.processors import available_processors
+    from dorothie_gym.rollout.closed_loop import submission
+    from dorothie_gym.rollout.closed_loop.leaderboard import checked_entries
+
+    try:
+        compile_first(pictures=False)
+        with session_progress(quiet=quiet) as on_session:
+            return checked_entries(
+                entries, submission.PROTOCOL, workers=workers or available_processors(), on_session=on_session
+            )
+    except KeyboardInterrupt:
+        exit_interrupted("Interrupted; no page was written.")
+    except (RolloutError, ProcessError) as error:
+        fail(str(error), FAILED)
 
 
 def _plan(

@@ -5,15 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from typing import Final
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.errors import RolloutError
+from dorothie_gym.errors import RolloutError, printable
 from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
 from dorothie_gym.ontology import ExceptionKind, Role
+from dorothie_gym.rollout.closed_loop.claims import Claim, claims_of
 from dorothie_gym.rollout.closed_loop.metrics import ClosedLoopMetric, RecoverySeconds
 from dorothie_gym.rollout.closed_loop.results import (
     ALL_METRICS,
@@ -26,6 +27,7 @@ from dorothie_gym.rollout.closed_loop.results import (
 )
 from dorothie_gym.rollout.closed_loop.running import command_of, fold_of_towns
 from dorothie_gym.rollout.closed_loop.session_record import Amount
+from dorothie_gym.rollout.closed_loop.submission import LeaderboardProtocol, SubmissionCheck, check_submission
 from dorothie_gym.rollout.runner import COST_FILE
 
 IMPORTED: Final = "imported"
@@ -40,7 +42,7 @@ PART_TITLES: Final[Mapping[str, str]] = {
 """Parts of the page and their titles."""
 
 ENOUGH: Final = 100
-"""Number of sessions of a row from which on it is compared; as `submission.Protocol`."""
+"""Number of sessions of a row from which on it is compared; as `submission.LeaderboardProtocol`."""
 
 _KINDS: Final = (*(kind.name.lower() for kind in ExceptionKind if kind is not ExceptionKind.NONE), NO_EXCEPTION)
 
@@ -49,6 +51,12 @@ PAGE_METRICS: Final = (
     "exchanges_per_subgoal", "clarification_rate", "exceptions_recovered", "recovery_seconds",
 )  # fmt: skip
 """Keys of the metrics on the page."""
+
+_IN_TABLES: Final = (Claim.FIGURES, Claim.NAME, Claim.WEIGHTS, Claim.LANGUAGE_MODEL, Claim.PERSONA)
+"""Claims in the column of the tables of figures; other claims have columns of their own, whose titles say so."""
+
+CLAIMED: Final = "claimed"
+"""Title of that column, and mark of the columns that are claims."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,12 +68,22 @@ class LeaderboardEntry:
         result: result of the rollout.
         table: table of the result.
         cost: `wall_seconds`, `cpu_seconds` and `workers` of the rollout; empty if unknown.
+        check: outcome of the check of all sessions, without faults; None if they were not checked.
     """
 
     folder: Path
     result: RolloutResult
     table: RolloutTable
     cost: Mapping[str, float]
+    check: SubmissionCheck | None = None
+
+    @property
+    def claims(self) -> tuple[Claim, ...]:
+        """What the files of the rollout state and nothing has checked."""
+        if self.check is not None:
+            return self.check.claims
+        usage, run_time = bool(self.result.usage()), bool(self.cost)
+        return claims_of(self.result.settings, checked=False, played=False, usage=usage, run_time=run_time)
 
     @property
     def policy(self) -> str:
@@ -138,6 +156,46 @@ def read_entries(folders: Sequence[Path | str]) -> tuple[LeaderboardEntry, ...]:
     return tuple(sorted(entries.values(), key=lambda entry: (order.index(entry.part), entry.rank)))
 
 
+def checked_entries(
+    entries: Sequence[LeaderboardEntry],
+    protocol: LeaderboardProtocol,
+    *,
+    workers: int = 1,
+    on_session: Callable[[int, int], None] | None = None,
+) -> tuple[LeaderboardEntry, ...]:
+    """Returns rollouts with the outcome of the check of all their sessions, in the same order.
+
+    Rollouts of another protocol, such as those in imported towns, are returned as they are: their figures stay claims.
+
+    Args:
+        entries: the rollouts.
+        protocol: protocol of the leaderboard.
+        workers: number of processes, as of `check_submission`.
+        on_session: called with the numbers of sessions checked and to be checked, of all rollouts.
+
+    Raises:
+        RolloutError: a rollout has faults.
+        ProcessError: a process died.
+    """
+    due = [entry for entry in entries if not any(protocol.faults(entry.result.settings))]
+    total, found = protocol.sessions * len(due), dict[Path, SubmissionCheck]()
+    for entry in due:
+        before = protocol.sessions * len(found)
+
+        def report(done: int, _: int, before: int = before) -> None:
+            if on_session is not None:
+                on_session(before + done, total)
+
+        check = check_submission(entry.folder, protocol=protocol, workers=workers, on_session=report)
+        if check.faults:
+            more = f", and {len(check.faults) - 1} more faults" if len(check.faults) > 1 else ""
+            raise RolloutError(
+                f"{entry.folder}: {check.faults[0]}{more}; see `dorothie-gym submit {entry.folder}`, or leave it out"
+            )
+        found[entry.folder] = check
+    return tuple(replace(entry, check=found.get(entry.folder)) for entry in entries)
+
+
 def labels_of(entries: Sequence[LeaderboardEntry]) -> dict[str, str]:
     """Returns the short name of each policy; those that would have the same keep their paths."""
     short = {entry.policy: entry.label for entry in entries}
@@ -178,6 +236,11 @@ def leaderboard_page(
         "This page is generated by `dorothie-gym leaderboard` from the results of `dorothie-gym rollout`. Values are",
         "means over sessions with 95 % intervals; sessions that ended in an error count as failures. The columns and",
         f"the intervals are defined in {where}.",
+        "",
+        f"`{CLAIMED}` names what the files of a rollout state and nothing has checked. With `--check`, all sessions",
+        "of a row are played again, as by `dorothie-gym submit`, and its figures are no claim. A name is none if the",
+        "package has the policy, which is then played again, too. The cost of training and running, and the usage of",
+        "language models, are always claims.",
     ]
     usual = f"{EnvConfig().max_seconds:g} s"
     if any(entry.shortened for entry in entries):
@@ -211,7 +274,7 @@ def leaderboard_page(
         f"`{figures_sha256(entries)}`",
         "",
     ]
-    lines += ["```bash", *(command_of(entry.result.settings) for entry in entries), "```", ""]
+    lines += ["```bash", *(printable(command_of(entry.result.settings)) for entry in entries), "```", ""]
     return "\n".join(lines)
 
 
@@ -219,11 +282,14 @@ def _figures(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> 
     columns: list[ClosedLoopMetric | RecoverySeconds] = [
         next(metric for metric in ALL_METRICS if metric.key == key) for key in PAGE_METRICS
     ]
-    rows = [["Co-Wizard", "sessions", "errored", *(metric.title for metric in columns)]]
+    rows = [["Co-Wizard", "sessions", "errored", CLAIMED, *(metric.title for metric in columns)]]
     for entry in entries:
         cells = [figure_text(metric, entry.table.figures[metric.key]) for metric in columns]
         part = "" if entry.result.complete else f" of {entry.result.settings['sessions_planned']}"
-        rows.append([labels[entry.policy], f"{entry.table.sessions}{part}", str(entry.table.errored), *cells])
+        claims = ", ".join(claim for claim in entry.claims if claim in _IN_TABLES) or "-"
+        rows.append(
+            [_name(labels[entry.policy]), f"{entry.table.sessions}{part}", str(entry.table.errored), claims, *cells]
+        )
     return _table(rows)
 
 
@@ -249,7 +315,7 @@ def _by_exception(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]
                 if kind in found else "-"
                 for kind in kinds
             ]  # fmt: skip
-            rows.append([labels[policy], *cells])
+            rows.append([_name(labels[policy]), *cells])
         lines += ["", f"### {title}, by exception", "", *_table(rows)]
     return lines if len(lines) > 5 else []
 
@@ -275,13 +341,14 @@ def figures_sha256(entries: Sequence[LeaderboardEntry]) -> str:
 
 
 def _costs(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]) -> list[str]:
-    rows = [["Co-Wizard", "towns", "training steps", "training time", "decisions", "wall time", "processor time"]]
+    times = [f"{name} ({CLAIMED})" for name in ("training steps", "training time", "wall time", "processor time")]
+    rows = [["Co-Wizard", "towns", *times[:2], "decisions", *times[2:]]]
     for entry in entries:
         training = entry.result.settings.get("training", {}).get(str(Role.CO_WIZARD), {})
         workers = entry.cost.get("workers")
         rows.append(
             [
-                labels[entry.policy],
+                _name(labels[entry.policy]),
                 entry.part,
                 f"{training['steps']:,.0f}" if "steps" in training else "-",
                 _time(training.get("seconds")),
@@ -301,7 +368,7 @@ def _language_models(entries: Sequence[LeaderboardEntry], labels: Mapping[str, s
             calls = max(usage.calls, 1)
             rows.append(
                 [
-                    labels[entry.policy],
+                    _name(labels[entry.policy]),
                     entry.part,
                     role.replace("_", "-"),
                     f"{usage.calls:,}",
@@ -311,12 +378,17 @@ def _language_models(entries: Sequence[LeaderboardEntry], labels: Mapping[str, s
                     "-" if usage.cost is None else f"{usage.cost / max(entry.table.sessions, 1):.4f} $",
                 ]
             )
-    return ["## Language models", "", *_table(rows), ""] if len(rows) > 1 else []
+    return [f"## Language models ({CLAIMED})", "", *_table(rows), ""] if len(rows) > 1 else []
 
 
 def _table(rows: Sequence[Sequence[str]]) -> list[str]:
     lines = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
     return [lines[0], "|" + "---|" * len(rows[0]), *lines[1:]]
+
+
+def _name(label: str) -> str:
+    """Returns a name as text of a Markdown page: names of others must not become links, pictures or tags."""
+    return re.sub(r"([\\`*\[\]])", r"\\\1", printable(label)).replace("<", "&lt;")
 
 
 def _time(seconds: float | None) -> str:

@@ -244,6 +244,9 @@ def _check_end(session: Session, config: EnvConfig) -> None:
     if len(ends) != 1 or session.events[-1] is not ends[0]:
         raise SessionError(f"has {len(ends)} events of type {EventType.END}; a session has one, which is its last")
     reason, last = ends[0].data.get("reason"), session.duration
+    frames = session.trajectory["frame"]
+    if not len(frames) or frames[-1] != ends[0].frame or frames[-1] - frames[0] + 1 != len(frames):
+        raise SessionError(f"its {len(frames)} frames do not run to its end at {last:g} s")
     if (session.summary or {}).get("reason") != reason:
         raise SessionError(f"its last event has the reason {short_repr(reason)}, its outcome another one")
     if reason == EndReason.OUT_OF_TIME:

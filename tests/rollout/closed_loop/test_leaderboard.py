@@ -13,9 +13,10 @@ from dorothie_gym.errors import RolloutError
 from dorothie_gym.maps import SEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player
-from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutRow, RolloutSettings
+from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutRow, RolloutSettings, roll_out, submission
 from dorothie_gym.rollout.closed_loop.leaderboard import labels_of, leaderboard_page, read_entries
 from tests.rollout.closed_loop.drives import record
+from tests.rollout.closed_loop.tampering import PROTOCOL, edit, settings
 
 
 def write(folder: Path, name: str, successes: int, **settings: Any) -> Path:
@@ -50,7 +51,9 @@ def test_page_has_figures_cost_and_the_command_of_each_row(tmp_path: Path) -> No
     (folder / "cost.json").write_text('{"wall_seconds": 100.0, "cpu_seconds": 180.0, "workers": 2}')
     page = leaderboard_page(read_entries([folder]), "board.png")
     assert "![Success and driving score of each policy, with intervals](board.png)" in page
-    assert "| ppo | 4 | 0 | 75.0 [30.1, 95.4] % |" in page
+    assert "| ppo | 4 | 0 | figures, name | 75.0 [30.1, 95.4] % |" in page
+    for name in ("training steps", "training time", "wall time", "processor time"):
+        assert f"| {name} (claimed) |" in page
     assert "| ppo | unseen | 50,000 | 20 min | 800 | 100 s by 2 | 180 s |" in page
     assert "dorothie-gym rollout --co-wizard ppo --participant scripted" in page
 
@@ -115,3 +118,70 @@ def test_two_models_of_one_name_keep_their_paths(tmp_path: Path) -> None:
     for folder in ("one", "two"):
         write(tmp_path / folder, f"{folder}/ppo/best", 2)
     assert sorted(labels_of(read_entries([tmp_path])).values()) == ["one/ppo/best", "two/ppo/best"]
+
+
+# --- Claims -----------------------------------------------------------------------------------------------------------
+
+
+def claims_in(page: str) -> list[tuple[str, str]]:
+    """Name and claims of each row of the tables of figures."""
+    found, inside = [], False
+    for line in page.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split(" | ")]
+        if cells[:4] == ["Co-Wizard", "sessions", "errored", "claimed"]:
+            inside = True
+        elif inside and line.startswith("| "):
+            found.append((cells[0], cells[3]))
+        elif not line.startswith("|-"):
+            inside = False
+    return found
+
+
+def test_claims_are_marked_in_page_output_and_json(tmp_path: Path) -> None:
+    folder = write(tmp_path / "one", "ppo", 3)
+    (folder / "cost.json").write_text('{"wall_seconds": 100.0, "cpu_seconds": 180.0, "workers": 2}')
+    call = ["leaderboard", str(folder), "--out", str(tmp_path / "board.md")]
+    done = CliRunner().invoke(app, call, env={"COLUMNS": "200"})
+    assert done.exit_code == 0, done.output
+    assert "ppo: success 75.0 % (claimed: figures, name, training cost, run time)" in done.stdout
+    assert claims_in((tmp_path / "board.md").read_text()) == [("ppo", "figures, name")]
+    (row,) = json.loads(CliRunner().invoke(app, [*call, "--json"]).stdout)["rows"]
+    assert row["claims"] == ["figures", "name", "training cost", "run time"]
+
+
+def test_checked_rollout_claims_only_what_nobody_can_check(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
+    monkeypatch.setattr(submission, "PROTOCOL", PROTOCOL)
+    monkeypatch.setenv("COLUMNS", "200")
+    roll_out(settings(), tmp_path / "lane-follow")
+    write(tmp_path / "imported", "scripted", 4, towns=("Town01.xodr",))
+    call = ["leaderboard", str(tmp_path), "--out", str(tmp_path / "board.md"), "--check", "--workers", "1"]
+    done = CliRunner().invoke(app, call)
+    assert done.exit_code == 0, done.output
+    short = "lane-follow (sessions of at most 15 s)"
+    assert claims_in((tmp_path / "board.md").read_text()) == [(short, "-"), ("scripted", "figures, name")]
+    assert f"{short}: success 0.0 % (claimed: run time)" in done.stdout
+    edit(tmp_path / "lane-follow" / "rollout.json", lambda page: page["rows"][1]["record"].update(success=True))
+    done = CliRunner().invoke(app, call)
+    assert done.exit_code == 1 and done.stderr.count("\n") == 1
+    assert "lane-follow: session 1 (brookside" in done.stderr and "see `dorothie-gym submit" in done.stderr
+
+
+def test_names_of_others_stay_text_on_the_page(tmp_path: Path) -> None:
+    name = "[best] <img src=x> `a` | b\n# Best"
+    write(tmp_path / "one", name, 4)
+    page = leaderboard_page(read_entries([tmp_path]))
+    assert "\n# Best" not in page
+    (row,) = [line for line in page.splitlines() if line.startswith("| ") and "| 4 | 0 | figures, name |" in line]
+    assert "\\[best\\]" in row and "<img" not in row and "\\`a\\`" in row and "\\| b" in row
+
+
+def test_page_of_the_documentation_has_the_columns_and_words_of_the_command(tmp_path: Path) -> None:
+    write(tmp_path / "one", "ppo", 3)
+    made = leaderboard_page(read_entries([tmp_path]), None, "closed-loop.md")
+    kept = (Path(__file__).parents[3] / "docs" / "leaderboard.md").read_text(encoding="utf-8")
+    heads = [line for line in made.splitlines() if line.startswith(("| Co-Wizard | sessions", "| Co-Wizard | towns"))]
+    assert len(heads) == 2 and all(head in kept for head in heads)
+    assert made.split("\n\n")[2] in kept and "`claimed` names" in made.split("\n\n")[2]
+    assert {claims for _, claims in claims_in(kept)} >= {"figures, name", "figures, name, weights"}

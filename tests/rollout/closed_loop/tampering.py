@@ -1,0 +1,516 @@
+"""Ways of making a rollout look better than it was, each with the words by which its check reports it.
+
+A careful cheat leaves files that agree with each other: sessions are saved again with their counts, and the result is
+measured again from them (`measured_again`).
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dorothie_gym.engine import session_engine
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.scenario import draw_scenario
+from dorothie_gym.maps import load_town
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies import ALL_SCRIPTED, Player, find_player
+from dorothie_gym.policies.ad_wizard import AdWizardConfig
+from dorothie_gym.policies.language_model.usage import ModelUsage
+from dorothie_gym.policies.persona import Persona
+from dorothie_gym.recording import Decision, Event, EventType, Session
+from dorothie_gym.recording.json_io import to_page
+from dorothie_gym.rollout import play
+from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings, measure, read_result, roll_out
+from dorothie_gym.rollout.closed_loop.submission import LeaderboardProtocol
+from dorothie_gym.rollout.closed_loop.usage import usage_to_json
+from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.tasks import load_template, template_names
+
+CONFIG = EnvConfig(max_seconds=15.0)
+PROTOCOL = LeaderboardProtocol(sessions=3, config=CONFIG)
+"""Protocol of the rollout that is edited afterwards."""
+
+LONGER = EnvConfig(max_seconds=120.0)
+ONE = LeaderboardProtocol(sessions=1, config=LONGER)
+"""Protocol of the rollouts that are played by cheats; the Ad-Wizard acts in its session."""
+
+
+def settings(**changes: Any) -> RolloutSettings:
+    cast = {**ALL_SCRIPTED, Role.CO_WIZARD: Player(name="lane-follow")}
+    return RolloutSettings(**{"cast": cast, "towns": ("brookside",), "sessions": 3, "config": CONFIG, **changes})
+
+
+# --- Files ------------------------------------------------------------------------------------------------------------
+
+
+def edit(file: Path, change: Callable[[Any], object]) -> None:
+    page = json.loads(file.read_text())
+    change(page)
+    file.write_text(json.dumps(page))
+
+
+def edit_settings(folder: Path, change: Callable[[Any], object]) -> None:
+    """Changes the settings in both files that have them."""
+    edit(folder / "rollout.json", lambda page: change(page["settings"]))
+    edit(folder / "settings.json", change)
+
+
+def sessions_of(folder: Path) -> list[Path]:
+    return sorted((folder / "sessions").iterdir())
+
+
+def measured_again(folder: Path) -> None:
+    """Writes the result that the sessions give, as if the rollout had been like this."""
+    result = read_result(folder)
+    rows = []
+    for row in result.rows:
+        (path,) = (folder / "sessions").glob(f"{row.number:04d}-*")
+        record = measure(Session.load(path), load_town(row.town))
+        rows.append(replace(row, record=record))
+    (folder / "rollout.json").write_text(to_page(RolloutResult(settings=result.settings, rows=tuple(rows)).to_json()))
+
+
+def resave(path: Path, change: Callable[[Session], Session]) -> None:
+    """Saves a changed session in place of another one, and the result that it gives."""
+    session = change(Session.load(path))
+    shutil.rmtree(path)
+    session.save(path)
+    measured_again(path.parents[1])
+
+
+def change_session(change: Callable[[Session], Session]) -> Callable[[Path], None]:
+    return lambda folder: resave(sessions_of(folder)[0], change)
+
+
+def change_header(**fields: Any) -> Callable[[Path], None]:
+    return change_session(lambda session: replace(session, header=replace(session.header, **fields)))
+
+
+def change_record(**fields: Any) -> Callable[[Path], None]:
+    return lambda folder: edit(folder / "rollout.json", lambda page: page["rows"][1]["record"].update(**fields))
+
+
+def with_event(session: Session, number: int, event: Event | None) -> Session:
+    """The session with another event in the place of one, or without that one."""
+    events = list(session.events)
+    events[number : number + 1] = [] if event is None else [event]
+    return replace(session, events=tuple(events))
+
+
+def end_of(session: Session, **data: Any) -> Session:
+    """The session with other data of its end, in event and outcome."""
+    last = session.events[-1]
+    assert last.type is EventType.END
+    changed = with_event(session, len(session.events) - 1, replace(last, data={**last.data, **data}))
+    return replace(changed, summary={**(session.summary or {}), **data})
+
+
+def cut(session: Session, seconds: float, *, end: float | None = None) -> Session:
+    """The session as if its time had been over earlier; with the event of its end at another time, if one is given."""
+    last = round(seconds * 30)
+    over = replace(session.events[-1], frame=round((seconds if end is None else end) * 30))
+    kept = session.trajectory["frame"] <= last
+    scene, frames = session.scene, np.arange(last + 1)
+    tables = {name: getattr(scene, name).at_frames(frames) for name in ("actors", "lights", "weather")}
+    return replace(
+        session,
+        events=(*(event for event in session.events[:-1] if event.frame <= last), over),
+        trajectory=session.trajectory[kept],
+        scene=replace(scene, **tables),
+        decisions=tuple(decision for decision in session.decisions or () if decision.frame < last),
+        summary={**(session.summary or {}), "seconds": seconds},
+    )
+
+
+def moved(session: Session) -> Session:
+    """The session with the last bits of one number of its frames changed."""
+    trajectory = session.trajectory.copy()
+    trajectory["x"][200] += 1e-9
+    return replace(session, trajectory=trajectory)
+
+
+def without_actors(session: Session) -> Session:
+    actors = session.scene.actors
+    none = type(actors)(frames=actors.frames, offsets=np.zeros_like(actors.offsets), rows=actors.rows[:0])
+    return replace(session, scene=replace(session.scene, actors=none))
+
+
+def with_column(session: Session) -> Session:
+    columns = {**session.scene.columns, "note": np.zeros(len(session.trajectory))}
+    return replace(session, scene=replace(session.scene, columns=columns))
+
+
+def without_actions(session: Session, role: Role) -> Session:
+    decisions = session.decisions or ()
+    found = next(decision for decision in decisions if role in decision.actions)
+    others = {each: action for each, action in found.actions.items() if each is not role}
+    changed = [Decision(frame=found.frame, actions=others)] if others else []
+    kept = [decision for decision in decisions if decision is not found]
+    return replace(session, decisions=tuple(sorted([*kept, *changed], key=lambda decision: decision.frame)))
+
+
+def no_end_line(folder: Path) -> None:
+    for path in sessions_of(folder):
+        file = path / "events.jsonl"
+        file.write_text("".join(line for line in file.read_text().splitlines(keepends=True) if '"End"' not in line))
+    measured_again(folder)
+
+
+def no_end(folder: Path) -> None:
+    for path in sessions_of(folder):
+        resave(path, lambda session: with_event(session, len(session.events) - 1, None))
+
+
+def declare_error(folder: Path, *, delete: bool) -> None:
+    result = read_result(folder)
+    rows = (replace(result.rows[0], record=None, error="ValueError: no"), *result.rows[1:])
+    page = RolloutResult(settings=result.settings, rows=rows).to_json()
+    (folder / "rollout.json").write_text(to_page(page))
+    if delete:
+        shutil.rmtree(sessions_of(folder)[0])
+
+
+def drop_session(folder: Path) -> None:
+    result = read_result(folder)
+    (folder / "rollout.json").write_text(
+        to_page(RolloutResult(settings=result.settings, rows=result.rows[1:]).to_json())
+    )
+    shutil.rmtree(sessions_of(folder)[0])
+
+
+def repeat_session(folder: Path) -> None:
+    """Puts a session into the place of another one, with the header of that one."""
+    first, second = sessions_of(folder)[:2]
+    wanted = Session.load(second).header
+    shutil.rmtree(second)
+    shutil.copytree(first, second)
+    resave(second, lambda session: replace(session, header=wanted))
+
+
+def swap_sessions(folder: Path) -> None:
+    first, second = sessions_of(folder)[:2]
+    kept = folder.parent / "kept"
+    first.rename(kept)
+    second.rename(first)
+    kept.rename(second)
+    measured_again(folder)
+
+
+def reverse_rows(folder: Path) -> None:
+    result = read_result(folder)
+    page = RolloutResult(settings=result.settings, rows=result.rows[::-1]).to_json()
+    (folder / "rollout.json").write_text(to_page(page))
+
+
+def add_usage(folder: Path, role: Role = Role.CO_WIZARD) -> None:
+    """Invents what a language model has cost."""
+    usage = {str(role): ModelUsage(model="large", calls=1, answers=1)}
+    (sessions_of(folder)[0] / "usage.json").write_text(to_page(usage_to_json(usage)))
+    result = read_result(folder)
+    rows = (replace(result.rows[0], usage=usage), *result.rows[1:])
+    (folder / "rollout.json").write_text(to_page(RolloutResult(settings=result.settings, rows=rows).to_json()))
+
+
+# --- Played by cheats -------------------------------------------------------------------------------------------------
+
+
+def play_as(folder: Path, patch: pytest.MonkeyPatch | None = None, *, named: Mapping[str, Any], **changes: Any) -> None:
+    """Plays a session under other settings, and then writes those of the protocol into all files."""
+    made = RolloutSettings(
+        **{"cast": settings().cast, "towns": ("brookside",), "sessions": 1, "config": LONGER, **changes}
+    )
+    roll_out(made, folder)
+    edit_settings(folder, lambda page: page.update(named))
+    for path in sessions_of(folder):
+        edit(path / "session.json", lambda page: page.update(config=LONGER.record()))
+    if patch is not None:
+        patch.undo()
+
+
+def partner(role: Role, name: str) -> Callable[[Path, pytest.MonkeyPatch], None]:
+    cast = {**settings().cast, role: find_player(name, role)}
+    return lambda folder, _: play_as(folder, named={str(role): "scripted"}, cast=cast)
+
+
+def configured(**fields: Any) -> Callable[[Path, pytest.MonkeyPatch], None]:
+    config = replace(LONGER, **fields)
+    return lambda folder, _: play_as(folder, named={"config": LONGER.record()}, config=config)
+
+
+def late_ad_wizard(folder: Path, patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(AdWizardConfig, "__init__", _later(AdWizardConfig.__init__))
+    play_as(folder, patch, named={})
+
+
+def _later(init: Callable[..., None]) -> Callable[..., None]:
+    def start(self: AdWizardConfig, **fields: Any) -> None:
+        init(self, **{"first_at": 100.0, **fields})
+
+    return start
+
+
+def patient_personas(folder: Path, patch: pytest.MonkeyPatch) -> None:
+    drawn = Persona.draw.__func__  # type: ignore[attr-defined]  # of a class method
+    easy = classmethod(lambda cls, *rest: replace(drawn(cls, *rest), patience=1.0, knowledge=1.0))
+    patch.setattr(Persona, "draw", easy)
+    play_as(folder, patch, named={})
+
+
+def hidden_personas(folder: Path, patch: pytest.MonkeyPatch) -> None:
+    """Plays with drawn personas of its own, and writes the personas of the seed into the header."""
+    patient_personas(folder, patch)
+    roll_out(settings(sessions=1, config=LONGER), folder.parent / "other")
+    personas = Session.load(sessions_of(folder.parent / "other")[0]).header.extra
+    (path,) = sessions_of(folder)
+    edit(path / "session.json", lambda page: page.update(personas))
+
+
+def one_storyboard(folder: Path, patch: pytest.MonkeyPatch) -> None:
+    template = load_template(template_names()[0])
+    patch.setattr(session_engine, "draw_scenario", lambda town, _, seed: draw_scenario(town, template, seed))
+    play_as(folder, patch, named={})
+
+
+def other_seeds_for_partners(folder: Path, patch: pytest.MonkeyPatch) -> None:
+    seed = play.policy_seed
+    patch.setattr(play, "policy_seed", lambda number, role: seed(number + 1, role))
+    play_as(folder, patch, named={})
+
+
+def in_another_town(folder: Path, _: pytest.MonkeyPatch) -> None:
+    play_as(folder, named={"towns": ["brookside"]}, towns=("millbrook",))
+    (path,) = sessions_of(folder)
+    path.rename(path.with_name("0000-brookside"))
+    edit(path.with_name("0000-brookside") / "session.json", lambda page: page.update(town="brookside"))
+    edit(folder / "rollout.json", lambda page: page["rows"][0].update(town="brookside"))
+
+
+def of_another_seed(folder: Path, _: pytest.MonkeyPatch) -> None:
+    play_as(folder, named={"seed": 0}, seed=1)
+    wanted = settings().plans()[0].seed
+    edit(sessions_of(folder)[0] / "session.json", lambda page: page.update(seed=wanted))
+    edit(folder / "rollout.json", lambda page: page["rows"][0].update(seed=wanted))
+
+
+def another_co_wizard(folder: Path, _: pytest.MonkeyPatch) -> None:
+    cast = {**ALL_SCRIPTED, Role.CO_WIZARD: Player(name="random")}
+    play_as(folder, named={"co_wizard": "lane-follow"}, cast=cast)
+
+
+def played(**changes: Any) -> Callable[[Path, pytest.MonkeyPatch], None]:
+    return lambda folder, _: play_as(folder, named={}, **changes)
+
+
+# --- The list ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tampering:
+    """A way of cheating.
+
+    Attributes:
+        name: what is done, as in docs/leaderboard-checks.md.
+        message: words of the fault that is reported.
+        edits: changes the copy of an honest rollout, of `PROTOCOL`.
+        plays: plays a rollout into a new folder, of `ONE`.
+        quick: whether it belongs to the quick tests.
+    """
+
+    name: str
+    message: str
+    edits: Callable[[Path], object] | None = None
+    plays: Callable[[Path, pytest.MonkeyPatch], object] | None = None
+    quick: bool = False
+
+
+def setting(**fields: Any) -> Callable[[Path], None]:
+    return lambda folder: edit_settings(folder, lambda page: page.update(fields))
+
+
+def append(name: str, text: str = "x") -> Callable[[Path], None]:
+    """Adds a file to the folder, or to its first session."""
+
+    def change(folder: Path) -> None:
+        (folder / name.replace("SESSION", f"sessions/{sessions_of(folder)[0].name}")).write_text(text)
+
+    return change
+
+
+def first_move(session: Session) -> int:
+    return next(k for k, event in enumerate(session.events) if event.type is EventType.DIALOGUE_MOVE)
+
+
+def arrival(session: Session) -> Session:
+    """The session with the arrival at its first subgoal."""
+    row = session.header.subgoals[0]
+    data = {"subgoal": 0, "landmark": session.header.landmarks[row["landmark"]]["name"], "status": "Complete",
+            "cause": "arrival"}  # fmt: skip
+    event = Event(frame=session.events[-1].frame - 15, type=EventType.SUBGOAL, source=Role.AGENT, data=data)
+    return replace(session, events=(*session.events[:-1], event, session.events[-1]))
+
+
+def first_landmark(session: Session) -> Session:
+    """The session with one place hidden less, or more."""
+    first, *others = session.header.landmarks
+    first = {**first, "hidden": not first["hidden"]}
+    return replace(session, header=replace(session.header, landmarks=(first, *others)))
+
+
+def traits(session: Session) -> Session:
+    personas = json.loads(json.dumps(session.header.extra["personas"]))
+    personas["participant"]["patience"] = 1.0
+    return replace(session, header=replace(session.header, extra={"personas": personas}))
+
+
+def renamed_technical(session: Session) -> Session:
+    return end_of(session, reason="technical")
+
+
+PARTICIPANT, AD_WIZARD = Role.PARTICIPANT, Role.AD_WIZARD
+AGAIN = "simulated again, it differs at"
+DRAWN = "its header is not what its seed gives"
+
+TAMPERINGS: tuple[Tampering, ...] = (
+    # partners
+    Tampering(name="silent Ad-Wizard renamed scripted", plays=partner(AD_WIZARD, "silent"), message=f"{AGAIN} frame",
+              quick=True),
+    Tampering(name="silent participant renamed scripted", plays=partner(PARTICIPANT, "silent"), message=DRAWN),
+    Tampering(name="participant with chosen traits renamed scripted", message=DRAWN,
+              plays=partner(PARTICIPANT, "scripted:knowledge=1..1,patience=1..1")),
+    Tampering(name="Ad-Wizard whose tricks come later", plays=late_ad_wizard, message=f"{AGAIN} frame"),
+    Tampering(name="personas drawn by patched code", plays=patient_personas, message=DRAWN, quick=True),
+    Tampering(name="personas drawn by patched code, with those of the seed in the header", plays=hidden_personas,
+              message=f"{AGAIN} frame"),
+    Tampering(name="partners with other seeds", plays=other_seeds_for_partners, message=DRAWN),
+    Tampering(name="persona edited in a header", edits=change_session(traits), message=DRAWN),
+    Tampering(name="action of a partner removed", message=AGAIN,
+              edits=change_session(lambda session: without_actions(session, PARTICIPANT))),
+    # ends
+    Tampering(name="line of the event End deleted", edits=no_end_line, message="is not complete", quick=True),
+    Tampering(name="event End removed, counts adjusted", edits=no_end, message="has 0 events of type End", quick=True),
+    Tampering(name="end called technical", edits=change_session(renamed_technical),
+              message="ended for the reason 'technical'", quick=True),
+    Tampering(name="end called technical in the outcome alone", message="its outcome another one",
+              edits=change_session(lambda session: replace(session, summary={**(session.summary or {}),
+                                                                             "reason": "technical"}))),
+    Tampering(name="end called an arrival", message="ended by arrival, but not all subgoals were reached",
+              edits=change_session(lambda session: end_of(session, reason="arrived"))),
+    Tampering(name="record cut off", edits=change_session(lambda session: cut(session, 10.0)),
+              message="ran out of time after 10 s; the time of the protocol is 15 s", quick=True),
+    Tampering(name="record cut off, with its end at the limit", message="300 frames do not run to its end at 15 s",
+              edits=change_session(lambda session: cut(session, 10.0, end=15.0))),
+    Tampering(name="record cut off and called interrupted", message="holds no finished session",
+              edits=change_session(lambda session: replace(cut(session, 10.0), summary=None, complete=False))),
+    Tampering(name="shorter limit, written as that of the protocol", plays=configured(max_seconds=60.0),
+              message="ran out of time after 60 s; the time of the protocol is 120 s", quick=True),
+    Tampering(name="session called an error", edits=lambda folder: declare_error(folder, delete=True),
+              message="ended in an error (ValueError: no); a submission has complete sessions only", quick=True),
+    Tampering(name="finished session called an error", edits=lambda folder: declare_error(folder, delete=False),
+              message="its row has an error, but the session is finished"),
+    # world and record
+    Tampering(name="no traffic, written as that of the protocol", message=f"{AGAIN} frame", quick=True,
+              plays=configured(world=WorldConfig(vehicles=0, pedestrians=0))),
+    Tampering(name="no word errors, written as those of the protocol", plays=configured(word_error_rate=0.0),
+              message=f"{AGAIN} frame"),
+    Tampering(name="more decisions a second", plays=configured(decision_frequency=5.0), message=DRAWN),
+    Tampering(name="settings edited in a header", edits=change_header(config={**CONFIG.record(), "note": 1}),
+              message="the session has other settings than the rollout"),
+    Tampering(name="one storyboard for all sessions", plays=one_storyboard, message=DRAWN),
+    Tampering(name="subgoals removed from a header", message=DRAWN,
+              edits=change_session(lambda session: replace(
+                  session, header=replace(session.header, subgoals=session.header.subgoals[-1:])))),
+    Tampering(name="hidden place made known in a header", edits=change_session(first_landmark), message=DRAWN),
+    Tampering(name="start moved in a header", edits=change_header(departure=(0, 1.0)), message=DRAWN),
+    Tampering(name="further field of a header", edits=change_header(extra={"award": "best"}), message=DRAWN),
+    Tampering(name="version edited in a header", edits=change_header(package_version="9.9"),
+              message="was recorded by version 9.9"),
+    Tampering(name="position of the car edited in a frame", edits=change_session(moved), message=f"{AGAIN} frame 2"),
+    Tampering(name="other cars removed from the frames", edits=change_session(without_actors), message=AGAIN),
+    Tampering(name="further column of the frames", edits=change_session(with_column), message=AGAIN),
+    Tampering(name="frames of another session", message=AGAIN, edits=lambda folder: (
+        shutil.copyfile(sessions_of(folder)[1] / "frames.parquet", sessions_of(folder)[0] / "frames.parquet"),
+        measured_again(folder))),
+    Tampering(name="event removed", message=AGAIN,
+              edits=change_session(lambda session: with_event(session, first_move(session), None))),
+    Tampering(name="further field of an event", message=AGAIN, edits=change_session(
+        lambda session: with_event(session, 0, replace(session.events[0], extra={"note": "x"})))),
+    Tampering(name="arrival invented", edits=change_session(arrival), message=AGAIN, quick=True),
+    Tampering(name="success invented in the outcome", message=AGAIN,
+              edits=change_session(lambda session: replace(session, summary={**(session.summary or {}),
+                                                                             "success": True}))),
+    Tampering(name="actions deleted", message="has no actions.jsonl",
+              edits=lambda folder: (sessions_of(folder)[0] / "actions.jsonl").unlink()),
+    Tampering(name="action that nobody can take", message="cannot be played again", plays=lambda folder, _: (
+        play_as(folder, named={"co_wizard": "own/model"}),
+        (sessions_of(folder)[0] / "actions.jsonl").write_text('{"frame":0,"co_wizard":{"fly":1}}\n'),
+        measured_again(folder))),
+    # which sessions
+    Tampering(name="another seed, written as that of the protocol", plays=of_another_seed, message=DRAWN, quick=True),
+    Tampering(name="another town, renamed", plays=in_another_town, message=DRAWN),
+    Tampering(name="towns in another order", message="the protocol has", plays=played(towns=("northgate", "midtown"))),
+    Tampering(name="more sessions than the protocol", plays=played(sessions=2),
+              message="2 sessions; the protocol has 1"),
+    Tampering(name="session left out", edits=drop_session, message="has no row", quick=True),
+    Tampering(name="session in the place of another", edits=repeat_session, message=AGAIN),
+    Tampering(name="sessions swapped", edits=swap_sessions, message="the session is of brookside, seed"),
+    Tampering(name="folder renamed", message="is none of the planned sessions", edits=lambda folder:
+              sessions_of(folder)[2].rename(folder / "sessions" / "0002-brookside-best")),
+    Tampering(name="surplus session", message="is none of the planned sessions", edits=lambda folder:
+              shutil.copytree(sessions_of(folder)[0], folder / "sessions" / "0009-brookside")),
+    Tampering(name="row given twice", message="two rows have the same number", edits=lambda folder:
+              edit(folder / "rollout.json", lambda page: page["rows"].append(page["rows"][0]))),
+    Tampering(name="rows in another order, for another interval", edits=reverse_rows, message="another order"),
+    # results
+    Tampering(name="figure of a session edited", edits=change_record(success=True), quick=True,
+              message="success is True; the session has False"),
+    Tampering(name="time of a session edited", edits=change_record(seconds=1.0),
+              message="seconds is 1.0; the session has"),
+    Tampering(name="table edited", message="its tables are not those of its rows", quick=True, edits=lambda folder:
+              edit(folder / "rollout.json", lambda page: page["success"].update(mean=1.0))),
+    Tampering(name="table of a town edited", message="its tables are not those of its rows", edits=lambda folder: edit(
+        folder / "rollout.json", lambda page: page["per_town"]["brookside"]["seconds"].update(low=1.0))),
+    Tampering(name="further field of a row", message="fields that nothing checks", edits=lambda folder:
+              edit(folder / "rollout.json", lambda page: page["rows"][0].update(award="best"))),
+    Tampering(name="usage invented", edits=add_usage, message="usage.json: is no part of a session"),
+    Tampering(name="usage of a partner invented", edits=lambda folder: add_usage(folder, PARTICIPANT),
+              message="its row has a usage of participant"),
+    # statements
+    Tampering(name="random Co-Wizard renamed lane-follow", plays=another_co_wizard, quick=True,
+              message=f"{AGAIN} frame"),
+    Tampering(name="name of a model that the package does not have", edits=setting(co_wizard="pretrained:best"),
+              message="there is no policy 'pretrained:best'"),
+    Tampering(name="name of several lines", edits=setting(co_wizard="lane-follow\n| best"),
+              message="a name has up to 200 printable characters"),
+    Tampering(name="weights of a policy without any", edits=setting(sha256={"co_wizard": "a" * 64}),
+              message="sha256 is not that of lane-follow"),
+    Tampering(name="other weights of a shipped model", message="sha256 is not that of pretrained:ppo",
+              edits=setting(co_wizard="pretrained:ppo", sha256={"co_wizard": "a" * 64})),
+    Tampering(name="training cost of a policy without any", message="training is not that of lane-follow",
+              edits=setting(training={"co_wizard": {"steps": 1, "seconds": 1.0}})),
+    Tampering(name="weights of a partner", message="sha256 is {", edits=setting(
+        co_wizard="own/model", sha256={"participant": "a" * 64})),
+    Tampering(name="further field of the training cost", message="training, award: is unknown", edits=setting(
+        co_wizard="own/model", training={"co_wizard": {"award": 1.0}})),
+    Tampering(name="language model of a policy that asks none", message="own/model is no language model",
+              edits=setting(co_wizard="own/model", language_models={"co_wizard": {}})),
+    Tampering(name="further setting", edits=setting(award="best"), message="settings, award: is unknown"),
+    Tampering(name="further field of settings.json", message="settings.json: award is unknown", edits=lambda folder:
+              edit(folder / "settings.json", lambda page: page.update(award="best"))),
+    Tampering(name="settings of the two files differ", message="rollout.json: seed is not that of settings.json",
+              edits=lambda folder: edit(folder / "settings.json", lambda page: page.update(seed=7))),
+    Tampering(name="version edited in settings.json", message="was played by package_version '9.9'",
+              edits=lambda folder: edit(folder / "settings.json", lambda page: page.update(package_version="9.9"))),
+    Tampering(name="unknown file of the rollout", edits=append("NOTES.md"), message="NOTES.md: is no part of a rollout",
+              quick=True),
+    Tampering(name="unknown file of a session", edits=append("SESSION/.award"), quick=True,
+              message=".award: is no part of a session"),
+)  # fmt: skip
+"""Everything that was tried; docs/leaderboard-checks.md lists the names."""
