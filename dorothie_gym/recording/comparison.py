@@ -51,7 +51,7 @@ def first_difference(recorded: Session, replayed: Session, *, strict: bool = Fal
         recorded: the first recording.
         replayed: the second.
         strict: whether completeness and further columns of the frames count. Otherwise, a first recording that was cut
-            off equals the beginning of a longer one.
+            off, and thus has no outcome, equals the beginning of a longer one.
     """
     return _Comparison(recorded, replayed, strict=strict).first()
 
@@ -108,7 +108,7 @@ class _Comparison:
     def __init__(self, recorded: Session, replayed: Session, *, strict: bool) -> None:
         self._pair = (recorded, replayed)
         self._strict = strict
-        self._whole = strict or recorded.complete
+        self._whole = strict or recorded.complete or recorded.summary is not None
         self._last = int(recorded.trajectory["frame"][-1]) if len(recorded.trajectory) else -1
 
     def first(self) -> Difference | None:

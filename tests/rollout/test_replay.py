@@ -153,3 +153,18 @@ def test_only_people_and_the_program_break_a_session_off() -> None:
     engine.break_off(EndReason.LEFT)
     with pytest.raises(RuntimeError, match="over"):
         engine.break_off(EndReason.LEFT)
+
+
+def test_finished_session_that_lost_its_end_differs(recorded: Session) -> None:
+    damaged = dataclasses.replace(recorded, events=recorded.events[:-1], complete=False)
+    difference = first_difference(damaged, resimulate(damaged, TOWN))
+    assert difference is not None
+    assert (difference.field, difference.recorded) == (f"events[{len(damaged.events)}]", "none")
+
+
+def test_sessions_without_frames_can_be_compared(recorded: Session) -> None:
+    nothing = Session(header=recorded.header, events=(), trajectory=recorded.trajectory[:0])
+    other = dataclasses.replace(nothing, header=dataclasses.replace(recorded.header, story="Another one."))
+    assert first_difference(nothing, nothing, strict=True) is None
+    difference = first_difference(nothing, other, strict=True)
+    assert difference is not None and difference.field == "header.story"

@@ -208,6 +208,8 @@ class SessionChecker:
                 raise SessionError(f"simulated again, it differs at {difference}")
             if session.digest != again.digest:
                 raise SessionError("simulated again, its content has another hash")
+            if session.report.to_json() != again.report.to_json():
+                raise SessionError("its files have parts that no session has; `dorothie-gym show` names them")
             for name, audio in again.audio.items():
                 if session.audio[name].read_bytes() != audio.read_bytes():
                     raise SessionError(f"simulated again, {AUDIO_FOLDER}/{name} differs")

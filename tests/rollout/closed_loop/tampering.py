@@ -455,7 +455,8 @@ TAMPERINGS: tuple[Tampering, ...] = (
     # which sessions
     Tampering(name="another seed, written as that of the protocol", plays=of_another_seed, message=DRAWN, quick=True),
     Tampering(name="another town, renamed", plays=in_another_town, message=DRAWN),
-    Tampering(name="towns in another order", message="the protocol has", plays=played(towns=("northgate", "midtown"))),
+    Tampering(name="towns in another order", plays=played(towns=("northgate", "midtown", "millbrook")),
+              message="towns are northgate, midtown, millbrook; the protocol has midtown, millbrook, northgate"),
     Tampering(name="more sessions than the protocol", plays=played(sessions=2),
               message="2 sessions; the protocol has 1"),
     Tampering(name="session left out", edits=drop_session, message="has no row", quick=True),
