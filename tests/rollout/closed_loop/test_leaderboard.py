@@ -16,7 +16,7 @@ from dorothie_gym.policies import ALL_SCRIPTED, Player
 from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutRow, RolloutSettings, roll_out, submission
 from dorothie_gym.rollout.closed_loop.leaderboard import labels_of, leaderboard_page, read_entries
 from tests.rollout.closed_loop.drives import record
-from tests.rollout.closed_loop.tampering import PROTOCOL, edit, settings
+from tests.rollout.closed_loop.rollout_edits import PROTOCOL, edit, settings
 
 
 def write(folder: Path, name: str, successes: int, **settings: Any) -> Path:

@@ -35,7 +35,15 @@ from dorothie_gym.rollout.closed_loop.submission import (
 from dorothie_gym.rollout.play import with_personas
 from dorothie_gym.spaces import SpaceLimits
 from tests.rollout.closed_loop.players import load_fainting, load_forgetful
-from tests.rollout.closed_loop.tampering import CONFIG, PROTOCOL, edit, edit_settings, sessions_of, settings
+from tests.rollout.closed_loop.rollout_edits import (
+    CONFIG,
+    PROTOCOL,
+    add_usage,
+    edit,
+    edit_settings,
+    sessions_of,
+    settings,
+)
 
 ROOT = Path(__file__).parents[3]
 
@@ -191,8 +199,6 @@ def test_what_nobody_can_check_may_be_edited_and_is_claimed(tmp_path: Path) -> N
 
 
 def test_usage_of_a_language_model_is_accepted_as_a_claim(tmp_path: Path) -> None:
-    from tests.rollout.closed_loop.tampering import add_usage
-
     folder = tmp_path / "own"
     roll_out(settings(cast=cast_with(own_policy(tmp_path))), folder)
     add_usage(folder)

@@ -9,7 +9,8 @@ import pytest
 
 from dorothie_gym.rollout.closed_loop import roll_out
 from dorothie_gym.rollout.closed_loop.submission import check_submission
-from tests.rollout.closed_loop.tampering import LONGER, ONE, PROTOCOL, TAMPERINGS, Tampering, settings
+from tests.rollout.closed_loop.rollout_edits import LONGER, ONE, PROTOCOL, settings
+from tests.rollout.closed_loop.tampering import TAMPERINGS, Tampering
 
 DOCS = Path(__file__).parents[3] / "docs"
 
