@@ -129,7 +129,7 @@ def _parts(found: object, wanted: object) -> Iterator[tuple[str, object, object]
 
 
 def digest_of(value: object) -> str:
-    """Returns a digest of the content of nested dataclasses, sequences, arrays and plain values, in hexadecimal."""
+    """Returns a digest of the content of nested dataclasses, mappings, sequences, arrays and plain values, in hex."""
     digest = hashlib.sha256()
     _feed(digest, value)
     return digest.hexdigest()
@@ -138,6 +138,10 @@ def digest_of(value: object) -> str:
 def _feed(digest: hashlib._Hash, value: object) -> None:
     if isinstance(value, np.ndarray):
         digest.update(f"{value.dtype.str}{value.shape}".encode() + np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, Mapping):
+        digest.update(f"{{{len(value)}".encode())
+        for name in sorted(value):
+            _feed(digest, [name, value[name]])
     elif isinstance(value, list | tuple):
         digest.update(f"[{len(value)}".encode())
         for item in value:

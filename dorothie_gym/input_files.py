@@ -269,6 +269,24 @@ def checked(value: object, kind: type[_T], where: object) -> _T:
     return found
 
 
+def settings_of(value: object, kind: type[_T], name: str) -> _T:
+    """Returns settings that are a dataclass already, or a mapping of its fields, as the JSON of `env.spec` has them.
+
+    Args:
+        value: the settings.
+        kind: the dataclass.
+        name: name of the argument, for messages.
+
+    Raises:
+        ValueError: they are neither, or a field is wrong; the message names it.
+    """
+    if isinstance(value, kind):
+        return value
+    if isinstance(value, Mapping):
+        return checked(dict(value), kind, name)
+    raise ValueError(f"{name} is a {type(value).__name__}; it must be {kind.__name__}(...), or a mapping of its fields")
+
+
 def _unknown_field(value: object, kind: object) -> str | None:
     """Returns the first field that a dataclass, or one of its fields, does not have."""
     if not (isinstance(kind, type) and dataclasses.is_dataclass(kind) and isinstance(value, Mapping)):

@@ -29,6 +29,13 @@ class TargetLayout(enum.StrEnum):
     HUGGING_FACE = "hf"
 
 
+class Storage(enum.StrEnum):
+    """Format of the files of a dataset for Minari."""
+
+    HDF5 = "hdf5"
+    ARROW = "arrow"
+
+
 class ExportedRole(enum.StrEnum):
     """Role whose view is exported."""
 
@@ -46,6 +53,13 @@ def convert(
     role: Annotated[
         ExportedRole, typer.Option(help="Role whose observations, actions and rewards --to minari and hf write.")
     ] = ExportedRole.CO_WIZARD,
+    storage: Annotated[
+        Storage, typer.Option(help="Files that --to minari writes; TorchRL reads HDF5 only.")
+    ] = Storage.HDF5,
+    field: Annotated[
+        list[str] | None,
+        typer.Option(help="Field of the action that --to minari keeps, more than once; all data are then vectors."),
+    ] = None,
     maps: Maps = None,
     as_json: AsJson = False,
 ) -> None:
@@ -56,6 +70,8 @@ def convert(
 
     The files of IN determine its layout. Unreadable sessions are listed, and the exit code is then 2.
     """
+    if to is not TargetLayout.MINARI and (field or storage is not Storage.HDF5):
+        fail("--storage and --field belong to --to minari")
     if maps is not None and not maps.is_dir():
         fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
     with reporting_errors():
@@ -67,7 +83,7 @@ def convert(
             _write_tables(corpus, out, as_json=as_json)
             return
         if to in (TargetLayout.MINARI, TargetLayout.HUGGING_FACE):
-            _write_role(corpus, out, to, role, maps, as_json=as_json)
+            _write_role(corpus, out, to, role, maps, storage, field or [], as_json=as_json)
             return
         is_one = [entry.path for entry in corpus.entries] == [source]
         rows = _convert(corpus, out, to, maps, is_one=is_one, quiet=as_json)
@@ -101,19 +117,24 @@ def _write_tables(corpus: Corpus, out: Path, *, as_json: bool) -> None:
 
 
 def _write_role(
-    corpus: Corpus, out: Path, to: TargetLayout, role: ExportedRole, maps: Path | None, *, as_json: bool
+    corpus: Corpus, out: Path, to: TargetLayout, role: ExportedRole, maps: Path | None, storage: Storage,
+    fields: list[str], *, as_json: bool,
 ) -> None:  # fmt: skip
     """Writes the view of a role on all sessions; a session that cannot be simulated again fails the command."""
     from dorothie_gym.ontology import Role
     from dorothie_gym.rollout.replay import ReplaySources
-    from dorothie_gym.rollout.role_export import export_hugging_face, export_minari, role_episodes
+    from dorothie_gym.rollout.role_episodes import role_episodes
 
     whose = Role(role.value)
     with _progress(len(corpus), quiet=as_json) as advance:
         episodes = role_episodes(corpus.entries, whose, ReplaySources(maps=maps))
         if to is TargetLayout.MINARI:
-            name = export_minari(episodes, whose, out, advance)
+            from dorothie_gym.rollout.minari_export import export_minari
+
+            name = export_minari(episodes, whose, out, advance, storage=storage.value, fields=fields)
         else:
+            from dorothie_gym.rollout.hugging_face_export import export_hugging_face
+
             name = str(export_hugging_face(episodes, whose, out, advance))
     facts = {"to": to.value, "in": str(corpus.root), "out": str(out), "role": role.value, "dataset": name}
     if as_json:

@@ -19,6 +19,7 @@ from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.pictures import OBSERVERS, picture_spaces
 from dorothie_gym.engine.scenario import Scenario, draw_scenario, template_option
 from dorothie_gym.engine.session_log import SessionSummary
+from dorothie_gym.input_files import settings_of
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.recording import EndReason, Event, SessionHeader
@@ -62,7 +63,7 @@ class SessionEngine(Restorable):
     Args:
         town: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`.
         storyboard: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one in each reset.
-        config: settings of the sessions.
+        config: settings of the sessions, or a mapping of them, as the JSON of `env.spec` has it.
         max_cycles: decisions until truncation, instead of `config.max_seconds`.
         limits: sizes of the spaces, if they are to be larger than the town needs.
 
@@ -81,19 +82,15 @@ class SessionEngine(Restorable):
         town: str | Path | Town,
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
-        config: EnvConfig | None = None,
+        config: EnvConfig | Mapping[str, object] | None = None,
         max_cycles: int | None = None,
         limits: SpaceLimits | None = None,
     ) -> None:
         if max_cycles is not None and max_cycles < 1:
             raise ValueError(f"max_cycles is {max_cycles}; it must be at least 1")
-        if config is not None and not isinstance(config, EnvConfig):
-            raise ValueError(
-                f"config is a {type(config).__name__}; it must be an EnvConfig, such as EnvConfig(max_seconds=600.0)"
-            )
         self.town = town if isinstance(town, Town) else load_town(town)
         self.template = template_option(storyboard)
-        self.config = config or EnvConfig()
+        self.config = EnvConfig() if config is None else settings_of(config, EnvConfig, "config")
         self.max_cycles = max_cycles
         self.limits = limits or SpaceLimits.for_town(self.town)
         self._network = network_of(self.town)

@@ -75,7 +75,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
     ## Arguments
     - `town`: name of a town, path of an `.xodr` or `.yaml` file, or a `Town`.
     - `storyboard`: name of a template, path of a `.json` file, or a `StoryboardTemplate`; None draws one each reset.
-    - `config`: `EnvConfig`.
+    - `config`: `EnvConfig`, or a mapping of its fields.
     - `render_mode`: None, `"rgb_array"` or `"human"`.
     - `render_view`: picture of `render()`: `"map"`, `"camera"` (the windscreen) or `"both"`, with subtitles.
     - `max_cycles`: decisions until truncation, instead of `config.max_seconds`.
@@ -95,7 +95,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
         town: str | Path | Town = "brookside",
         storyboard: str | Path | StoryboardTemplate | None = None,
         *,
-        config: EnvConfig | None = None,
+        config: EnvConfig | Mapping[str, object] | None = None,
         render_mode: str | None = None,
         max_cycles: int | None = None,
         render_view: str = "map",

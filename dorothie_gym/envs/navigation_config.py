@@ -11,6 +11,7 @@ from typing import Final
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.copying import shared
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.input_files import settings_of
 from dorothie_gym.policies.ad_wizard import MOST_TRICKS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, MAX_SECONDS
@@ -131,9 +132,7 @@ class NavigationConfig:
             if self.camera is not None:
                 raise ValueError('camera is set, but observation is "vector"; choose observation="camera"')
             return
-        camera = SMALL_CAMERA if self.camera is None else self.camera
-        if not isinstance(camera, CameraConfig):
-            raise ValueError(f"camera is a {type(camera).__name__}; it must be a CameraConfig or None")
+        camera = SMALL_CAMERA if self.camera is None else settings_of(self.camera, CameraConfig, "camera")
         if camera.outputs != (CameraOutput.RGB,):
             raise ValueError(f"camera.outputs is {camera.outputs}; drivers observe (CameraOutput.RGB,) only")
         object.__setattr__(self, "camera", camera)
@@ -149,10 +148,10 @@ class NavigationConfig:
         )
 
 
-def weights_of(reward: str | NavigationWeights) -> NavigationWeights:
-    """Returns weights given by name or directly; raises `ValueError` for an unknown name."""
-    if isinstance(reward, NavigationWeights):
-        return reward
+def weights_of(reward: str | NavigationWeights | Mapping[str, object]) -> NavigationWeights:
+    """Returns weights given by name, directly or by their fields; raises `ValueError` for an unknown name or field."""
+    if not isinstance(reward, str):
+        return settings_of(reward, NavigationWeights, "reward")
     if reward not in REWARDS:
         raise ValueError(f"reward is {reward!r}; it must be one of {', '.join(REWARDS)}, or NavigationWeights")
     return REWARDS[reward]

@@ -23,6 +23,7 @@ from dorothie_gym.envs.history_space import (
     encode_view,
     history_space,
 )
+from dorothie_gym.input_files import settings_of
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import LABELS
 from dorothie_gym.recording import (
@@ -164,7 +165,7 @@ class PointEnv(Restorable, gym.Env[Observation, ActionDict]):
         if render_mode not in (None, "ansi"):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or 'ansi'")
         self.task = task
-        self.limits = limits or SpaceLimits()
+        self.limits = SpaceLimits() if limits is None else settings_of(limits, SpaceLimits, "limits")
         self.render_mode = render_mode
         self.rules: PointRules[Any] = RULES[task]
         self.observation_space = history_space(task, self.limits)

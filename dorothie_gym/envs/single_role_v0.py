@@ -74,7 +74,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
         role: Role | str,
         town: str | Path | Town = "brookside",
         storyboard: str | Path | StoryboardTemplate | None = None,
-        config: EnvConfig | None = None,
+        config: EnvConfig | Mapping[str, object] | None = None,
         partners: Mapping[str, str | AnyPolicy] | None = None,
         render_mode: str | None = None,
         max_cycles: int | None = None,

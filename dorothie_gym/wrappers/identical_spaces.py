@@ -13,7 +13,7 @@ from pettingzoo import ParallelEnv
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import Role
 from dorothie_gym.spaces import ActionDict, Observation, StepInfo, noop
-from dorothie_gym.wrappers.flatten import Flat, FlatActions, FlatObservations
+from dorothie_gym.spaces.flat import Flat, FlatActions, FlatObservations
 
 FlatVector: TypeAlias = NDArray[np.float32]
 

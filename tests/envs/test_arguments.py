@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import pytest
+from gymnasium.envs.registration import EnvSpec
 
 import dorothie_gym
-from dorothie_gym import EnvConfig
+from dorothie_gym import CameraConfig, CameraOutput, EnvConfig, NavigationWeights, SpaceLimits, WorldConfig
+from tests.recording.builders import session
+from tests.recording.dialogues import talk
 
 
 @pytest.mark.parametrize(
     ("name", "arguments", "message"),
     [
-        ("CoWizard-v0", {"config": {"a": 1}}, "config is a dict; it must be an EnvConfig"),
-        ("Participant-v0", {"config": "fast"}, "config is a str; it must be an EnvConfig"),
+        ("CoWizard-v0", {"config": {"a": 1}}, "config, field 'a': is unknown in this version"),
+        ("Participant-v0", {"config": "fast"}, r"config is a str; it must be EnvConfig\(...\), or a mapping"),
         ("AdWizard-v0", {"storyboard": 3}, "storyboard is a int; it must be a name, a path or a StoryboardTemplate"),
         ("Navigation-v0", {"storyboard": ["x"]}, "storyboard is a list"),
         ("CoWizard-v0", {"town": "Brooksid"}, "did you mean 'brookside'"),
@@ -29,7 +33,7 @@ def test_wrong_argument_is_named(name: str, arguments: dict[str, Any], message: 
 
 
 def test_duo_wizard_names_a_wrong_config() -> None:
-    with pytest.raises(ValueError, match="config is a dict"):
+    with pytest.raises(ValueError, match="config, field 'a': is unknown"):
         dorothie_gym.DuoWizardEnv(config={"a": 1})  # type: ignore[arg-type]  # a user's mistake
 
 
@@ -100,3 +104,25 @@ def test_a_limit_given_to_make_is_kept() -> None:
 
 def test_driving_has_a_reward_threshold() -> None:
     assert gym.spec("dorothie_gym/Navigation-v0").reward_threshold == 20.0
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("CoWizard-v0", {"config": EnvConfig(max_seconds=30.0, world=WorldConfig(vehicles=3), observe_acts=False)}),
+        ("Participant-v0", {"config": EnvConfig(camera=CameraConfig(width=64, outputs=(CameraOutput.RGB,)))}),
+        ("Navigation-v0", {"reward": NavigationWeights(time=-0.5), "guidance": "goals"}),
+        ("Navigation-v0", {"observation": "camera", "camera": CameraConfig(width=64, height=64)}),
+        ("UfN-v0", {"corpus": "corpus", "limits": SpaceLimits(objects=3)}),
+    ],
+)
+def test_environment_is_made_again_from_the_json_of_its_spec(
+    name: str, arguments: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    session(talk()).save(tmp_path / "corpus" / "one")
+    env = gym.make(f"dorothie_gym/{name}", **arguments)
+    assert env.spec is not None
+    again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    assert (again.observation_space, again.action_space) == (env.observation_space, env.action_space)
+    assert again.unwrapped.compatibility() == env.unwrapped.compatibility()  # type: ignore[attr-defined]

@@ -150,7 +150,7 @@ def test_frames_are_stacked_by_gymnasiums_wrapper() -> None:
     [
         ({"observation": "pixels"}, "observation is 'pixels'; it must be one of vector, camera"),
         ({"camera": TINY}, 'camera is set, but observation is "vector"'),
-        ({"observation": "camera", "camera": 84}, "camera is a int; it must be a CameraConfig or None"),
+        ({"observation": "camera", "camera": 84}, "camera is a int; it must be CameraConfig"),
         (
             {"observation": "camera", "camera": CameraConfig(outputs=(CameraOutput.RGB, CameraOutput.DEPTH))},
             "drivers observe",

@@ -26,7 +26,7 @@ from dorothie_gym.spaces import (
     SpaceLimits,
     observation_space,
 )
-from dorothie_gym.wrappers.flatten import FlatObservations
+from dorothie_gym.spaces.flat import FlatObservations
 
 Mask: TypeAlias = NDArray[np.bool_]
 Memory = TypeVar("Memory")
