@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -44,7 +45,8 @@ class Room:
         config: settings.
         seed: seed of the first session; each further one has the next number.
         folder: folder in which each session is recorded in a folder of its own; None records nothing.
-        name: name of the folder of a session; None names it by town, storyboard and seed.
+        name: name of the folder of a session; None names it by the town and a random number, since people at the seats
+            may see the name, and storyboard and seed would tell them the errands.
         extra: further fields of the header of the record (JSON types).
         resumed: interrupted session that the first one goes on with; the engine is then one of `begin_replay`.
 
@@ -205,7 +207,7 @@ class Room:
         if self._folder is None or self.record is not None:
             return
         engine = self.engine
-        name = self._name or f"{engine.town.name}_{engine.scenario.storyboard.name}_{self._seed}"
+        name = self._name or f"{engine.town.name}_{secrets.token_hex(4)}"
         header = self._players.sign(engine.session_header())
         header = replace(header, extra={**header.extra, **self._extra})
         self.record = RoomRecord(engine, header, free_folder(self._folder, name))

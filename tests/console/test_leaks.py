@@ -5,7 +5,9 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -52,6 +54,19 @@ def pairs(value: Any) -> Iterator[tuple[float, float]]:
                 yield float(one), float(other)
         for item in value:
             yield from pairs(item)
+
+
+def test_the_name_of_a_record_tells_neither_story_nor_seed(tmp_path: Path) -> None:
+    """People at the seats may see where a session is recorded; seeds and storyboards are few enough to be tried."""
+    names = []
+    for number, seed in enumerate((3, 3, 4)):
+        table = Table("co_wizard=human", folder=tmp_path / str(number), seed=seed, max_seconds=2.0)
+        person = table.seat("co_wizard")
+        table.until(lambda person=person: person.state.get("outcome") is not None)  # type: ignore[misc]  # bound at once
+        (folder,) = (tmp_path / str(number)).iterdir()
+        names.append(folder.name)
+        assert re.fullmatch("brookside_[0-9a-f]{8}", folder.name)
+    assert len(set(names)) == 3, "names follow from the seed"
 
 
 def frames(person: Person) -> list[dict[str, Any]]:
