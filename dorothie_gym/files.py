@@ -21,16 +21,49 @@ JsonValue: TypeAlias = "str | int | float | bool | Sequence[JsonValue] | Mapping
 """Value of JSON types: text, number, true or false, list, object with text keys, or null."""
 
 
+_UNSUPPORTED: Final = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP)
+"""Errors of file systems that cannot sync a file or a folder."""
+
+
+def sync(path: Path) -> None:
+    """Returns when a file, or the names in a folder, are on the disk; at once where the file system cannot do that.
+
+    Raises:
+        OSError: it cannot be written, or the file is missing.
+    """
+    is_folder = path.is_dir()
+    if is_folder and not (hasattr(os, "O_DIRECTORY") and os.access(path, os.R_OK)):
+        return  # Windows syncs no folders, and a folder may be closed to its readers
+    descriptor = os.open(path, os.O_RDONLY if is_folder else os.O_RDWR)  # Windows syncs only what can be written
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _UNSUPPORTED:
+            raise OSError(error.errno, error.strerror, str(path)) from error
+    finally:
+        os.close(descriptor)
+
+
+def make_folder(folder: Path, *, parents: bool = False) -> None:
+    """Creates a folder unless it exists, also its parents if wanted; it is then on the disk. Errors as `Path.mkdir`."""
+    made = [each for each in (folder, *folder.parents) if not each.exists()]
+    folder.mkdir(parents=parents, exist_ok=True)
+    for each in made:
+        sync(each.parent)
+
+
 @contextmanager
-def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
+def replacing(path: Path, *, shared: bool = False, synced: bool = True) -> Iterator[Path]:
     """Yields a path beside `path` to write to, which replaces `path` in one step when the block is left.
 
-    Readers see the old file or the whole new one, even if the process dies. If the block fails, the part is removed.
+    Readers see the old file or the whole new one, even if the process dies or, with `synced`, the power fails; after
+    the block it is the new one. If the block fails, the part is removed.
 
     Args:
         path: the file.
         shared: whether several processes may write the file at once: the name of the part is then unique. Otherwise it
             is `path` with the ending `PART`, so that a later write removes what a killed process left.
+        synced: whether the file is on the disk when the block is left; not needed for what can be made again.
 
     Raises:
         OSError: the file cannot be written, or a pipe or device is there, which a file must not replace; the error
@@ -45,7 +78,11 @@ def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
         part.unlink(missing_ok=True)  # a link to another place must not be followed
     try:
         yield part
+        if synced:
+            sync(part)
         os.replace(part, path)
+        if synced:
+            sync(path.parent)
     except OSError as error:
         part.unlink(missing_ok=True)
         if error.errno is not None and error.filename in (None, str(part)):
@@ -56,7 +93,9 @@ def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
         raise
 
 
-def write_atomically(path: Path, content: str | bytes, *, shared: bool = False, mode: int | None = None) -> None:
+def write_atomically(
+    path: Path, content: str | bytes, *, shared: bool = False, mode: int | None = None, synced: bool = True
+) -> None:
     """Writes a file whole or not at all; a text in UTF-8. Errors as of `replacing`.
 
     Args:
@@ -64,8 +103,9 @@ def write_atomically(path: Path, content: str | bytes, *, shared: bool = False, 
         content: text or bytes.
         shared: see `replacing`.
         mode: permissions of the file from its creation on; those of the process if None.
+        synced: see `replacing`.
     """
-    with replacing(path, shared=shared) as part:
+    with replacing(path, shared=shared, synced=synced) as part:
         if mode is not None:
             part.touch(mode=mode, exist_ok=False)
         part.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)

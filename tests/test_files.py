@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.files import PART, new_folder, replacing, write_atomically
+from dorothie_gym.files import PART, make_folder, new_folder, replacing, write_atomically
+from tests.power_failure import Disk, disk, needs_linux
+
+__all__ = ["disk"]
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -17,6 +20,50 @@ def test_file_is_replaced_and_no_part_is_left(tmp_path: Path, shared: bool) -> N
     write_atomically(tmp_path / "a", b"two", shared=shared)
     assert (tmp_path / "a").read_text() == "two"
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+@needs_linux
+def test_written_file_survives_a_power_failure(tmp_path: Path, disk: Disk) -> None:
+    for content in (b"one", b"two", b"three" * 10_000):
+        write_atomically(tmp_path / "a", content)
+        assert disk.content(tmp_path / "a") == content
+    assert not disk.early
+
+
+@needs_linux
+def test_made_folder_survives_a_power_failure(tmp_path: Path, disk: Disk) -> None:
+    for name in ("deep/er/one", "deep/er/two", "deep/er/two"):
+        make_folder(tmp_path / name, parents=True)
+        write_atomically(tmp_path / name / "a", b"one")
+        assert disk.content(tmp_path / name / "a") == b"one"
+
+
+@needs_linux
+def test_file_that_can_be_made_again_is_not_synced(tmp_path: Path, disk: Disk) -> None:
+    write_atomically(tmp_path / "a", b"one", synced=False)
+    assert (tmp_path / "a").read_bytes() == b"one" and disk.content(tmp_path / "a") is None
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTSUP])
+def test_file_system_that_cannot_sync_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    def refuse(_: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    write_atomically(tmp_path / "a", "one")
+    assert (tmp_path / "a").read_text() == "one"
+
+
+def test_failed_sync_is_reported_and_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: int) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    write_atomically(tmp_path / "a", "old")
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(OSError, match="Input/output error") as caught:
+        write_atomically(tmp_path / "a", "new")
+    assert caught.value.filename == str(tmp_path / "a")
+    assert (tmp_path / "a").read_text() == "old" and [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
 @pytest.mark.parametrize("shared", [False, True])

@@ -1,13 +1,14 @@
 """Log of an annotator's marks: an append-only file beside the session, from which marks, undo and redo are restored.
 
 The first line says whose log it is and of which text. Every later line is an edit with the new marks of what it
-changes; an undo is an edit that restores earlier marks. A line is handed to the operating system before the edit is
-acknowledged, so that the death of the program loses nothing.
+changes; an undo is an edit that restores earlier marks. A line is on the disk before the edit is acknowledged, so that
+neither the death of the program nor a power failure loses it.
 """
 
 from __future__ import annotations
 
 import enum
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ from dorothie_gym.annotation.marks import Annotation, Change, check_change
 from dorothie_gym.annotation.rows import ChangeRows, change_of, rows_of
 from dorothie_gym.annotation.source_text import SourceText
 from dorothie_gym.errors import AnnotationError, SessionError, one_line
+from dorothie_gym.files import make_folder, sync
 from dorothie_gym.input_files import check_value_count, raising
 from dorothie_gym.recording.file_names import ANNOTATIONS_FOLDER
 from dorothie_gym.recording.header import parse_version
@@ -237,7 +239,7 @@ class AnnotationLog:
         if not self._size:
             head = LogHead(LOG_VERSION, self.annotator, self.text.session, self.text.digest, self.pre_annotated)
             rows = [head, *self.lines, line]
-            self.path.parent.mkdir(exist_ok=True)
+            make_folder(self.path.parent)
         content = b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
         with self.path.open("ab") as file:
             if file.tell() != self._size + self._torn:
@@ -245,6 +247,10 @@ class AnnotationLog:
             if self._torn:  # a program died while it wrote; that edit was not acknowledged
                 file.truncate(self._size)
             file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        if not self._size:
+            sync(self.path.parent)
         self._size, self._torn = self._size + len(content), 0
 
     # --- reading ------------------------------------------------------------------------------------------------------

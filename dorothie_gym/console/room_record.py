@@ -94,8 +94,8 @@ class RoomRecord:
             self._closed = True
         if broken_off:
             self._recorder.record_end()
+        self._log.close()  # before the session counts as finished
         self._writer.finish(self._engine.summary())
-        self._log.close()
 
     def close(self) -> None:
         """Closes the record of a session that is not over; it stays incomplete."""

@@ -7,6 +7,7 @@ session; it has no dates and no names of people.
 from __future__ import annotations
 
 import enum
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -131,7 +132,9 @@ class SeatLogWriter:
         self._file.flush()
 
     def close(self) -> None:
-        """Closes the file; may be called again."""
+        """Closes the file, which is then on the disk; may be called again."""
+        if not self._file.closed:
+            os.fsync(self._file.fileno())
         self._file.close()
 
     def __enter__(self) -> Self:

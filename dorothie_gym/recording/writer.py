@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.errors import OutputFolderError, SessionError
-from dorothie_gym.files import PART, write_atomically
+from dorothie_gym.files import PART, make_folder, sync, write_atomically
 from dorothie_gym.maps import LightColour
 from dorothie_gym.ontology import Role, WeatherParameter
 from dorothie_gym.recording.action_log import Decision, encode_decision
@@ -41,7 +41,8 @@ class SessionWriter:
     """Appends events and frames to the folder of a session; appended data survives the death of the process.
 
     At any moment, the folder holds a finished session, an interrupted one that loads up to the last append, or, before
-    the header was written, none (`session_state`). Actors, lights and weather are optional, at each frame.
+    the header was written, none (`session_state`). A finished session, pictures and audio survive a power failure, too.
+    Actors, lights and weather are optional, at each frame.
 
     Args:
         folder: folder of the session.
@@ -148,9 +149,7 @@ class SessionWriter:
             raise SessionError(f"{self.folder}: the picture of frame {frame} is no PNG")
         if not 0 <= frame < MAX_FRAME:
             raise SessionError(f"{self.folder}: a picture of frame {frame}; frames are 0 or above")
-        pictures = self.folder / PICTURES_FOLDER
-        pictures.mkdir(exist_ok=True)
-        write_atomically(pictures / picture_name(frame), png)
+        write_atomically(self._subfolder(PICTURES_FOLDER) / picture_name(frame), png)
 
     def add_audio(self, name: str, flac: bytes) -> None:
         """Writes the audio (FLAC) of a dialogue move, whose field `audio` has the name.
@@ -163,14 +162,13 @@ class SessionWriter:
             raise SessionError(f"{self.folder}: the audio {name!r} is no FLAC")
         if safe_name(name) != name or not name.endswith(".flac"):
             raise SessionError(f"{self.folder}: {name!r} is no name of a FLAC file")
-        folder = self.folder / AUDIO_FOLDER
-        folder.mkdir(exist_ok=True)
-        write_atomically(folder / name, flac)
+        write_atomically(self._subfolder(AUDIO_FOLDER) / name, flac)
 
     def finish(self, outcome: Mapping[str, object]) -> None:
         """Writes the outcome, which completes the session, and closes it.
 
-        The journal is converted into `frames.parquet` and removed; last, `session.json` is replaced atomically.
+        The journal is converted into `frames.parquet` and removed; last, `session.json` is replaced atomically. A
+        finished session is on the disk: a power failure cannot take parts of it.
 
         Raises:
             SessionError: the outcome holds other types than JSON's, or the session is closed.
@@ -179,6 +177,9 @@ class SessionWriter:
         self._check_open("it cannot be finished")
         outcome = canonical_object(outcome, "outcome")
         self.close()
+        for name in (EVENTS_FILE, ACTIONS_FILE):
+            if (self.folder / name).is_file():
+                sync(self.folder / name)
         if not (self.folder / JOURNAL_FILE).is_file():
             raise OutputFolderError(f"{self.folder}: the folder was deleted or emptied while it was being written")
         trajectory, scene = read_journal(self.folder / JOURNAL_FILE)
@@ -204,7 +205,7 @@ class SessionWriter:
 
     def _prepare(self, overwrite: bool, create: bool) -> None:
         if create:
-            self.folder.mkdir(parents=True, exist_ok=True)
+            make_folder(self.folder, parents=True)
         names = (*SESSION_FILES, *(name + PART for name in SESSION_FILES))
         present = [name for name in names if _stands(self.folder / name)]
         if present and not overwrite and present != [HEADER_FILE + PART]:  # that one died before there was a session
@@ -217,6 +218,11 @@ class SessionWriter:
         for name in (PICTURES_FOLDER, AUDIO_FOLDER):
             if overwrite and (self.folder / name).is_dir():
                 shutil.rmtree(self.folder / name)
+
+    def _subfolder(self, name: str) -> Path:
+        folder = self.folder / name
+        make_folder(folder)
+        return folder
 
     def _check_open(self, consequence: str) -> None:
         if self._events.closed:

@@ -14,6 +14,9 @@ from dorothie_gym.errors import AnnotationError, SessionError
 from dorothie_gym.ontology import DialogueMove, LandmarkName, UnitEnd
 from dorothie_gym.recording import Session
 from tests.annotation.builders import FIRST, OKAY, random_change, recorded, span
+from tests.power_failure import Disk, disk, needs_linux
+
+__all__ = ["disk"]
 
 M = DialogueMove
 
@@ -43,6 +46,19 @@ def test_marks_are_restored_with_undo_and_redo(tmp_path: Path) -> None:
     assert again.redo() and again.annotation.utterances[OKAY][1].move is M.EXPLAIN
     assert again.undo() and again.undo() and not again.undo()
     assert again.annotation == Annotation.empty(log.text)
+
+
+@needs_linux
+def test_edit_survives_a_power_failure(tmp_path: Path, disk: Disk) -> None:
+    log = marked(tmp_path / "s")
+    for step in (lambda: None, log.undo, log.redo, log.undo):
+        step()
+        content = disk.content(log.path)
+        assert content == log.path.read_bytes() and content.count(b"\n") == 1 + log.edits
+    kept = tmp_path / "kept" / "annotations" / log.path.name
+    kept.parent.mkdir(parents=True)
+    kept.write_bytes(content)
+    assert AnnotationLog(log.text, tmp_path / "kept", "anna").annotation == log.annotation
 
 
 def test_the_session_is_never_changed(tmp_path: Path) -> None:

@@ -13,6 +13,9 @@ from dorothie_gym.ontology import PhysicalAction, Role
 from dorothie_gym.recording import EventType, SeatEventKind, Session, first_difference, read_seat_log
 from dorothie_gym.rollout import resimulate
 from tests.console.people import Table
+from tests.power_failure import Disk, disk, needs_linux
+
+__all__ = ["disk"]
 
 
 def load(folder: Path) -> Session:
@@ -200,6 +203,18 @@ def test_the_session_ends_when_a_person_does_not_come_back(tmp_path: Path) -> No
     assert log is not None
     assert [event.kind.value for event in log] == ["joined", "joined", "left", "paused"]
     assert_replays(session, table)
+
+
+@needs_linux
+def test_session_that_counts_as_finished_survives_a_power_failure(tmp_path: Path, disk: Disk) -> None:
+    table = Table("co_wizard=human,ad_wizard=silent", folder=tmp_path / "sessions", max_seconds=3.0)
+    table.seat("co_wizard")
+    table.until(lambda: table.room.state is RoomState.OVER)
+    (folder,) = (tmp_path / "sessions").iterdir()
+    files = [path for path in folder.iterdir() if path.is_file()]
+    assert {path.name for path in files} >= {"session.json", "events.jsonl", "actions.jsonl", "seats.jsonl"}
+    for path in files:
+        assert disk.content(path) == path.read_bytes(), path.name
 
 
 def test_the_session_goes_on_without_a_person_where_the_rules_say_so() -> None:

@@ -15,10 +15,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.recording import Session, SessionState, SessionWriter, session_state
+from dorothie_gym.ontology import Role
+from dorothie_gym.recording import (
+    SeatEvent,
+    SeatEventKind,
+    SeatLogWriter,
+    Session,
+    SessionState,
+    SessionWriter,
+    session_state,
+)
+from dorothie_gym.recording.file_names import AUDIO_FOLDER
+from tests.power_failure import Disk, disk, needs_linux
 from tests.recording.builders import header, rows
 from tests.recording.dialogues import talk
 from tests.recording.scenes import actors
+
+__all__ = ["disk"]
 
 ROOT = Path(__file__).parents[2]
 
@@ -52,6 +65,24 @@ def test_session_cut_off_at_any_byte_loads_up_to_the_last_complete_record(
             assert np.array_equal(loaded.trajectory, whole.trajectory[: len(loaded.trajectory)])
             decisions = len(loaded.trajectory) // 15
             assert decisions - 1 <= len(loaded.scene.actors) <= decisions
+
+
+@needs_linux
+def test_finished_session_survives_a_power_failure(tmp_path: Path, disk: Disk) -> None:
+    folder = tmp_path / "session"
+    with SessionWriter(folder, header()) as writer, SeatLogWriter(folder) as seats:
+        writer.append(talk(), rows(0, 60))
+        writer.add_decision(3, {Role.CO_WIZARD: {"navigation": 1}})
+        writer.add_audio("one.flac", b"fLaC and more")
+        assert disk.content(folder / AUDIO_FOLDER / "one.flac") == b"fLaC and more"
+        seats.append(SeatEvent(frame=0, kind=SeatEventKind.JOINED, role=Role.CO_WIZARD, data={"seconds": None}))
+        seats.close()
+        writer.finish({"success": True})
+    assert not disk.early
+    files = [path for path in folder.iterdir() if path.is_file()]
+    assert {path.name for path in files} >= {"session.json", "events.jsonl", "frames.parquet", "seats.jsonl"}
+    for path in files:
+        assert disk.content(path) == path.read_bytes(), path.name
 
 
 def test_damaged_block_of_the_journal_ends_it(cut_off: Path, tmp_path: Path) -> None:
