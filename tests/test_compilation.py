@@ -1,5 +1,6 @@
 import gc
 import os
+import random
 import subprocess
 import sys
 import warnings
@@ -16,6 +17,7 @@ from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.compilation.cache import compiled_folder
 from dorothie_gym.compilation.dispatcher import OwnFlags
 from dorothie_gym.compilation.records import Float, empty_records
+from tests.cache_damage import DAMAGES
 
 
 @pytest.mark.parametrize("kind", [allocating, compiled, inlined])
@@ -157,6 +159,56 @@ def test_damaged_machine_code_is_compiled_again(tmp_path):
         file.write_bytes(file.read_bytes()[:100])
     assert square(tmp_path, factor=2, seconds=1000) == (18, 0)
     assert square(tmp_path, factor=2, seconds=1000) == (18, 1)
+
+
+def tripled(x):
+    return 3 * x
+
+
+def halved(x):
+    return x / 2
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+@pytest.mark.parametrize("kind", sorted(DAMAGES))
+def test_machine_code_with_any_damage_is_compiled_again(tmp_path, monkeypatch, kind):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "code"))
+    assert compiled(halved)(3.0) == 1.5
+    halves = {path.name for path in (tmp_path / "code").iterdir()}
+    assert compiled(tripled)(3.0) == 9.0
+    threefold = {path.name for path in (tmp_path / "code").iterdir()} - halves
+    for number, name in enumerate(sorted(threefold)):
+        DAMAGES[kind](tmp_path / "code" / name, random.Random(number))
+    for hits in (0, 1):
+        again, other = compiled(tripled), compiled(halved)
+        assert again.is_cached() == bool(hits)
+        assert again(3.0) == 9.0 and other(3.0) == 1.5
+        assert sum(again.stats.cache_hits.values()) == hits and sum(other.stats.cache_hits.values()) == 1
+    assert {path.name for path in (tmp_path / "code").iterdir()} == halves | threefold
+
+
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+def test_machine_code_of_other_versions_is_deleted_when_nobody_uses_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    compiled(tripled)(3.0)
+    (path,) = set(tmp_path.glob("*tripled*"))
+    stem = path.name.partition("tripled-")[0] + "tripled-"
+    others = [
+        f"{stem}0123.py311.{'0' * 16}.code",
+        f"{stem}0123.py311.nbi",
+        f"{stem}0123.py311.1.nbc",
+        f"{stem}0123.part",
+    ]
+    for name in others:
+        (tmp_path / name).touch()
+    compiled(tripled)(3)  # of another type
+    assert all((tmp_path / name).exists() for name in others), "another copy of the package uses them"
+    for file in tmp_path.iterdir():
+        os.utime(file, (0.0, 0.0))
+    compiled(tripled)(np.float32(3.0))
+    assert not any((tmp_path / name).exists() for name in others)
+    assert path.exists() and len(set(tmp_path.glob("*tripled*"))) == 3
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has other permissions")

@@ -1,23 +1,35 @@
 from __future__ import annotations
 
+import logging
 import os
+import random
 import sys
 import time
 from pathlib import Path
 
 import pytest
 
+from dorothie_gym import user_cache
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps.cache import pack, through_cache, unpack
 from dorothie_gym.user_cache import (
     CACHE_VARIABLE,
+    KEY_FILE,
     RECENT,
+    SEAL_FILE,
     SIGNATURE_LENGTH,
     cache_folder,
+    is_sealed,
     mark_used,
+    read_signed,
     remove_least_used,
+    seal,
+    write_signed,
 )
+from tests.cache_damage import DAMAGES
 from tests.maps.yaml_text import MIDTOWN, written
+
+needs_posix = pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="folders of the Linux desktop standard")
@@ -94,6 +106,84 @@ def test_cache_that_others_can_write_is_not_used(cache: Path, caplog: pytest.Log
         assert through_cache(path, lambda _, town=compiled: town) is compiled
         assert f"{shared} can be written by other users" in caplog.text
         shared.chmod(0o700)
+
+
+@needs_posix
+@pytest.mark.parametrize("kind", sorted(set(DAMAGES) - {"missing"}))
+@pytest.mark.parametrize("seed", range(5))
+def test_damaged_entry_is_removed_and_can_be_written_again(cache: Path, kind: str, seed: int) -> None:
+    drawn = random.Random(seed)
+    contents = {cache / "things" / name: drawn.randbytes(drawn.randrange(5000)) for name in "abc"}
+    for path, content in contents.items():
+        write_signed(path, content)
+    damaged = cache / "things" / "b"
+    DAMAGES[kind](damaged, drawn)
+    for path, content in contents.items():
+        assert read_signed(path) == (None if path == damaged else content)
+    assert not damaged.exists()
+    write_signed(damaged, contents[damaged])
+    assert read_signed(damaged) == contents[damaged]
+
+
+def test_first_damage_of_a_process_is_a_warning(
+    cache: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(user_cache, "_damage_reported", False)
+    caplog.set_level(logging.DEBUG, user_cache.__name__)
+    for name in "abc":
+        write_signed(cache / "things" / name, b"content")
+        (cache / "things" / name).write_bytes(b"")
+        assert read_signed(cache / "things" / name) is None
+    assert [record.levelname for record in caplog.records] == ["WARNING", "DEBUG", "DEBUG"]
+    assert f"{cache / 'things' / 'a'} in the cache is damaged" in caplog.text
+    caplog.clear()
+    assert read_signed(cache / "things" / "d") is None and not caplog.records, "it was never there"
+
+
+@needs_posix
+@pytest.mark.parametrize("kind", sorted(DAMAGES))
+def test_damaged_key_is_replaced(cache: Path, kind: str) -> None:
+    entry = cache / "things" / "a"
+    write_signed(entry, b"content")
+    (cache / "other").write_bytes(b"something else")
+    DAMAGES[kind](cache / KEY_FILE, random.Random(0))
+    assert read_signed(entry) is None
+    write_signed(entry, b"content")
+    assert read_signed(entry) == b"content"
+
+
+def test_write_replaces_a_folder_and_a_file_in_the_place_of_a_folder(cache: Path) -> None:
+    cache.mkdir()
+    (cache / "things").write_text("no folder")
+    assert read_signed(cache / "things" / "a") is None
+    (cache / "others" / "a" / "deep").mkdir(parents=True)
+    for name in ("things", "others"):
+        write_signed(cache / name / "a", b"content")
+        assert read_signed(cache / name / "a") == b"content"
+
+
+def test_only_folders_of_the_cache_replace_a_file(cache: Path, tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("of the user")
+    with pytest.raises(FileExistsError):
+        write_signed(tmp_path / "precious" / "a", b"content")
+    assert (tmp_path / "precious").read_text() == "of the user"
+
+
+@needs_posix
+@pytest.mark.parametrize("kind", sorted(DAMAGES))
+@pytest.mark.parametrize("file", ["one", "deep/two", SEAL_FILE])
+def test_seal_notices_damage_of_any_file(tmp_path: Path, kind: str, file: str) -> None:
+    folder = tmp_path / "part"
+    (folder / "deep").mkdir(parents=True)
+    for name, content in {"one": b"1" * 100, "deep/two": b"2" * 5000, "deep/three": b"3"}.items():
+        (folder / name).write_bytes(content)
+    seal(folder, "whole", tmp_path)
+    assert not is_sealed(folder, tmp_path), "it has another name"
+    folder = folder.rename(tmp_path / "whole")
+    (folder / "deep" / "more").write_text("added later")
+    assert is_sealed(folder, tmp_path)
+    DAMAGES[kind](folder / file, random.Random(0))
+    assert not is_sealed(folder, tmp_path)
 
 
 def own_town(folder: Path) -> Path:

@@ -7,6 +7,7 @@ import hashlib
 import importlib.metadata
 import io
 import logging
+import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.cache import compiler_digest, package_sources, remove_oldest
-from dorothie_gym.user_cache import cache_folder, read_signed, write_signed
+from dorothie_gym.user_cache import cache_folder, discard, read_signed, write_signed
 
 _PACKAGES = ("dorothie_gym.camera", "dorothie_gym.rendering", "dorothie_gym.sim")
 _log = logging.getLogger(__name__)
@@ -33,7 +34,8 @@ def through_cache(
 ) -> Kept:  # fmt: skip
     """Returns what the user's cache holds under a key, or builds it and adds it to the cache.
 
-    A cache that cannot be read or written is logged at level DEBUG and otherwise ignored.
+    A damaged entry is replaced (`user_cache.read_signed`). A cache that cannot be written is logged at level DEBUG and
+    otherwise ignored.
 
     Args:
         folder: name of the folder in the cache.
@@ -44,15 +46,12 @@ def through_cache(
         unpack: returns the content of such arrays; `KeyError` and `ValueError` mean that they are damaged.
     """
     entry = _entry(folder, key)
-    if entry is not None:
+    data = None if entry is None else read_signed(entry)
+    if entry is not None and data is not None:
         try:
-            data = read_signed(entry)
-            if data is not None:
-                return unpack(from_bytes(data))
-        except FileNotFoundError:
-            pass
-        except (KeyError, OSError, ValueError) as error:
-            _log.debug("%s in the cache cannot be used and is built again: %s", entry, error)
+            return unpack(from_bytes(data))
+        except (KeyError, OSError, ValueError, zipfile.BadZipFile) as error:
+            discard(entry, str(error))
     content = build()
     if entry is not None:
         try:
@@ -74,7 +73,7 @@ def from_bytes(data: bytes) -> Arrays:
     """Returns the arrays that `to_bytes` has written.
 
     Raises:
-        KeyError, OSError, ValueError: the bytes hold no arrays.
+        KeyError, OSError, ValueError, zipfile.BadZipFile: the bytes hold no arrays.
     """
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}

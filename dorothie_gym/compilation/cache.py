@@ -2,32 +2,46 @@
 
 An update of the package compiles only functions that are different, or that call different ones; copies of the package
 share what is equal in them. The folder is `compiled` in the user's cache folder, or `NUMBA_CACHE_DIR`.
+
+A file holds the machine code for one signature and processor. It is signed under its name, by a key in the same folder:
+damaged machine code would end the process without a message.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 import pickle
 import sys
 import time
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.serialize import dumps
 
 from dorothie_gym.compilation.fingerprint import Compilable, fingerprint
-from dorothie_gym.user_cache import cache_folder, is_private
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from dorothie_gym.files import PART
+from dorothie_gym.user_cache import cache_folder, discard, is_private, mark_used, read_signed, write_signed
 
 NUMBA_VARIABLE: Final = "NUMBA_CACHE_DIR"
 """numba's own environment variable for the folder of machine code; it goes before the user's cache folder."""
 
 KEPT: Final = 14 * 24 * 3600.0
 """Time without a read after which files of other versions of a function are deleted [s]."""
+
+ENDING: Final = ".code"
+"""Ending of the names of the files."""
+
+_OLD_ENDING: Final = ".nbi"
+"""Ending of the index files of earlier versions of the package, which left their machine code in numba's own form."""
+
+_UNPICKLING_ERRORS: Final = (
+    ImportError, AttributeError, TypeError, ValueError, LookupError, EOFError, pickle.UnpicklingError
+)  # fmt: skip
+"""Errors of `pickle` for objects of other versions of their classes."""
 
 _warned = False
 
@@ -44,18 +58,59 @@ def compiled_folder() -> Path | None:
     return folder if is_private(folder) else None
 
 
-class _Files(CompileResultCacheImpl):  # type: ignore[misc]  # numba has no type information
-    """Reading and writing of results of the compiler; the folder is made when the first one is written."""
+class _Impl(CompileResultCacheImpl):  # type: ignore[misc]  # numba has no type information
+    """Conversion of results of the compiler."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self) -> None:
+        """Needs no function: files are named by `_Files`."""
 
     @property
-    def locator(self) -> _Files:
+    def locator(self) -> _Impl:
         return self
 
     def ensure_cache_path(self) -> None:
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        """Does nothing: the folder is made when the first file is written."""
+
+
+class _Files:
+    """Signed files of one version of a function, in place of numba's index and data files.
+
+    Args:
+        folder: folder of the files and of their key.
+        base: what their names begin with.
+    """
+
+    def __init__(self, folder: Path, base: str) -> None:
+        self._folder, self._base = folder, base
+
+    def load(self, key: object) -> object:
+        """Returns the result of the compiler for a key, None if there is none that can be read."""
+        path = self._path(key)
+        content = read_signed(path, self._folder)
+        if content is None:
+            return None
+        try:
+            kept, data = pickle.loads(content)
+        except _UNPICKLING_ERRORS as error:
+            discard(path, f"it is of another version: {error}")
+            return None
+        if kept != key:  # types of the same name
+            return None
+        mark_used(path)
+        return data
+
+    def save(self, key: object, data: object) -> None:
+        """Writes the result of the compiler for a key; raises `OSError` if that is not possible."""
+        write_signed(self._path(key), dumps((key, data)), self._folder)
+
+    def has_any(self) -> bool:
+        """Returns whether there is a file that can be read."""
+        files = self._folder.glob(f"{self._base}.*{ENDING}")
+        return any(read_signed(path, self._folder) is not None for path in files)
+
+    def _path(self, key: object) -> Path:
+        digest = hashlib.sha256(repr(key).encode()).hexdigest()
+        return self._folder / f"{self._base}.{digest[:16]}{ENDING}"
 
 
 class ContentCache(FunctionCache):  # type: ignore[misc]  # numba has no type information
@@ -76,24 +131,12 @@ class ContentCache(FunctionCache):  # type: ignore[misc]  # numba has no type in
         return None if folder is None else str(folder)
 
     def is_empty(self) -> bool:
-        """Returns whether there is no machine code of this version of the function."""
-        return not self._is_open() or not self._index().exists()
+        """Returns whether there is no machine code of this version of the function that can be read."""
+        return not self._is_open() or not self._cache_file.has_any()
 
     def load_overload(self, sig: object, target_context: Any) -> Any:
         """Returns the machine code for a signature, None if there is none that can be read."""
-        if not self._is_open():
-            return None
-        try:
-            found = super().load_overload(sig, target_context)
-            if found is not None:
-                os.utime(self._index())
-        except (EOFError, pickle.UnpicklingError):  # a damaged file
-            with contextlib.suppress(OSError):
-                self.flush()
-            return None
-        except OSError:
-            return None
-        return found
+        return super().load_overload(sig, target_context) if self._is_open() else None
 
     def save_overload(self, sig: object, data: Any) -> None:
         """Writes the machine code for a signature, and deletes old versions of the function."""
@@ -114,28 +157,31 @@ class ContentCache(FunctionCache):  # type: ignore[misc]  # numba has no type in
             stamp = fingerprint(self._function)
             self._folder = folder
             self._base = f"{self._stem()}{stamp[:24]}.py{sys.version_info[0]}{sys.version_info[1]}"
-            self._impl = _Files(folder)
-            self._cache_file = IndexDataCacheFile(cache_path=str(folder), filename_base=self._base, source_stamp=stamp)
+            self._impl = _Impl()
+            self._cache_file = _Files(folder, self._base)
         return True
 
     def _stem(self) -> str:
         module = self._py_func.__module__.removeprefix("dorothie_gym.")
         return f"{module}.{self._py_func.__qualname__}-".replace("<", "").replace(">", "")
 
-    def _index(self) -> Path:
-        assert self._folder is not None
-        return self._folder / f"{self._base}.nbi"
-
-    def _others(self) -> Iterator[Path]:
-        assert self._folder is not None
-        for index in self._folder.glob(f"{self._stem()}*.nbi"):
-            if index.stem != self._base and time.time() - index.stat().st_mtime > KEPT:
-                yield index
-
     def _delete_others(self) -> None:
-        for index in self._others():
-            for file in [index, *index.parent.glob(f"{index.stem}.*.nbc")]:
-                file.unlink(missing_ok=True)
+        """Deletes files of other versions of the function, and parts of files, that nobody has used for `KEPT`."""
+        assert self._folder is not None
+        for file in self._folder.glob(f"{self._stem()}*"):
+            if file.suffix in (ENDING, _OLD_ENDING, PART) and not self._is_current(file):
+                with contextlib.suppress(OSError):  # another process deletes them, too
+                    if time.time() - file.lstat().st_mtime > KEPT:
+                        self._delete(file)
+
+    def _is_current(self, file: Path) -> bool:
+        return file.suffix == ENDING and file.name.startswith(f"{self._base}.")
+
+    def _delete(self, file: Path) -> None:
+        file.unlink()
+        if file.suffix == _OLD_ENDING:
+            for data in file.parent.glob(f"{file.stem}.*.nbc"):
+                data.unlink()
 
 
 def _warn_once(reason: str) -> None:

@@ -40,7 +40,7 @@ from dorothie_gym.maps.model import (
 )
 from dorothie_gym.maps.town import MAX_EXTENT, Town
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
-from dorothie_gym.user_cache import cache_folder, read_signed, write_signed
+from dorothie_gym.user_cache import cache_folder, discard, read_signed, remove, write_signed
 
 ARCHIVE_FORMAT = 1
 """Version of the archive format; raise it when the same town would be written differently."""
@@ -261,7 +261,8 @@ _log = logging.getLogger(__name__)
 def through_cache(path: Path, read: Callable[[Path], Town]) -> Town:
     """Returns the town of a file from the cache, or reads the file and adds the town to the cache.
 
-    A cache that cannot be read or written is logged at level DEBUG and otherwise ignored.
+    A damaged entry is replaced (`user_cache.read_signed`). A cache that cannot be written is logged at level DEBUG and
+    otherwise ignored.
 
     Args:
         path: source file.
@@ -343,15 +344,13 @@ def _key(compiler: str, path: Path, content: bytes) -> str:
 
 def _recall(folder: Path, key: str) -> Town | None:
     entry = folder / f"{key}.npz"
-    try:
-        data = read_signed(entry)
-        if data is None:
-            raise TownArchiveError("it was not written by this user")
-        return unpack(data, key)
-    except FileNotFoundError:
+    data = read_signed(entry)
+    if data is None:
         return None
-    except (OSError, TownArchiveError) as error:
-        _log.debug("the cached town %s cannot be used and is compiled again: %s", entry, error)
+    try:
+        return unpack(data, key)
+    except TownArchiveError as error:
+        discard(entry, str(error))
         return None
 
 
@@ -373,6 +372,6 @@ def remove_oldest(folder: Path, most: int) -> None:
     """
     entries = [entry for entry in folder.iterdir() if entry.suffix in (".npz", PART)]
     if len(entries) > most:
-        entries.sort(key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
+        entries.sort(key=lambda entry: (entry.lstat().st_mtime_ns, entry.name))
         for entry in entries[:-most]:
-            entry.unlink(missing_ok=True)
+            remove(entry)

@@ -19,7 +19,7 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import CacheError
 from dorothie_gym.recording import FORMAT_VERSION
 from dorothie_gym.rollout.corpus_generation import generate_corpus
-from dorothie_gym.user_cache import CACHE_VARIABLE, cache_folder, is_private
+from dorothie_gym.user_cache import CACHE_VARIABLE, cache_folder, is_private, is_sealed, remove, report_damage, seal
 
 SESSIONS = 20
 """Number of sessions: each fold has at least one, and the generation takes some minutes."""
@@ -36,7 +36,7 @@ def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: Env
 
     Folds and towns have the proportions of the paper. The corpus is kept in the user's cache; the name of its folder
     contains the version of the package and a hash of the settings. The folder appears when all sessions are played, so
-    that incomplete corpora are never read.
+    that incomplete corpora are never read. One with a damaged file is renamed to `NAME.damaged` and generated again.
 
     Args:
         sessions: number of sessions; `SESSIONS` if None.
@@ -49,7 +49,7 @@ def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: Env
     """
     config = CONFIG if config is None else config
     sessions = SESSIONS if sessions is None else sessions
-    key = {"format": FORMAT_VERSION, "sessions": sessions, "seed": seed, "config": config.record()}
+    key = {"sealed": True, "format": FORMAT_VERSION, "sessions": sessions, "seed": seed, "config": config.record()}
     digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:12]
     cache = cache_folder()
     if cache is None:
@@ -58,19 +58,30 @@ def default_corpus(*, sessions: int | None = None, seed: int = SEED, config: Env
             "folder that only you can write"
         )
     folder = cache / f"corpus-{__version__}-{digest}"
-    if folder.is_dir():
-        if not is_private(folder):
-            raise CacheError(f"{folder}: belongs to another user or can be written by others; remove it")
+    if not is_private(folder):
+        raise CacheError(f"{folder}: belongs to another user or can be written by others; remove it")
+    if is_sealed(folder, cache):
         return folder
     with _naming_the_variable(folder.parent):
         folder.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if folder.exists():
+            _set_aside(folder)
         part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", suffix=".part", dir=folder.parent))
         try:
             _play(part, sessions, seed, config)
+            seal(part, folder.name, cache)
             _publish(part, folder)
         finally:
             shutil.rmtree(part, ignore_errors=True)
     return folder
+
+
+def _set_aside(folder: Path) -> None:
+    """Renames a damaged corpus, because people may have annotated its sessions."""
+    aside = folder.with_name(f"{folder.name}.damaged")
+    remove(aside)
+    folder.rename(aside)
+    report_damage(folder, f"it does not fit its seal; now {aside.name}")
 
 
 def _play(folder: Path, sessions: int, seed: int, config: EnvConfig) -> None:

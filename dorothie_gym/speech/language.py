@@ -29,7 +29,7 @@ TRANSCRIPT_WEIGHT: Final = 3.0
 EXCHANGED: Final = (4, 0.25)
 """Number and weight of the copies of a transcript in which names are exchanged."""
 
-VERSION: Final = 1
+VERSION: Final = 2
 """Version of the cached files; changes with the code that makes them."""
 
 _log = logging.getLogger(__name__)
@@ -113,11 +113,7 @@ def _cached(kind: str, content: str, build: Callable[[], dict[str, str]]) -> dic
         return build()
     name = hashlib.sha256(f"{VERSION}\n{content}".encode()).hexdigest()[:32]
     path = folder / "speech" / f"{kind}-{name}"
-    try:
-        found = read_signed(path) if path.exists() else None
-    except OSError as error:
-        _log.warning("%s: cannot be read (%s); it is built again", path, error)
-        found = None
+    found = read_signed(path)
     if found is not None:
         texts: dict[str, str] = json.loads(gzip.decompress(found))
         return texts

@@ -1,4 +1,6 @@
 import importlib.util
+import os
+import random
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from dorothie_gym.baselines.encoders import (
 )
 from dorothie_gym.baselines.encoders.encoder import Vectors
 from dorothie_gym.errors import EncoderError
+from tests.cache_damage import DAMAGES
 
 SENTENCES = ("turn left at the market", "turn right at the market", "where is my house", "")
 
@@ -60,11 +63,26 @@ def test_a_table_is_made_once_and_read_then(tmp_path):
     np.testing.assert_array_equal(first, again)
 
 
-def test_damaged_table_is_computed_again(tmp_path):
-    wanted = text_table(HashingEncoder(dim=16), SENTENCES, tmp_path)
-    (kept,) = tmp_path.iterdir()
-    kept.write_bytes(kept.read_bytes()[:40])
-    np.testing.assert_array_equal(text_table(HashingEncoder(dim=16), SENTENCES, tmp_path), wanted)
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+@pytest.mark.parametrize("kind", sorted(DAMAGES))
+def test_damaged_table_is_computed_again(tmp_path, kind):
+    folder = tmp_path / "texts"
+    text_table(HashingEncoder(dim=16), SENTENCES[1:], folder)
+    others = set(folder.iterdir())
+    wanted = text_table(HashingEncoder(dim=16), SENTENCES, folder)
+    (kept,) = set(folder.iterdir()) - others
+    DAMAGES[kind](kept, random.Random(0))
+    np.testing.assert_array_equal(text_table(HashingEncoder(dim=16), SENTENCES, folder), wanted)
+    CountingEncoder.calls = 0
+    np.testing.assert_array_equal(text_table(CountingEncoder(dim=16), SENTENCES, folder), wanted)
+    assert CountingEncoder.calls == 0, "the table was written again"
+
+
+def test_cache_that_cannot_be_written_costs_time_but_no_result(tmp_path, caplog):
+    (tmp_path / "file").touch()
+    table = text_table(HashingEncoder(dim=16), SENTENCES, tmp_path / "file" / "texts")
+    np.testing.assert_array_equal(table, HashingEncoder(dim=16).encode(SENTENCES))
+    assert "cannot be written" in caplog.text
 
 
 def test_tables_of_other_texts_or_encoders_have_other_keys():

@@ -1,14 +1,19 @@
 from __future__ import annotations
 
+import os
+import random
+import shutil
 from pathlib import Path
 
 import pytest
 
+from dorothie_gym import user_cache
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import CacheError
 from dorothie_gym.recording import Corpus, load_sessions
 from dorothie_gym.rollout import corpus_cache as corpus
 from dorothie_gym.rollout import default_corpus
+from tests.cache_damage import DAMAGES
 
 SHORT = EnvConfig(max_seconds=3.0)
 
@@ -39,6 +44,35 @@ def test_other_settings_are_kept_apart(cache: Path) -> None:
     second = default_corpus(sessions=1, seed=4, config=SHORT)
     third = default_corpus(sessions=1, seed=3, config=EnvConfig(max_seconds=2.0))
     assert len({first, second, third}) == 3
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+@pytest.mark.parametrize("kind", sorted(DAMAGES))
+def test_damaged_corpus_is_set_aside_and_played_again(
+    cache: Path, kind: str, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(user_cache, "_damage_reported", False)
+    folder = default_corpus(sessions=1, seed=3, config=SHORT)
+    (before,) = load_sessions(folder)
+    (events,) = folder.rglob("events.jsonl")
+    labels = events.with_name("annotations") / "ann.jsonl"
+    labels.parent.mkdir()
+    labels.write_text("work of a person")
+    assert default_corpus(sessions=1, seed=3, config=SHORT) == folder and labels.exists(), "other files are no damage"
+    DAMAGES[kind](events, random.Random(0))
+    assert default_corpus(sessions=1, seed=3, config=SHORT) == folder
+    (after,) = load_sessions(folder)
+    assert after.digest == before.digest and not labels.exists()
+    aside = folder.with_name(f"{folder.name}.damaged")
+    assert (aside / labels.relative_to(folder)).read_text() == "work of a person"
+    assert f"now {aside.name}" in caplog.text
+
+
+def test_file_in_the_place_of_the_corpus_is_set_aside(cache: Path) -> None:
+    folder = default_corpus(sessions=1, seed=3, config=SHORT)
+    shutil.rmtree(folder)
+    folder.write_text("no folder")
+    assert len(load_sessions(default_corpus(sessions=1, seed=3, config=SHORT))) == 1
 
 
 def test_an_interrupted_corpus_leaves_nothing(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import io
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,12 +14,12 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.files import replacing
-from dorothie_gym.input_files import ARRAY_ERRORS
-from dorothie_gym.user_cache import is_private, make_private
+from dorothie_gym.user_cache import read_signed, write_signed
 
 if TYPE_CHECKING:
     from sklearn.feature_extraction.text import HashingVectorizer
+
+_log = logging.getLogger(__name__)
 
 Vectors: TypeAlias = NDArray[np.float32]
 
@@ -62,20 +64,21 @@ def text_table(encoder: TextEncoder, texts: Sequence[str], cache: Path | None = 
     Args:
         encoder: the encoder.
         texts: of a corpus, each once.
-        cache: folder to keep them in; None for no cache.
-
-    Raises:
-        OSError: the cache cannot be written.
+        cache: folder of the user's cache folder to keep them in; None for no cache.
     """
     if cache is None:
         return encoder.encode(texts)
     path = cache / f"{table_key(encoder.id, texts)}.npy"
-    if path.is_file() and is_private(cache) and is_private(path):
-        kept = _read(path, (len(texts), encoder.dim))
-        if kept is not None:
-            return kept
+    kept = _read(path, (len(texts), encoder.dim))
+    if kept is not None:
+        return kept
     table = encoder.encode(texts)
-    _write(path, table)
+    buffer = io.BytesIO()
+    np.save(buffer, table, allow_pickle=False)
+    try:
+        write_signed(path, buffer.getvalue())
+    except OSError as error:
+        _log.warning("%s: cannot be written (%s); the vectors are computed again the next time", path, error)
     return table
 
 
@@ -89,22 +92,12 @@ def table_key(encoder_id: str, texts: Sequence[str]) -> str:
 
 
 def _read(path: Path, shape: tuple[int, int]) -> Vectors | None:
-    """Returns a cached table; None if the file is damaged."""
-    try:
-        mapped = np.load(path, mmap_mode="r", allow_pickle=False)  # a header cannot state more than the file holds
-    except ARRAY_ERRORS:
+    """Returns a cached table; None if there is none of this shape."""
+    content = read_signed(path)
+    if content is None:
         return None
-    if mapped.shape != shape or mapped.dtype != np.float32 or not np.all(np.isfinite(mapped)):
-        return None
-    return np.array(mapped)
-
-
-def _write(path: Path, table: Vectors) -> None:
-    """Writes a table atomically; two processes may write the same one at once."""
-    make_private(path.parent)
-    with replacing(path, shared=True) as part, part.open("wb") as file:
-        part.chmod(0o600)
-        np.save(file, table, allow_pickle=False)
+    table: Vectors = np.load(io.BytesIO(content), allow_pickle=False)
+    return table if table.shape == shape and table.dtype == np.float32 else None
 
 
 # --- Hashed n-grams ---------------------------------------------------------------------------------------------------

@@ -1,8 +1,8 @@
 """Labelled pictures of the recorded sessions of a corpus, drawn once and kept in the user's cache.
 
 An entry of the cache is a folder of memory-mapped `.npy` files for one session. Its name is a hash of everything that
-determines its content: the session, its town, the sampling, and the source of the renderer. The least recently used
-entries are removed beyond `MOST_BYTES`.
+determines its content: the session, its town, the sampling, and the source of the renderer. Entries are sealed; damaged
+ones are drawn again. The least recently used entries are removed beyond `MOST_BYTES`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,16 @@ from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import Sensor, parse_sensor
 from dorothie_gym.recording import FRAME_RATE, Corpus, CorpusEntry, EventType, Session
 from dorothie_gym.rollout.processes import run_tasks
-from dorothie_gym.user_cache import cache_folder, is_private, mark_used, remove_least_used
+from dorothie_gym.user_cache import (
+    cache_folder,
+    discard,
+    is_sealed,
+    make_private,
+    mark_used,
+    remove,
+    remove_least_used,
+    seal,
+)
 
 OnFrames: TypeAlias = Callable[[int, int], None]
 """Called with the numbers of finished and of all sessions."""
@@ -296,16 +305,17 @@ def load_frames(
         cache = cache_folder()
         if cache is None:
             raise SessionError("pictures for training need the user's cache: set DOROTHIE_GYM_CACHE to a folder")
-        folder = cache / "frames"
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        folder, keys = cache / "frames", cache
+        make_private(folder)
+    else:
+        keys = folder
+        folder.mkdir(parents=True, exist_ok=True)
     entries = [entry for entry in corpus.entries if entry.fold is not None]
-    tasks = [(number, entry, sampling, folder) for number, entry in enumerate(entries)]
+    tasks = [(number, entry, sampling, folder, keys) for number, entry in enumerate(entries)]
     found: dict[int, SessionFrames] = {}
     on_session(0, len(tasks))
     for number, path, name, town in run_tasks(_prepare, tasks, workers=max(min(workers, len(tasks)), 1)):
-        session = _recall(path, name, town, sampling)
-        assert session is not None  # just written, or checked
-        found[number] = session
+        found[number] = _mapped(path, name, town)
         on_session(len(found), len(tasks))
     if bounded:
         remove_least_used(folder, MOST_BYTES, {session.key for session in found.values()})
@@ -315,7 +325,7 @@ def load_frames(
     return {fold: FrameSet(sessions) for fold, sessions in folds.items()}
 
 
-_Task: TypeAlias = tuple[int, CorpusEntry, FrameSampling, Path]
+_Task: TypeAlias = tuple[int, CorpusEntry, FrameSampling, Path, Path]
 _Drawn: TypeAlias = tuple[int, Path, str, str]
 
 
@@ -325,21 +335,26 @@ def _prepare() -> Callable[[_Task], _Drawn]:
 
 def _draw(task: _Task) -> _Drawn:
     """Draws the pictures of a session unless they are kept; returns number, folder, name and town."""
-    number, entry, sampling, folder = task
+    number, entry, sampling, folder, keys = task
     session = entry.load()
     town = find_town(session.header.town, entry.maps)
     if town is None:
         raise SessionError(f"{session.name}: its town {session.header.town} is unknown; give its map")
     key = hashlib.sha256(f"{_builder_digest()} {session.digest} {sampling}\n".encode() + pack(town, "")).hexdigest()
     target = folder / key
-    if _recall(target, session.name, town.name, sampling) is None:
+    if not is_sealed(target, keys):
+        if target.exists():
+            discard(target, "it does not fit its seal")
         pictures = RecordedPictures(session, town, sampling.camera)
-        _write(target, pictures, sampling.choose(session, town), sampling)
+        _write(target, pictures, sampling.choose(session, town), sampling, keys)
+    mark_used(target)
     return number, target, session.name, town.name
 
 
-def _write(target: Path, pictures: RecordedPictures, frames: NDArray[np.int64], sampling: FrameSampling) -> None:
-    """Draws pictures into a new folder, which gets its name when it is whole."""
+def _write(
+    target: Path, pictures: RecordedPictures, frames: NDArray[np.int64], sampling: FrameSampling, keys: Path
+) -> None:
+    """Draws pictures into a new folder, which gets its name, and a seal by the key in `keys`, when it is whole."""
     size = len(frames), sampling.height, sampling.width
     part = Path(tempfile.mkdtemp(prefix=f"{target.name[:16]}.", suffix=PART, dir=target.parent))
     try:
@@ -354,8 +369,8 @@ def _write(target: Path, pictures: RecordedPictures, frames: NDArray[np.int64], 
         del rgb, semantic, depth  # writes them
         np.save(part / "boxes.npy", np.concatenate(boxes), allow_pickle=False)
         np.save(part / "frames.npy", frames, allow_pickle=False)
-        if target.exists():  # damaged, or of a process that was faster
-            shutil.rmtree(target)
+        seal(part, target.name, keys)
+        remove(target)  # of a process that was faster
         part.rename(target)
     finally:
         shutil.rmtree(part, ignore_errors=True)
@@ -389,27 +404,12 @@ def _boxes(number: int, drawn: CameraFrame, solid: SolidBoxes, heading: float) -
     return rows
 
 
-def _recall(path: Path, name: str, town: str, sampling: FrameSampling) -> SessionFrames | None:
-    """Returns the pictures in a folder; None if they are missing, damaged, or not this user's."""
-    if not path.is_dir() or not is_private(path):
-        return None
-    try:
-        rgb, semantic, depth = (
-            np.load(path / f"{part}.npy", mmap_mode="r", allow_pickle=False) for part in ("rgb", "semantic", "depth")
-        )
-        boxes, frames = (np.load(path / f"{part}.npy", allow_pickle=False) for part in ("boxes", "frames"))
-    except (OSError, ValueError, EOFError):
-        return None
-    size = len(frames), sampling.height, sampling.width
-    whole = (
-        (rgb.shape, rgb.dtype) == ((*size, 3), np.uint8)
-        and (semantic.shape, semantic.dtype) == (size, np.uint8)
-        and (depth.shape, depth.dtype) == (size, np.float16)
-        and (boxes.dtype, frames.dtype) == (BOX_DTYPE, np.int64)
+def _mapped(path: Path, name: str, town: str) -> SessionFrames:
+    """Returns the pictures in a folder."""
+    rgb, semantic, depth = (
+        np.load(path / f"{part}.npy", mmap_mode="r", allow_pickle=False) for part in ("rgb", "semantic", "depth")
     )
-    if not whole:
-        return None
-    mark_used(path)
+    boxes, frames = (np.load(path / f"{part}.npy", allow_pickle=False) for part in ("boxes", "frames"))
     return SessionFrames(name, town, path.name, rgb, semantic, depth, boxes, frames)
 
 

@@ -1,18 +1,17 @@
 """Columns of all sessions of a corpus, kept in the user's cache.
 
 An entry of the cache is a folder of memory-mapped `.npy` files, and `columns.json` with all other values and a checksum
-of each file. Its name is a hash of everything that determines its content. A damaged entry is built again and replaced;
-the checksums guard against accidents, not against attackers with access to the cache folder.
+of each file. Its name is a hash of everything that determines its content. A damaged entry is built again and replaced.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import hashlib
 import json
 import logging
-import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,13 +29,22 @@ from dorothie_gym.benchmark.features.session_columns import SessionColumns, extr
 from dorothie_gym.benchmark.features.sight import Sight, seen_by
 from dorothie_gym.errors import FeatureStoreError, SessionError, TownError, one_line
 from dorothie_gym.files import PART
-from dorothie_gym.input_files import ARRAY_ERRORS, MIB, checked, parse_json, raising, read_text
+from dorothie_gym.input_files import ARRAY_ERRORS, MIB, checked, parse_json, raising, read_file, read_text
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.cache import compiler_digest
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import FOLDS, Corpus, CorpusEntry, Fold, Session
 from dorothie_gym.recording.file_names import ACTIONS_FILE
-from dorothie_gym.user_cache import cache_folder, is_private, is_signed, make_private, sign
+from dorothie_gym.user_cache import (
+    cache_folder,
+    discard,
+    is_private,
+    is_signed,
+    make_private,
+    mark_used,
+    remove,
+    sign,
+)
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -280,19 +288,24 @@ def recall(key: str) -> Columns | None:
     folder = features_folder()
     if folder is None:
         return None
+    entry = folder / key
+    if not entry.exists() or not is_private(entry):
+        return None
     try:
-        index = (folder / key / INDEX_FILE).read_bytes()
-        signature = (folder / key / SIGNATURE_FILE).read_bytes()
-        if not is_private(folder / key) or not is_signed(index, signature, folder.parent):
-            raise FeatureStoreError(f"{folder / key}: was not written by this user")
-        columns = read_columns(folder / key)
-        os.utime(folder / key)
-    except FileNotFoundError:
-        return None
+        _check_signature(entry, folder.parent)
+        columns = read_columns(entry)
     except (OSError, FeatureStoreError) as error:
-        _log.debug("the cached features %s cannot be read and are built again: %s", folder / key, error)
+        discard(entry, str(error))
         return None
-    return columns if columns.key == key else None
+    mark_used(entry)
+    return columns
+
+
+def _check_signature(entry: Path, keys: Path) -> None:
+    with raising(FeatureStoreError):
+        index, signature = (read_file(entry / name, MAX_INDEX) for name in (INDEX_FILE, SIGNATURE_FILE))
+    if not is_signed(index, signature, keys, entry.name):
+        raise FeatureStoreError("its signature is wrong")
 
 
 def keep(columns: Columns) -> None:
@@ -305,7 +318,8 @@ def keep(columns: Columns) -> None:
         part = Path(tempfile.mkdtemp(prefix=f"{columns.key[:16]}.", suffix=PART, dir=folder))
         try:
             write_columns(columns, part)
-            (part / SIGNATURE_FILE).write_bytes(sign((part / INDEX_FILE).read_bytes(), folder.parent))
+            signature = sign((part / INDEX_FILE).read_bytes(), folder.parent, columns.key)
+            (part / SIGNATURE_FILE).write_bytes(signature)
             _publish(part, folder / columns.key)
         finally:
             shutil.rmtree(part, ignore_errors=True)
@@ -320,7 +334,7 @@ def _publish(part: Path, target: Path) -> None:
         part.rename(target)
     except OSError:
         if recall(target.name) is None:  # the existing entry is damaged
-            shutil.rmtree(target)
+            remove(target)
             part.rename(target)
 
 
@@ -433,6 +447,7 @@ def _digest(path: Path) -> str:
 
 def _prune(folder: Path) -> None:
     """Removes the least recently used entries beyond `MOST_ENTRIES`."""
-    entries = sorted(folder.iterdir(), key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
+    entries = sorted(folder.iterdir(), key=lambda entry: (entry.lstat().st_mtime_ns, entry.name))
     for entry in entries[:-MOST_ENTRIES]:
-        shutil.rmtree(entry, ignore_errors=True)
+        with contextlib.suppress(OSError):  # another process removes entries, too
+            remove(entry)

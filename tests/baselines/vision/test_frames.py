@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import random
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,8 @@ from dorothie_gym.recording import Corpus, EventType, Session
 from dorothie_gym.recording.events import Event
 from dorothie_gym.rollout import generate_corpus
 from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.user_cache import SEAL_FILE
+from tests.cache_damage import DAMAGES
 
 SMALL = FrameSampling(width=96, height=64, spacing=6.0, wait=3.0, most=5)
 
@@ -119,13 +122,17 @@ def test_pictures_are_drawn_once_and_equal_in_other_processes(corpus, tmp_path, 
     assert np.array_equal(again.take([1]).rgb, here.take([1]).rgb)
 
 
-def test_damaged_pictures_are_drawn_again(corpus, tmp_path):
-    before = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path)["train"]
-    damaged = tmp_path / before.sessions[0].key / "depth.npy"
-    content = np.array(before.sessions[0].depth)
-    damaged.write_bytes(b"nothing")
-    after = load_frames(Corpus.load(corpus), SMALL, folder=tmp_path)["train"]
-    assert np.array_equal(after.sessions[0].depth, content)
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+@pytest.mark.parametrize("file", ["depth.npy", "boxes.npy", SEAL_FILE])
+@pytest.mark.parametrize("kind", sorted(DAMAGES))
+def test_damaged_pictures_are_drawn_again(corpus, tmp_path, kind, file):
+    sampling = replace(SMALL, most=1)
+    before = load_frames(Corpus.load(corpus), sampling, folder=tmp_path)["train"]
+    first = before.sessions[0]
+    depth, boxes = np.array(first.depth), np.array(first.boxes)
+    DAMAGES[kind](tmp_path / first.key / file, random.Random(0))
+    after = load_frames(Corpus.load(corpus), sampling, folder=tmp_path)["train"]
+    assert np.array_equal(after.sessions[0].depth, depth) and np.array_equal(after.sessions[0].boxes, boxes)
 
 
 def test_pictures_with_objects_only(corpus, tmp_path):

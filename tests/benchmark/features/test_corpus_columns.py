@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import os
+import random
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +10,16 @@ import pytest
 
 from dorothie_gym.benchmark.features import build
 from dorothie_gym.benchmark.features import corpus_columns as building
-from dorothie_gym.benchmark.features.corpus_columns import INDEX_FILE, features_folder, keep, read_columns
+from dorothie_gym.benchmark.features.corpus_columns import (
+    INDEX_FILE,
+    SIGNATURE_FILE,
+    features_folder,
+    keep,
+    read_columns,
+)
 from dorothie_gym.errors import FeatureStoreError, SessionError
 from tests.benchmark.features.test_layouts import assert_same
+from tests.cache_damage import DAMAGES
 from tests.recording.builders import write
 from tests.recording.dialogues import talk
 
@@ -87,6 +97,35 @@ def test_damaged_entries_are_built_again(corpus: Path, name: str, damage: str) -
             read_columns(entry())
     assert_same(first, build(corpus))
     assert_same(first, read_columns(entry()))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+@pytest.mark.parametrize("kind", sorted(DAMAGES))
+@pytest.mark.parametrize("name", ["moves.slots.npy", INDEX_FILE, SIGNATURE_FILE])
+def test_entry_with_any_damage_is_replaced(corpus: Path, name: str, kind: str) -> None:
+    first = build(corpus)
+    DAMAGES[kind](entry() / name, random.Random(0))
+    assert_same(first, build(corpus))
+    assert_same(first, read_columns(entry()))
+
+
+def test_file_in_the_place_of_an_entry_is_replaced(corpus: Path) -> None:
+    first, place = build(corpus), entry()
+    shutil.rmtree(place)
+    place.write_bytes(b"no folder")
+    assert_same(first, build(corpus))
+    assert_same(first, read_columns(entry()))
+
+
+def test_whole_entry_of_another_corpus_is_not_read(corpus: Path) -> None:
+    build(corpus)
+    stranger = entry().rename(corpus.parent / "stranger")
+    events = corpus / "train" / "a" / "events.jsonl"
+    events.write_text(events.read_text().replace("turning left.", "turning right."))
+    expected = build(corpus)
+    shutil.rmtree(entry())
+    stranger.rename(features_folder() / expected.key)
+    assert_same(build(corpus), expected)
 
 
 def test_the_faster_of_two_processes_wins(corpus: Path) -> None:
