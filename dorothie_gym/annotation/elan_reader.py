@@ -1,4 +1,8 @@
-"""Reader of annotations in ELAN files with the tiers of `elan_writer`, also if people have edited them in ELAN."""
+"""Reader of annotations in ELAN files with the tiers of `elan_writer`, also if people have edited them in ELAN.
+
+The order of annotations and tiers in such a file has no meaning: utterances follow each other by their times, spans by
+their references to each other.
+"""
 
 from __future__ import annotations
 
@@ -23,17 +27,27 @@ MAX_ELEMENTS: Final = 500_000
 """Most elements of a file; each takes some 200 bytes of memory."""
 
 _NUMBER: Final = re.compile(r"\d{1,8}", re.ASCII)
+_TIME: Final = re.compile(r"\d{1,12}", re.ASCII)
 _Label = TypeVar("_Label")
 
 
 @dataclass(frozen=True)
 class _Noted:
-    """Annotation of a tier: its name, its value, the annotation that it belongs to, and the one before it."""
+    """Annotation of a tier.
+
+    Attributes:
+        name: its id.
+        value: its text.
+        of: annotation that it belongs to.
+        before: annotation before it.
+        slots: names of the times at which it begins and ends.
+    """
 
     name: str
     value: str
     of: str | None
     before: str | None
+    slots: tuple[str | None, str | None]
 
 
 def read_elan(path: Path, text: SourceText) -> Annotation:
@@ -62,7 +76,11 @@ class _Reader:
     def __init__(self, path: Path) -> None:
         self._path = path
         root = self._root()
-        self._tiers = {str(tier.get("TIER_ID")): tier for tier in root.iterfind("TIER")}
+        self._times = self._read_times(root)
+        self._tiers: dict[str, Element] = {}
+        for tier in root.iterfind("TIER"):
+            if self._tiers.setdefault(str(tier.get("TIER_ID")), tier) is not tier:
+                self._fail(f"has two tiers {str(tier.get('TIER_ID'))[:60]!r}")
         self.exchanges: dict[int, ExchangeMark] = {}
         self.transactions: dict[int, TransactionMark] = {}
 
@@ -82,10 +100,21 @@ class _Reader:
             self._fail("is not an ELAN file; its outermost element must be ANNOTATION_DOCUMENT")
         return root
 
+    def _read_times(self, root: Element) -> dict[str, tuple[int, int]]:
+        """Returns the times of a file by name: [ms], and the place in the list, which orders slots without a time."""
+        found, latest = dict[str, tuple[int, int]](), 0
+        for place, slot in enumerate(root.iterfind("TIME_ORDER/TIME_SLOT")):
+            name, value = str(slot.get("TIME_SLOT_ID")), slot.get("TIME_VALUE")
+            if value is not None and not _TIME.fullmatch(value):
+                self._fail(f"time slot {name[:60]!r} has the time {value[:60]!r}; it must be a number [ms]")
+            latest = latest if value is None else int(value)
+            found[name] = latest, place
+        return found
+
     def read(self, speaker: Role, text: SourceText) -> dict[UtteranceId, tuple[SpanMark, ...]]:
         """Returns the spans of the utterances of a speaker."""
         lines = [line for line in text.lines if line.id.speaker is speaker]
-        utterances = self._tier(speaker.value)
+        utterances = sorted(self._tier(speaker.value), key=self._span_of_time)
         if len(utterances) != len(lines):
             self._fail(
                 f"tier {speaker.value!r} has {len(utterances)} utterances, and session {text.session} has {len(lines)}"
@@ -103,7 +132,7 @@ class _Reader:
         return found
 
     def _tier(self, name: str) -> list[_Noted]:
-        """Returns the annotations of a tier, in the order of the file."""
+        """Returns the annotations of a tier, in no order."""
         tier = self._tiers.get(name)
         if tier is None:
             self._fail(f"has no tier {name!r}")
@@ -112,8 +141,16 @@ class _Reader:
             value, id = one.findtext("ANNOTATION_VALUE") or "", one.get("ANNOTATION_ID")
             if id is None:
                 self._fail(f"tier {name!r} has an annotation without ANNOTATION_ID")
-            found.append(_Noted(id, value, one.get("ANNOTATION_REF"), one.get("PREVIOUS_ANNOTATION")))
+            slots = one.get("TIME_SLOT_REF1"), one.get("TIME_SLOT_REF2")
+            found.append(_Noted(id, value, one.get("ANNOTATION_REF"), one.get("PREVIOUS_ANNOTATION"), slots))
         return found
+
+    def _span_of_time(self, utterance: _Noted) -> tuple[int, ...]:
+        """Returns what orders utterances: start and end [ms], and their places in the list of times."""
+        found = [self._times[slot] for slot in utterance.slots if slot in self._times]
+        if len(found) != len(utterance.slots):
+            self._fail(f"annotation {utterance.name} has no start or end (TIME_SLOT_REF1, TIME_SLOT_REF2)")
+        return (*(time for time, _ in found), *(place for _, place in found))
 
     def _children(self, name: str) -> dict[str, list[_Noted]]:
         """Returns the annotations of a tier, by the annotation that they belong to."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 import io
 import wave
 from math import gcd
@@ -110,14 +111,40 @@ def to_pcm(samples: Samples) -> NDArray[np.int16]:
 
 
 def encode_flac(samples: Samples, sample_rate: int = SAMPLE_RATE) -> bytes:
-    """Returns audio as a FLAC file of 16 bits; equal samples give equal bytes.
+    """Returns audio as a FLAC file of 16 bits; equal samples give equal bytes. No samples give a file without frames.
 
     Raises:
         SpeechError: the extra `speech` is not installed.
     """
-    buffer = io.BytesIO()
-    _soundfile().write(buffer, to_pcm(samples), sample_rate, format="FLAC", subtype="PCM_16")
-    return buffer.getvalue()
+    buffer, pcm = io.BytesIO(), to_pcm(samples)
+    _soundfile().write(buffer, pcm if len(pcm) else np.zeros(1, np.int16), sample_rate, format="FLAC", subtype="PCM_16")
+    return buffer.getvalue() if len(pcm) else _without_frames(buffer.getvalue())
+
+
+_STREAM_INFO: Final = 42
+"""Size of the marker of FLAC and of its first block, with the header of the block [bytes] (RFC 9639, section 8.2)."""
+
+
+def _without_frames(flac: bytes) -> bytes:
+    """Returns a FLAC file of the same rate without samples, which libsndfile does not write: its first block only."""
+    info = bytearray(flac[:_STREAM_INFO])
+    info[4] |= 0x80  # the last block
+    info[12:18] = bytes(6)  # no smallest and largest frame
+    info[21] &= 0xF0
+    info[22:26] = bytes(4)  # number of samples, 36 bits
+    info[26:] = hashlib.md5(b"", usedforsecurity=False).digest()  # of the samples
+    return bytes(info)
+
+
+def _has_no_frames(content: bytes) -> bool:
+    """Returns whether a FLAC file states no number of samples and ends behind its last block of metadata."""
+    if content[:4] != b"fLaC" or len(content) < _STREAM_INFO or content[21] & 0x0F or any(content[22:26]):
+        return False
+    place, last = 4, False
+    while not last and place + 4 <= len(content):
+        last = bool(content[place] & 0x80)
+        place += 4 + int.from_bytes(content[place + 1 : place + 4], "big")
+    return last and place == len(content)
 
 
 def encode_wav(samples: Samples, sample_rate: int = SAMPLE_RATE) -> bytes:
@@ -132,7 +159,7 @@ def encode_wav(samples: Samples, sample_rate: int = SAMPLE_RATE) -> bytes:
 
 
 def read_audio(path: Path | str, sample_rate: int = SAMPLE_RATE) -> Samples:
-    """Returns the audio of a FLAC or WAV file at a rate; several channels are averaged.
+    """Returns the audio of a FLAC or WAV file at a rate; several channels are averaged, and a file may be empty.
 
     Args:
         path: the file.
@@ -148,8 +175,12 @@ def read_audio(path: Path | str, sample_rate: int = SAMPLE_RATE) -> Samples:
             content = read_file(path, _LARGEST_FILE)
     except OSError as error:
         raise AudioError(f"{path}: cannot be read: {error.strerror}") from error
+    if _has_no_frames(content):  # libsndfile takes it for a stream of unknown length
+        return np.zeros(0, np.float32)
     try:
         with soundfile.SoundFile(io.BytesIO(content)) as file:
+            if not file.frames:
+                return np.zeros(0, np.float32)
             if file.frames > LONGEST * file.samplerate:
                 raise AudioError(
                     f"{path}: is {file.frames / file.samplerate:.0f} s long; at most {LONGEST:.0f} s are read at once"

@@ -145,6 +145,10 @@ def test_another_program_reads_the_elan_file(tmp_path: Path) -> None:
         ('TIER_ID="co_wizard moves"', 'TIER_ID="x"', "has no tier 'co_wizard moves'"),
         ("<ANNOTATION_VALUE>Great.</ANNOTATION_VALUE>", "<ANNOTATION_VALUE>Bad.</ANNOTATION_VALUE>", "'Bad.'"),
         ('PREVIOUS_ANNOTATION="', 'PREVIOUS_ANNOTATION="z', "order of the spans"),
+        ('TIME_SLOT_ID="ts3"', 'TIME_SLOT_ID="x"', "has no start or end (TIME_SLOT_REF1, TIME_SLOT_REF2)"),
+        ('TIME_SLOT_REF2="', 'REF2="', "has no start or end (TIME_SLOT_REF1, TIME_SLOT_REF2)"),
+        ('TIME_VALUE="3000"', 'TIME_VALUE="3 s"', "has the time '3 s'; it must be a number [ms]"),
+        ('TIER_ID="co_wizard moves"', 'TIER_ID="co_wizard slots"', "has two tiers 'co_wizard slots'"),
         ("moves\" PARTICIPANT", "moves\" X=\"&a;\" PARTICIPANT", "is not XML"),
     ],
 )  # fmt: skip
@@ -156,6 +160,53 @@ def test_elan_files_that_do_not_fit_are_one_error(old: str, new: str, wanted: st
     with pytest.raises(AnnotationError) as refused:
         import_annotation(one, path)
     assert wanted in str(refused.value) and "one.eaf" in str(refused.value)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_order_of_elements_has_no_meaning(seed: int, tmp_path: Path) -> None:
+    one, annotation, path = eaf(tmp_path)
+    drawn, tree = random.Random(seed), etree.parse(str(path))
+    shuffled = [tree.getroot(), tree.find("TIME_ORDER"), *tree.findall("TIER")]
+    for parent in shuffled if seed else reversed(shuffled):
+        parts = list(parent)
+        drawn.shuffle(parts)
+        parent[:] = parts if seed else list(reversed(parent))
+    tree.write(str(path), encoding="UTF-8", xml_declaration=True)
+    assert import_annotation(one, path) == annotation
+
+
+def test_times_decide_even_if_names_and_references_are_in_another_order(tmp_path: Path) -> None:
+    one, annotation, path = eaf(tmp_path)
+    tree = etree.parse(str(path))
+    names = [*tree.iter("ALIGNABLE_ANNOTATION"), *tree.iter("REF_ANNOTATION")]
+    new = {str(each.get("ANNOTATION_ID")): f"z{len(names) - number}" for number, each in enumerate(names)}
+    for each in names:
+        for reference in ("ANNOTATION_ID", "ANNOTATION_REF", "PREVIOUS_ANNOTATION"):
+            if each.get(reference):
+                each.set(reference, new[str(each.get(reference))])
+    tree.write(str(path), encoding="UTF-8", xml_declaration=True)
+    assert import_annotation(one, path) == annotation
+
+
+def test_times_that_are_not_given_follow_their_list(tmp_path: Path) -> None:
+    one, annotation, path = eaf(tmp_path)
+    tree = etree.parse(str(path))
+    for number, slot in enumerate(tree.iter("TIME_SLOT")):
+        if number % 3:
+            del slot.attrib["TIME_VALUE"]
+    tree.write(str(path), encoding="UTF-8", xml_declaration=True)
+    assert import_annotation(one, path) == annotation
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_order_of_lines_has_no_meaning(seed: int, tmp_path: Path) -> None:
+    one, text = recorded(tmp_path / "s")
+    annotation = random_annotation(text, random.Random(seed), complete=True)
+    path = export_annotation(one, annotation, "anna", tmp_path / "one.jsonl", Format.JSONL)
+    head, *lines = path.read_text(encoding="utf-8").splitlines()
+    random.Random(seed).shuffle(lines)
+    path.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+    assert import_annotation(one, path) == annotation
 
 
 def test_files_of_another_session_are_refused(tmp_path: Path) -> None:

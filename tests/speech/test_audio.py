@@ -1,12 +1,13 @@
 """Audio: checks, sample rates and files."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import soundfile
 
-from dorothie_gym.speech import AudioError, checked_samples, encode_flac, read_audio, resample
+from dorothie_gym.speech import AudioError, checked_samples, encode_flac, encode_wav, read_audio, resample
 from dorothie_gym.speech.audio import trimmed
 
 
@@ -46,6 +47,36 @@ def test_stereo_integers_are_averaged_at_full_scale() -> None:
 def test_unusable_audio_is_refused(samples: np.ndarray, rate: int, message: str) -> None:
     with pytest.raises(AudioError, match=message):
         checked_samples(samples, rate)
+
+
+@pytest.mark.parametrize("rate", [8000, 16000, 44100, 96000])
+@pytest.mark.parametrize("encode", [encode_flac, encode_wav])
+def test_no_samples_are_a_file_that_is_read(encode: Callable[..., bytes], rate: int, tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(encode(np.zeros(0, np.float32), rate))
+    assert path.stat().st_size == {encode_flac: 42, encode_wav: 44}[encode]
+    found = read_audio(path)
+    assert (found.shape, found.dtype) == ((0,), np.float32)
+
+
+def test_flac_without_samples_states_its_rate_and_the_hash_of_nothing() -> None:
+    content = encode_flac(np.zeros(0, np.float32), 44100)
+    bits = int.from_bytes(content[18:26], "big")
+    assert content[:8] == b"fLaC\x80\x00\x00\x22"
+    assert (bits >> 44, (bits >> 41 & 7) + 1, (bits >> 36 & 31) + 1, bits & (1 << 36) - 1) == (44100, 1, 16, 0)
+    assert content[26:].hex() == "d41d8cd98f00b204e9800998ecf8427e"
+
+
+def test_flac_that_was_cut_behind_its_metadata_is_damaged_not_empty(tmp_path: Path) -> None:
+    whole, path = encode_flac(tone(0.3, 16000)), tmp_path / "a.flac"
+    end, last = 4, False
+    while not last:
+        last = bool(whole[end] & 0x80)
+        end += 4 + int.from_bytes(whole[end + 1 : end + 4], "big")
+    for cut in (end, 42):
+        path.write_bytes(whole[:cut])
+        with pytest.raises(AudioError, match=r"a\.flac"):
+            read_audio(path)
 
 
 def test_damaged_missing_and_long_files_are_refused(tmp_path: Path) -> None:

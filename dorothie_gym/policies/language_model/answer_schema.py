@@ -56,7 +56,7 @@ class ChoiceField:
 
 @dataclass(frozen=True, kw_only=True)
 class WordsField:
-    """Field of free words; longer texts are cut after a whole word."""
+    """Field of free words; longer texts are cut after a whole word, or within a word that is longer than the field."""
 
     name: str
     length: int
@@ -77,8 +77,11 @@ class WordsField:
             return ""
         if not isinstance(value, str):
             raise CallError(Fault.WRONG_SCHEMA, f"{self.name} is {short_repr(value)}; it must be a text")
-        words = plain_text(" ".join(value.split()), MAX_ANSWER)
-        return words if len(words) <= self.length else words[: self.length + 1].rpartition(" ")[0][: self.length]
+        words = " ".join(plain_text(" ".join(value.split()), MAX_ANSWER).split())
+        if len(words) <= self.length:
+            return words
+        whole = words[: self.length + 1].rpartition(" ")[0]
+        return whole or words[: self.length]
 
 
 AnswerField = ChoiceField | WordsField

@@ -20,7 +20,7 @@ from dorothie_gym.policies.language_model.cassette import Reply
 from dorothie_gym.policies.language_model.faults import CallError
 from dorothie_gym.policies.language_model.language_model import LanguageModel, Prompt
 from dorothie_gym.policies.policy import policy_inputs, policy_seed
-from dorothie_gym.spaces import action_space
+from dorothie_gym.spaces import action_space, plain_text
 from tests.policies.language_model.sessions import NOWHERE
 from tests.policies.language_model.simple_readers import Dice
 
@@ -92,6 +92,29 @@ def test_answer_of_the_schema_is_read_with_words_that_can_be_spoken(words: str, 
 
 def test_words_are_cut_after_a_whole_word() -> None:
     assert SCHEMA.read('{"say": "I am going to turn left soon"}') == {"drive": "none", "say": "I am going to turn"}
+
+
+@pytest.mark.parametrize(
+    ("text", "cut"),
+    [
+        ("Wolframsbruckenstrasse", "Wolframsbruckenstras"),
+        ("Wolframsbruckenstrasse is the place", "Wolframsbruckenstras"),
+        ("exactly-twenty-charac", "exactly-twenty-chara"),
+        ("twenty-characters-xx and more", "twenty-characters-xx"),
+        ("\U0001f600 Wolframsbruckenstrasse", "Wolframsbruckenstras"),
+        ("a \U0001f600 b", "a b"),
+    ],
+)
+def test_word_that_is_longer_than_the_field_is_cut_not_lost(text: str, cut: str) -> None:
+    assert SCHEMA.read(json.dumps({"say": text}))["say"] == cut
+
+
+@given(st.text(st.sampled_from("ab ,\u00e9\U0001f600\n"), max_size=60))
+def test_words_are_the_beginning_of_what_was_said(text: str) -> None:
+    read = SCHEMA.read(json.dumps({"say": text}))["say"]
+    spoken = " ".join(plain_text(" ".join(text.split()), 1000).split())
+    assert spoken.startswith(read) and read == read.strip() and bool(read) == bool(spoken)
+    assert len(read) == len(spoken) <= 20 or (len(spoken) > 20 and (spoken[len(read)] == " " or len(read) == 20))
 
 
 @given(st.text(max_size=40) | st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=5),
