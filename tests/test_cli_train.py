@@ -18,18 +18,21 @@ runner = CliRunner()
     ("arguments", "message"),
     [
         (["train", "gpt"], "there is no model 'gpt'; choose from toto, toto-belief"),
+        (["train", "bert"], "there is no model 'bert': it is called 'text', which says what it is"),
+        (["train", "detector-boxes"], "it is called 'objects-boxes'"),
+        (["table", "--models", "toto,E.T."], "there is no model 'E.T.': it is called 'toto-episodic'"),
         (["train", "hubert"], "no audio"),
         (["table", "--models", "toto,gpt"], "there is no model 'gpt'"),
-        (["train", "bert", "--device", "cpu"], "--device is for segformer and detr only"),
+        (["train", "text", "--device", "cpu"], "--device is for segformer and detr only"),
         (["train", "segformer", "--inputs", "true"], "--inputs is for detr only"),
         (["train", "segformer", "--config", "huge"], "there is no config 'huge'; choose from small, paper"),
         (["train", "segformer", "--device", "abacus"], "the device 'abacus' cannot be used"),
         (["train", "detr", "--inputs", "guessed"], "there are no inputs 'guessed'; choose from predicted, true"),
-        (["train", "bert", "--detector", "here"], "--detector is for models of detections and queries only"),
+        (["train", "text", "--detector", "here"], "--detector is for models of detections and queries only"),
         (["train", "segformer", "--detector", "here"], "--detector is for models of detections and queries only"),
         (["train", "toto-detections"], "run first: dorothie-gym train detr"),
-        (["train", "detector-queries"], "run first: dorothie-gym train detr"),
-        (["table", "--models", "toto,et-detections"], "run first: dorothie-gym train detr"),
+        (["train", "objects-queries"], "run first: dorothie-gym train detr"),
+        (["table", "--models", "toto,toto-episodic-detections"], "run first: dorothie-gym train detr"),
         (["train", "co-wizard", "--config", "paper"], "--config and --encoder are not for co-wizard"),
         (["train", "co-wizard", "--encoder", "minilm"], "--config and --encoder are not for co-wizard"),
         (["train", "participant", "--strict"], "--config and --encoder are not for participant"),
@@ -51,9 +54,16 @@ def test_unknown_and_untrainable_models_are_reported(arguments, message, tmp_pat
 
 
 def test_folder_without_sessions_is_reported(tmp_path):
-    result = runner.invoke(app, ["train", "bert", "--corpus", str(tmp_path), "--out", str(tmp_path / "runs")])
+    result = runner.invoke(app, ["train", "text", "--corpus", str(tmp_path), "--out", str(tmp_path / "runs")])
     assert result.exit_code == 2
     assert str(tmp_path) in result.stderr.replace("\n", "")
+
+
+def test_trainings_of_a_former_version_are_named_where_their_row_is_called_otherwise(tmp_path):
+    (tmp_path / "runs" / "bert").mkdir(parents=True)
+    for model, named in (("text", True), ("map", False)):
+        result = runner.invoke(app, ["train", model, "--corpus", str(tmp_path), "--out", str(tmp_path / "runs")])
+        assert ("whose row is called text now" in " ".join(result.stderr.split())) is named
 
 
 @pytest.fixture(scope="module")
@@ -68,12 +78,12 @@ def corpus(tmp_path_factory):
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_table_is_computed_once_and_then_read(corpus, tmp_path):
-    command = ["table", "--models", "detector,cloning", "--seeds", "2", "--encoder", "hashing", "--json"]
+    command = ["table", "--models", "objects,cloning", "--seeds", "2", "--encoder", "hashing", "--json"]
     places = ["--corpus", str(corpus), "--out", str(tmp_path)]
     first = json.loads(runner.invoke(app, [*command, *places], catch_exceptions=False).stdout)
     again = json.loads(runner.invoke(app, [*command, *places], catch_exceptions=False).stdout)
-    assert {"Deformable-DETR Only", "Behaviour Cloning", "majority", "random"} <= set(first["models"])
-    figure = first["models"]["Deformable-DETR Only"]["seen"]["nfd_joint_accuracy"]
+    assert {"Objects Only", "Behaviour Cloning", "majority", "random"} <= set(first["models"])
+    figure = first["models"]["Objects Only"]["seen"]["nfd_joint_accuracy"]
     assert figure["seeds"] == 2 and 0 <= figure["mean"] <= 1
     assert again["models"] == first["models"] and again["wall_seconds"] < first["wall_seconds"]
     assert {"table.md", "table.tex", "table.json", "predictions.parquet"} <= {path.name for path in tmp_path.iterdir()}

@@ -1,4 +1,4 @@
-"""Models of the table by their names in the paper, and their construction."""
+"""Models of the table by names that say what they are, and their construction."""
 
 from __future__ import annotations
 
@@ -21,12 +21,13 @@ from dorothie_gym.baselines.toto import (
     Channel,
     FrozenTexts,
     PretrainedBert,
-    SmallBert,
+    SmallTextEncoder,
     Texts,
     TOTOConfig,
     Towns,
     TrainedTexts,
 )
+from dorothie_gym.benchmark.paper_comparison import paper_name
 from dorothie_gym.errors import did_you_mean
 
 Kind = Literal["toto", "reader", "ppo", "cloning", "shallow"]
@@ -46,7 +47,7 @@ class ModelEntry:
     """Model of the table.
 
     Attributes:
-        name: name in the paper's table.
+        name: name in the table; `paper_comparison.COUNTERPARTS` has the paper's row where that is called otherwise.
         command: name on the command line and in paths.
         change: function from TOTO's config to the model's; None for a policy, and if it cannot be run.
         missing: reason why it cannot be run, or empty.
@@ -67,7 +68,7 @@ class ModelEntry:
     kind: Kind = "toto"
 
 
-def _bert(config: TOTOConfig) -> TOTOConfig:
+def _trained_text(config: TOTOConfig) -> TOTOConfig:
     return replace(config, text="trained")
 
 
@@ -84,14 +85,15 @@ def _only(*channels: Channel) -> Change:
 
 
 _EPISODIC: Final = (Channel.ACTIONS, Channel.MOVES, Channel.TRANSCRIPT, Channel.VISION)
-"""Inputs of the Episodic Transformer (Pashevich et al., 2021): actions, text and the images of the window."""
+"""Inputs that the paper gives to the Episodic Transformer (Pashevich et al., 2021): actions, text, and the window, here
+with the objects around the ego instead of images."""
 
 ROWS: Final[tuple[ModelEntry, ...]] = (
     ModelEntry(name="TOTO", command="toto", change=lambda config: config),
     ModelEntry(
         name="TOTO (+ Belief Tracking)", command="toto-belief", change=lambda config: replace(config, belief=True)
     ),
-    ModelEntry(name="TOTO (+ Fine-tuned BERT)", command="toto-bert", change=_bert),
+    ModelEntry(name="TOTO (+ Trained Text Encoder)", command="toto-trained-text", change=_trained_text),
     *(
         ModelEntry(name=f"TOTO (- {name})", command=f"toto-no-{name.lower().replace(' ', '-')}", change=_without(name))
         for name in ABLATIONS
@@ -99,16 +101,20 @@ ROWS: Final[tuple[ModelEntry, ...]] = (
     ModelEntry(name="TOTO (- Current Speech)", command="toto-no-current-speech", missing=NO_AUDIO),
     ModelEntry(name="TOTO (- Current Utterance)", command="toto-no-current-utterance", change=_without_utterance),
     ModelEntry(
-        name="Fine-tuned BERT Only",
-        command="bert-trained",
-        change=lambda config: _bert(config.only((Channel.TRANSCRIPT,))),
+        name="Text Only (Trained Encoder)",
+        command="text-trained",
+        change=lambda config: _trained_text(config.only((Channel.TRANSCRIPT,))),
     ),
-    ModelEntry(name="BERT Only", command="bert", change=_only(Channel.TRANSCRIPT)),
+    ModelEntry(name="Text Only", command="text", change=_only(Channel.TRANSCRIPT)),
     ModelEntry(name="HuBERT Only", command="hubert", missing=NO_AUDIO),
-    ModelEntry(name="Deformable-DETR Only", command="detector", change=_only(Channel.OBJECTS)),
+    ModelEntry(name="Objects Only", command="objects", change=_only(Channel.OBJECTS)),
     ModelEntry(name="Map Encoder Only", command="map", change=_only(Channel.MAP)),
-    ModelEntry(name="E.T.", command="et", change=_only(*_EPISODIC)),
-    ModelEntry(name="E.T. (+ Fine-tuned BERT)", command="et-bert", change=lambda config: _bert(config.only(_EPISODIC))),
+    ModelEntry(name="TOTO (Episodic Inputs)", command="toto-episodic", change=_only(*_EPISODIC)),
+    ModelEntry(
+        name="TOTO (Episodic Inputs, Trained Text Encoder)",
+        command="toto-episodic-trained-text",
+        change=lambda config: _trained_text(config.only(_EPISODIC)),
+    ),
     ModelEntry(
         name="TOTO (point clock)",
         command="toto-point-clock",
@@ -120,8 +126,8 @@ ROWS: Final[tuple[ModelEntry, ...]] = (
     ModelEntry(name="PPO", command="ppo", kind="ppo"),
     ModelEntry(name="Junction Reader (ours)", command="reader", change=reader_config, kind="reader"),
 )
-"""Models of the paper's table, in its order; then TOTO with another clock, shallow models, policies, and the Junction
-Reader. TOTO without the current utterance stands beside the paper's row without its sound."""
+"""Counterparts of the paper's rows, in its order; then TOTO with another clock, shallow models, policies, and the
+Junction Reader. TOTO without the current utterance stands beside the paper's row without its sound."""
 
 _SEEN: Final[Mapping[str, Objects]] = MappingProxyType({"oracle boxes": "boxes", "detections": "detections"})
 
@@ -130,12 +136,12 @@ CAMERA_ROWS: Final = (
         replace(row, name=f"{row.name} ({name})", command=f"{row.command}-{objects}", objects=objects)
         for name, objects in _SEEN.items()
         for row in ROWS
-        if row.command in ("toto", "detector", "et", "et-bert")
+        if row.command in ("toto", "objects", "toto-episodic", "toto-episodic-trained-text")
     ),
     *(
         replace(row, name=f"{row.name} (queries)", command=f"{row.command}-queries", objects="detections", queries=True)
         for row in ROWS
-        if row.command in ("toto", "detector")
+        if row.command in ("toto", "objects")
     ),
 )
 """Models whose objects are those that the camera on the car shows, or that a trained detector finds in its pictures; or
@@ -160,25 +166,61 @@ SOUND_ROWS: Final = (
     ModelEntry(name="HuBERT Only (weights of a folder)", command="sound-hubert", change=_only(Channel.SPEECH),
                sound="hubert"),
     ModelEntry(
-        name="BERT + Log-mel", command="bert-sound", change=_only(Channel.TRANSCRIPT, Channel.SPEECH), sound="log-mel"
+        name="Text + Log-mel", command="text-sound", change=_only(Channel.TRANSCRIPT, Channel.SPEECH), sound="log-mel"
     ),
 )  # fmt: skip
 """Models of spoken corpora, whose current utterance is heard as sound. In TOTO without the current speech, the words of
 the current utterance stay, as in the paper's row. They are trained where they are named."""
 
 
-class EpisodicTransformer(TOTO):
-    """E.T. (Pashevich et al., 2021): TOTO's encoder over actions, text and images alone."""
+ALL_ROWS: Final = (*ROWS, *CAMERA_ROWS, *SOUND_ROWS)
+
+_CALLED: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "bert": "text", "bert-trained": "text-trained", "toto-bert": "toto-trained-text", "bert-sound": "text-sound",
+        "detector": "objects", "et": "toto-episodic", "et-bert": "toto-episodic-trained-text",
+        "toto-no-object-detection": "toto-no-objects", "toto-no-vision-history": "toto-no-object-history",
+    }
+)  # fmt: skip
+_SOURCES: Final = ("", "-boxes", "-detections", "-queries")
+
+FORMER_COMMANDS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        former + source: now + source
+        for former, now in _CALLED.items()
+        for source in _SOURCES
+        if now + source in {row.command for row in ALL_ROWS}
+    }
+)
+"""Commands of this version by those of versions up to 0.1, which were the paper's words; `model.json` files of such
+versions have them."""
 
 
 def find_row(name: str) -> ModelEntry:
-    """Returns a model by its command or name; raises `ValueError` listing all for an unknown one."""
-    rows = (*ROWS, *CAMERA_ROWS, *SOUND_ROWS)
-    for row in rows:
+    """Returns a model by its command or name.
+
+    Raises:
+        ValueError: there is none; the message lists all, or names the one that is compared with this row of the paper.
+    """
+    for row in ALL_ROWS:
         if name.casefold() in (row.command, row.name.casefold()):
             return row
-    commands = tuple(row.command for row in rows)
+    commands = tuple(row.command for row in ALL_ROWS)
+    called = FORMER_COMMANDS.get(name.casefold()) or _counterpart(name)
+    if called is not None:
+        raise ValueError(f"there is no model {name!r}: it is called {called!r}, which says what it is (docs/models.md)")
     raise ValueError(f"there is no model {name!r}; {did_you_mean(name, commands)}choose from {', '.join(commands)}")
+
+
+def stored_row(command: str) -> ModelEntry:
+    """Returns the model of a file by its command, also that of a former version; raises `ValueError` as `find_row`."""
+    return find_row(FORMER_COMMANDS.get(command, command))
+
+
+def _counterpart(name: str) -> str | None:
+    """Returns the command of the model that is compared with a row of the paper; None for other names."""
+    row = paper_name(name)
+    return None if row is None else next(entry.command for entry in ROWS if paper_name(entry.name) == row)
 
 
 def make_model(row: ModelEntry, size: str, material: Dataset, seed: int, *, strict: bool = False) -> TOTO:
@@ -215,8 +257,7 @@ def build_model(row: ModelEntry, config: TOTOConfig, material: Dataset, spread: 
     if row.kind == "reader":
         assert isinstance(texts, FrozenTexts)  # of `reader_config`
         return JunctionReader(config, towns, texts, material.columns, _pieces(config, material), config.vocabulary)
-    kind = EpisodicTransformer if set(config.channels) == set(_EPISODIC) else TOTO
-    return kind(config, towns, texts)
+    return TOTO(config, towns, texts)
 
 
 def retell(model: TOTO, material: Dataset) -> None:
@@ -239,7 +280,7 @@ def make_texts(config: TOTOConfig, material: Dataset, spread: float | None = Non
         model: Any = load_pretrained(find_transformers("minilm").BertModel, minilm_folder(), "minilm")
         return TrainedTexts(tokens, PretrainedBert(model), int(model.config.hidden_size))
     width = config.text_width
-    reader = SmallBert(config.vocabulary, config.text_tokens, width, config.text_layers, config.dropout)
+    reader = SmallTextEncoder(config.vocabulary, config.text_tokens, width, config.text_layers, config.dropout)
     return TrainedTexts(tokens, reader, width)
 
 

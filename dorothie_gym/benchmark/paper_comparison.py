@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 from importlib.resources import files
+from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
 
 from dorothie_gym.analysis.intervals import Estimate
@@ -18,11 +19,30 @@ FULL: Final = "TOTO"
 NO_HISTORY: Final = "TOTO (- Action History)"
 NO_UTTERANCE: Final = "TOTO (- Current Utterance)"
 NO_MAP: Final = "TOTO (- Map Knowledge)"
-TUNED: Final = "Fine-tuned BERT Only"
+TUNED: Final = "Text Only (Trained Encoder)"
 OTHER_ABLATIONS: Final = (
-    "TOTO (- GT Transcript)", "TOTO (- Object Detection)", "TOTO (- Vision History)", NO_UTTERANCE, NO_MAP,
+    "TOTO (- GT Transcript)", "TOTO (- Objects)", "TOTO (- Object History)", NO_UTTERANCE, NO_MAP,
 )  # fmt: skip
 """The other ablations of TOTO."""
+
+COUNTERPARTS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "TOTO (+ Trained Text Encoder)": "TOTO (+ Fine-tuned BERT)",
+        "TOTO (- Objects)": "TOTO (- Object Detection)",
+        "TOTO (- Object History)": "TOTO (- Vision History)",
+        "Text Only (Trained Encoder)": "Fine-tuned BERT Only",
+        "Text Only": "BERT Only",
+        "Objects Only": "Deformable-DETR Only",
+        "TOTO (Episodic Inputs)": "E.T.",
+        "TOTO (Episodic Inputs, Trained Text Encoder)": "E.T. (+ Fine-tuned BERT)",
+    }
+)
+"""Rows of the paper by the models of this package that are compared with them under names of their own.
+
+The paper's rows have a BERT, a Deformable DETR on pictures, and another architecture (E.T.). The package's models have
+frozen vectors or an encoder that is trained from random weights, the objects of the world's record, and TOTO's
+architecture.
+"""
 
 MOVE_METRICS: Final = ("ufn_move_accuracy", "rfn_move_accuracy")
 ACTION_METRICS: Final = ("nfd_action_accuracy", "nfd_joint_accuracy")
@@ -126,19 +146,23 @@ class ModelFinding:
         }
 
 
-def findings(estimate: Estimates, part: str) -> tuple[ModelFinding, ...]:
+def findings(
+    estimate: Estimates, part: str, called: Callable[[str], str] = lambda model: model
+) -> tuple[ModelFinding, ...]:
     """Returns the paper's findings on one part of the corpus (section 6, ablation on input modalities).
 
     Args:
         estimate: estimate of a model, a part and a metric over seeds; without seeds if the model was not run.
         part: part of the corpus.
+        called: returns the name under which a model, or another that is compared with the same row, was run.
     """
 
     def claim(metric: str, higher: str, lower: str, *, positive: bool = True) -> ModelClaim:
-        return _claim(estimate, part, metric, (higher, lower), "positive" if positive else "hardly any")
+        models = called(higher), called(lower)
+        return _claim(estimate, part, metric, models, "positive" if positive else "hardly any")
 
     def most(metric: str) -> tuple[ModelClaim, ...]:
-        rival = _lowest(estimate, part, metric, OTHER_ABLATIONS)
+        rival = _lowest(estimate, part, metric, [called(model) for model in OTHER_ABLATIONS])
         return (claim(metric, FULL, NO_HISTORY), *([claim(metric, rival, NO_HISTORY)] if rival else []))
 
     return (
@@ -157,9 +181,11 @@ def findings(estimate: Estimates, part: str) -> tuple[ModelFinding, ...]:
             note="The paper removes the sound of the utterance and keeps its words; here both are removed.",
         ),
         ModelFinding(
-            statement="Fine-tuned BERT leads on moves and trails on NfD joint",
+            statement="Text alone leads on moves and trails on NfD joint, if its encoder is trained",
             part=part,
             claims=(*(claim(metric, TUNED, FULL) for metric in MOVE_METRICS), claim("nfd_joint_accuracy", FULL, TUNED)),
+            note="The paper fine-tunes a BERT; the encoder of the package is trained from random weights, unless the "
+            "published sizes find MiniLM.",
         ),
         ModelFinding(
             statement="Map knowledge hardly helps",
@@ -246,6 +272,10 @@ def paper_figure(model: str, part: str, key: str) -> PaperFigure | None:
 
 
 def paper_name(model: str) -> str | None:
-    """Returns the spelling of a model's name in the paper, ignoring case; None if the paper has no such model."""
-    names = {name.casefold(): name for name in paper_figures()}
-    return names.get(model.casefold())
+    """Returns the paper's row with which a model is compared, by its name in any case; None if there is none.
+
+    These are the rows themselves, and those of `COUNTERPARTS`.
+    """
+    rows = {name.casefold(): name for name in paper_figures()}
+    rows |= {name.casefold(): row for name, row in COUNTERPARTS.items()}
+    return rows.get(model.casefold())

@@ -107,6 +107,12 @@ def row_title(table: ResultsTable, model: str) -> str:
     return f"{model} (not run: {table.missing[model]})" if model in table.missing else model
 
 
+def paper_row(table: ResultsTable, model: str) -> str:
+    """Returns the paper's row with which a model of a table is compared; empty if no figures of the paper are shown."""
+    shown = any(paper_figure(model, part, key) for part in table.parts for key in SHOWN)
+    return paper_name(model) or "" if shown else ""
+
+
 def part_title(part: str) -> str:
     """Returns the heading of a part of the corpus."""
     return "All sessions" if part == ALL else f"{part.capitalize()} towns"
@@ -121,7 +127,10 @@ def legend(table: ResultsTable) -> str:
     protocol = (
         "Columns marked (paper) use the definitions of the paper's code: exact match of all slots, angles not wrapped"
     )
-    return f"Values in per cent: ours ({some}){paper}; {NONE}: no value. {protocol}. The best of our values is bold."
+    others = any(paper_row(table, model) not in ("", model) for model in table.models)
+    names = " Where the paper's row is called otherwise, it is another model." if others else ""
+    values = f"Values in per cent: ours ({some}){paper}; {NONE}: no value."
+    return f"{values}{names} {protocol}. The best of our values is bold."
 
 
 # --- Markdown -------------------------------------------------------------------------------------------------------
@@ -130,9 +139,17 @@ def legend(table: ResultsTable) -> str:
 def markdown(table: ResultsTable) -> str:
     """Returns the table as Markdown: figures by part, findings, points and what was left out."""
     lines = ["# Results", "", legend(table), *([f"Paper: {paper_source()}."] if _has_paper(table) else [])]
+    rowed = _has_paper(table)
     for part in table.parts:
-        heads = ["model", *(f"{task_of(key)} {shown_title(key)}" for key in SHOWN)]
-        rows = [[row_title(table, model), *_cells(table, model, part, _bold_markdown)] for model in table.models]
+        heads = ["model", *(["the paper's row"] if rowed else []), *(f"{task_of(k)} {shown_title(k)}" for k in SHOWN)]
+        rows = [
+            [
+                row_title(table, model),
+                *([paper_row(table, model) or NONE] if rowed else []),
+                *_cells(table, model, part, _bold_markdown),
+            ]
+            for model in table.models
+        ]
         lines += ["", f"## {part_title(part)}", "", *_markdown_table(heads, rows)]
     tested = [finding for finding in table.findings() if any(claim.difference.seeds for claim in finding.claims)]
     if tested:
@@ -244,8 +261,9 @@ def tex(table: ResultsTable) -> str:
         for model in table.models:
             cells = [_tex_cell(table, model, part, key) for key in SHOWN]
             lines.append(" & ".join([escape_tex(row_title(table, model)), *cells]) + r" \\")
-            if paper_name(model) and any(paper_figure(model, part, key) for key in SHOWN):
-                lines.append(" & ".join([r"\quad\textcolor{gray}{paper}", *_tex_paper(model, part)]) + r" \\")
+            if row := paper_row(table, model):
+                named = rf"\quad\textcolor{{gray}}{{paper{'' if row == model else f': {escape_tex(row)}'}}}"
+                lines.append(" & ".join([named, *_tex_paper(model, part)]) + r" \\")
     caption = escape_tex(legend(table).replace("/ the", "and in grey the"))
     lines += [r"\bottomrule", r"\end{tabular}}", rf"\caption{{{caption}}}", r"\end{table*}"]
     return "\n".join(lines) + "\n"
@@ -313,10 +331,10 @@ def draw_table(table: ResultsTable, path: Path | str) -> Path:
     height = _TOP + _BOTTOM + _ROW * max(len(table.models), 1)
     with empty_figure(15.0, height) as figure:
         axes = figure.subplots(1, len(PANELS), sharey=True, squeeze=False)[0]
-        figure.subplots_adjust(left=0.185, right=0.985, top=1 - _TOP / height, bottom=_BOTTOM / height, wspace=0.09)
+        figure.subplots_adjust(left=0.2, right=0.985, top=1 - _TOP / height, bottom=_BOTTOM / height, wspace=0.09)
         for key, panel in zip(PANELS, axes, strict=True):
             _panel(panel, table, key)
-        names = [row_title(table, model).replace(" (not run: ", "\n(not run: ") for model in table.models]
+        names = [_picture_title(table, model) for model in table.models]
         axes[0].set_yticks(range(len(names)), names, fontsize=8.5, color=INK)
         axes[0].set_ylim(len(names) - 0.5, -0.5)
         title = "Models on the three tasks" + (", ours beside the paper's" if _has_paper_pictures(table) else "")
@@ -362,6 +380,12 @@ def draw_confusions(table: ResultsTable, model: str, path: Path | str) -> Path:
         with replacing(Path(path)) as new:
             figure.savefig(new, format="png")
     return Path(path)
+
+
+def _picture_title(table: ResultsTable, model: str) -> str:
+    """Returns the name of a row in two lines: the paper's name where that is another, or why it was not run."""
+    title, row = row_title(table, model).replace(" (not run: ", "\n(not run: "), paper_row(table, model)
+    return title if row in ("", model) or model in table.missing else f"{title}\n(paper: {row})"
 
 
 def _panel(axes: Axes, table: ResultsTable, key: str) -> None:

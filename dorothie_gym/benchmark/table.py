@@ -54,7 +54,7 @@ class ResultsTable:
 
     @property
     def models(self) -> tuple[str, ...]:
-        """Names of the models: those of the paper in its order, then the others in order of arrival."""
+        """Names of the models: those with a row in the paper, in its order, then the others in order of arrival."""
         names = dict.fromkeys([*(run.model for run in self.runs), *self.missing])
         order = list(paper_figures())
         known = sorted(
@@ -119,22 +119,24 @@ class ResultsTable:
 
         Others are the models that are neither the paper's nor floors nor ablations of TOTO.
         """
-        names = {model.casefold(): model for model in self.models}
+        names: dict[str, str] = {}
+        for model in self.models:
+            names.setdefault((paper_name(model) or model).casefold(), model)
 
-        def estimate(model: str, part: str, key: str) -> Estimate:
-            return self.estimate(names.get(model.casefold(), model), part, key)
+        def called(model: str) -> str:
+            return names.get((paper_name(model) or model).casefold(), model)
 
         found: list[ModelFinding] = []
         for part in self.parts:
-            found += findings(estimate, part)
+            found += findings(self.estimate, part, called)
             found += [
-                above(estimate, part, FULL, floor, (*MOVE_METRICS, *ACTION_METRICS))
+                above(self.estimate, part, called(FULL), floor, (*MOVE_METRICS, *ACTION_METRICS))
                 for floor in FLOORS
                 if floor in self.models
             ]
             known = {*FLOORS, NO_UTTERANCE.casefold()}
             own = [model for model in self.models if paper_name(model) is None and model.casefold() not in known]
-            found += [above(estimate, part, model, FULL) for model in own]
+            found += [above(self.estimate, part, model, called(FULL)) for model in own]
         return tuple(found)
 
     def to_json(self) -> dict[str, object]:
@@ -159,6 +161,7 @@ class ResultsTable:
             "findings": [finding.to_json() for finding in self.findings()],
             "paper": {
                 "source": paper_source(),
+                "rows": {m: row for m in self.models if (row := paper_name(m))},
                 "models": {m: self._paper_json(m) for m in self.models if paper_name(m)},
             },
             "about": dict(self.about),

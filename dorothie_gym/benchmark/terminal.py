@@ -30,6 +30,7 @@ from dorothie_gym.benchmark.report import (
     claim_line,
     legend,
     notes,
+    paper_row,
     part_title,
     percent,
     points_rows,
@@ -108,8 +109,14 @@ def _figures(table: ResultsTable, part: str, tasks: Sequence[Task]) -> Table:
     for key in keys:
         shown.add_column(f"{task_of(key)}\n{shown_title(key)}", justify="right")
     for model in table.models:
-        shown.add_row(Text(row_title(table, model)), *(_cell(table, model, part, key) for key in keys))
+        shown.add_row(_title(table, model), *(_cell(table, model, part, key) for key in keys))
     return shown
+
+
+def _title(table: ResultsTable, model: str) -> Text:
+    """Returns the name of a model, and below it that of the paper's row if that is another."""
+    title, row = Text(row_title(table, model)), paper_row(table, model)
+    return title if row in ("", model) else Text.assemble(title, (f"\npaper: {row}", "dim"))
 
 
 def _cell(table: ResultsTable, model: str, part: str, key: str) -> Text:

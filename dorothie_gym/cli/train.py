@@ -98,7 +98,7 @@ def train(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="toto, toto-belief, bert, ... (see `table`); segformer, detr; co-wizard, co-wizard-rl, participant.",
+            help="toto, toto-belief, text, ... (see `table`); segformer, detr; co-wizard, co-wizard-rl, participant.",
             autocompletion=complete_model,
         ),
     ],
@@ -206,7 +206,7 @@ def table(
     corpus: CorpusOption = None,
     size: Size = SMALL,
     seeds: Seeds = 5,
-    models: Annotated[str, typer.Option(help="all, or a list of models: toto,bert,...")] = "all",
+    models: Annotated[str, typer.Option(help="all, or a list of models: toto,text,...")] = "all",
     encoder: Encoder = AUTO,
     out: Out = None,
     workers: Workers = None,
@@ -252,6 +252,7 @@ def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> lis
     from dorothie_gym.baselines.experiment import run_experiments
     from dorothie_gym.processors import available_processors
 
+    _name_former_trainings(jobs)
     found: dict[Path, Facts] = {}
     try:
         with _progress(len(jobs), quiet=quiet) as (on_epoch, on_job, on_session):
@@ -263,6 +264,20 @@ def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> lis
             f"Interrupted with {len(found)} of {len(jobs)} trainings finished; resume with the same command."
         )
     return [found[job.folder] for job in jobs]
+
+
+def _name_former_trainings(jobs: Sequence[Experiment]) -> None:
+    """Names on standard error the trainings of former versions whose rows are called otherwise, and are not resumed."""
+    from dorothie_gym.baselines.model_zoo import FORMER_COMMANDS
+
+    places = {job.model: job.out for job in jobs if not (job.out / job.model).exists()}
+    for former, now in FORMER_COMMANDS.items():
+        if now in places and (places[now] / former).is_dir():
+            stderr().print(
+                f"{places[now] / former}: has trainings of a former version, whose row is called {now} now; they are "
+                "not resumed, but still play, and their predictions can be evaluated",
+                style="dim", markup=False, soft_wrap=True,
+            )  # fmt: skip
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from dorothie_gym.baselines.toto import (
     TOTO,
     Channel,
     FrozenTexts,
-    SmallBert,
+    SmallTextEncoder,
     TOTOConfig,
     Towns,
     TrainedTexts,
@@ -49,7 +49,7 @@ def make(config=TINY, graphs=None):
         texts = FrozenTexts(torch.randn(samples.TEXTS, 24))
     else:
         pieces = torch.randint(1, 50, (samples.TEXTS, 6))
-        texts = TrainedTexts(pieces, SmallBert(50, 6, config.text_width, 1, 0.1), config.text_width)
+        texts = TrainedTexts(pieces, SmallTextEncoder(50, 6, config.text_width, 1, 0.1), config.text_width)
     return TOTO(config, towns, texts)
 
 
@@ -162,8 +162,8 @@ def test_without_speech_the_words_of_the_current_utterance_stay():
     assert not torch.allclose(values(model(other)), values(model(given)))
 
 
-def test_without_vision_history_there_are_neither_images_nor_objects():
-    left = set(TINY.without(*ABLATIONS["Vision History"]).channels)
+def test_without_object_history_there_are_objects_neither_in_the_window_nor_at_the_point():
+    left = set(TINY.without(*ABLATIONS["Object History"]).channels)
     assert not left & {Channel.VISION, Channel.OBJECTS}
 
 

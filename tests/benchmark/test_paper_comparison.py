@@ -3,7 +3,16 @@ from __future__ import annotations
 import pytest
 
 from dorothie_gym.benchmark import COLUMNS, Estimate, ModelVerdict, above, findings, paper_figures
-from dorothie_gym.benchmark.paper_comparison import FULL, NO_HISTORY, NO_MAP, NO_UTTERANCE, OTHER_ABLATIONS, TUNED
+from dorothie_gym.benchmark.paper_comparison import (
+    FULL,
+    NO_HISTORY,
+    NO_MAP,
+    NO_UTTERANCE,
+    OTHER_ABLATIONS,
+    TUNED,
+    paper_figure,
+    paper_name,
+)
 
 NOISE = (-0.01, 0.0, 0.01)
 
@@ -69,11 +78,21 @@ def test_history_is_compared_with_the_ablation_of_lowest_score() -> None:
     assert (claim.higher, claim.lower, claim.verdict) == (rival, NO_HISTORY, ModelVerdict.FAILS)
 
 
-def test_claims_name_models_of_the_paper_and_columns_of_its_table() -> None:
-    names = {*paper_figures(), NO_UTTERANCE}  # the paper removes the sound of the utterance only
+def test_claims_name_counterparts_of_the_papers_models_and_columns_of_its_table() -> None:
     for finding in findings(Table({}), "seen"):
         for claim in finding.claims:
-            assert claim.higher in names and claim.lower in names and claim.metric in COLUMNS
+            for model in (claim.higher, claim.lower):  # the paper removes the sound of the utterance only
+                assert model == NO_UTTERANCE or paper_name(model) in paper_figures()
+            assert claim.metric in COLUMNS
+
+
+def test_models_and_rows_of_the_paper_have_its_figures_in_any_case() -> None:
+    for name in ("Objects Only", "objects only", "deformable-detr only"):
+        assert paper_name(name) == "Deformable-DETR Only"
+        assert paper_figure(name, "seen", "nfd_action_accuracy") == paper_figure(
+            "Deformable-DETR Only", "seen", "nfd_action_accuracy"
+        )
+    assert paper_name("Objects Only (oracle boxes)") is None
 
 
 def test_the_papers_figures_are_shares() -> None:

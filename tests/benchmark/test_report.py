@@ -30,9 +30,9 @@ def test_markdown_has_ours_in_bold_where_best_and_the_papers_beside(table: Resul
     text = markdown(table)
     (row,) = [line for line in text.splitlines() if line.startswith("| TOTO |")][:1]
     # Right of the 4 seen points: 2 and 4, so 75 per cent; t(0.975, 1) = 12.706 x 0.3536 / sqrt(2).
-    assert row.split(" | ")[1] == "75.0 ± 317.7 / 40.9 ± 3.9"
-    assert "| a/b_c | **100.0 ± 0.0** |" in text
-    assert "| HuBERT Only (not run: no audio) | – / 35.7 ± 3.4 |" in text
+    assert row.split(" | ")[1:3] == ["TOTO", "75.0 ± 317.7 / 40.9 ± 3.9"]
+    assert "| a/b_c | – | **100.0 ± 0.0** |" in text
+    assert "| HuBERT Only (not run: no audio) | HuBERT Only | – / 35.7 ± 3.4 |" in text
 
 
 def test_columns_of_the_papers_protocol_alone_have_its_figures(table: ResultsTable) -> None:
@@ -47,7 +47,7 @@ def test_markdown_lists_findings_and_points(table: ResultsTable) -> None:
     text = markdown(table)
     assert "**Action history matters most" in text
     assert "UfN move accuracy, TOTO minus TOTO (- Action History): +25.0 ± 317.7, expected above 0: undecided" in text
-    assert "Fine-tuned BERT leads" not in text, "none of its figures is there"
+    assert "Text alone leads" not in text, "none of its figures is there"
     assert "| sum | 5 | 60 | 20 | 15 | 25 | 0 |" in text
 
 
@@ -77,7 +77,7 @@ def test_letters_that_latex_reads_otherwise_are_escaped() -> None:
 
 def test_names_become_files() -> None:
     assert file_name("TOTO (- Action History)") == "toto-without-action-history"
-    assert file_name("E.T. (+ Fine-tuned BERT)") == "e-t-with-fine-tuned-bert"
+    assert file_name("E.T. (+ Fine-tuned BERT)") == "e-t-with-fine-tuned-bert"  # a name of a user
     assert file_name("***") == "model"
 
 
@@ -116,3 +116,19 @@ def test_terminal_shows_classes_and_exceptions_of_a_model(table: ResultsTable) -
 def test_narrow_terminals_lose_nothing(table: ResultsTable) -> None:
     for model in (None, "TOTO"):
         assert "…" not in shown(table, model, width=80)
+
+
+def test_every_form_names_the_row_of_the_paper_beside_a_model_that_is_called_otherwise(table: ResultsTable) -> None:
+    runs = tuple(replace(run, model="Objects Only") if run.model == "TOTO" else run for run in table.runs)
+    renamed = replace(table, runs=runs)
+    (row,) = [line for line in markdown(renamed).splitlines() if line.startswith("| Objects Only |")][:1]
+    assert row.split(" | ")[1:3] == ["Deformable-DETR Only", "75.0 ± 317.7 / 31.5 ± 0.0"]
+    assert r"\textcolor{gray}{paper: Deformable-DETR Only}" in tex(renamed)
+    assert r"\textcolor{gray}{paper} &" in tex(renamed), "TOTO (- Action History) is called so there, too"
+    assert "paper: Deformable-DETR Only" in shown(renamed)
+    assert renamed.to_json()["paper"]["rows"]["Objects Only"] == "Deformable-DETR Only"  # type: ignore[index]
+
+
+def test_tables_without_figures_of_the_paper_have_no_column_for_its_rows(table: ResultsTable) -> None:
+    own = replace(table, runs=tuple(run for run in table.runs if run.model == "a|b_c"), missing={})
+    assert "the paper's row" not in markdown(own) and "the paper's row" in markdown(table)

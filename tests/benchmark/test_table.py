@@ -131,3 +131,11 @@ def test_toto_is_held_against_the_floors_and_others_against_toto(labels: CorpusL
     verdicts = {(found.statement, found.part): found.verdict for found in evaluate_predictions(runs, labels).findings()}
     assert verdicts["TOTO is above majority", "seen"] is ModelVerdict.HOLDS
     assert verdicts["mine is above TOTO", "unseen"] is ModelVerdict.UNDECIDED
+
+
+@pytest.mark.parametrize("name", ["Text Only (Trained Encoder)", "Fine-tuned BERT Only"])
+def test_findings_are_about_the_model_that_was_run_under_its_own_name(labels: CorpusLabels, name: str) -> None:
+    runs = [run for seed in (0, 1) for model in ("TOTO", name) for run in oracle(labels, model, seed)]
+    found = evaluate_predictions(runs, labels).findings()[2]
+    assert {claim.higher for claim in found.claims} == {name, "TOTO"} == {claim.lower for claim in found.claims}
+    assert all(claim.difference.seeds == 2 for claim in found.claims)

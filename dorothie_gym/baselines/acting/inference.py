@@ -17,7 +17,7 @@ from dorothie_gym.baselines.checkpoints import ModelCard, restore, sha256_of
 from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, Vectors, text_encoder
 from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
-from dorothie_gym.baselines.model_zoo import build_model, find_row, retell
+from dorothie_gym.baselines.model_zoo import build_model, retell, stored_row
 from dorothie_gym.baselines.toto import TOTO, TOTOConfig
 from dorothie_gym.benchmark.features import Columns, PointTable, points
 from dorothie_gym.benchmark.features.session_columns import town_graph
@@ -46,7 +46,7 @@ class BenchmarkModel:
     def __init__(self, description: ModelCard, folder: Path):
         self.description = description
         self.weights = folder / description.weights
-        self.row = find_row(description.row)
+        self.row = stored_row(description.row)
         self.config = TOTOConfig.from_json(description.config)
         if self.config.detector is not None:
             raise ValueError(f"{folder}: reads the queries of a detector, which are known of recorded sessions only")

@@ -3,7 +3,7 @@
 from dorothie_gym.baselines.toto.config import ABLATIONS, ALL_CHANNELS, Channel, LossWeights, TOTOConfig
 from dorothie_gym.baselines.toto.losses import point_losses
 from dorothie_gym.baselines.toto.model import TOTO
-from dorothie_gym.baselines.toto.texts import FrozenTexts, PretrainedBert, SmallBert, Texts, TrainedTexts
+from dorothie_gym.baselines.toto.texts import FrozenTexts, PretrainedBert, SmallTextEncoder, Texts, TrainedTexts
 from dorothie_gym.baselines.toto.towns import Towns
 
 __all__ = [
@@ -14,7 +14,7 @@ __all__ = [
     "FrozenTexts",
     "LossWeights",
     "PretrainedBert",
-    "SmallBert",
+    "SmallTextEncoder",
     "TOTOConfig",
     "Texts",
     "Towns",

@@ -41,12 +41,12 @@ ABLATIONS: Final[Mapping[str, tuple[Channel, ...]]] = MappingProxyType(
     {
         "Action History": (Channel.ACTIONS, Channel.MOVES),
         "GT Transcript": (Channel.TRANSCRIPT,),
-        "Object Detection": (Channel.OBJECTS,),
-        "Vision History": (Channel.VISION, Channel.OBJECTS),
+        "Objects": (Channel.OBJECTS,),
+        "Object History": (Channel.VISION, Channel.OBJECTS),
         "Map Knowledge": (Channel.MAP, Channel.TRAJECTORY),
     }
 )
-"""Inputs that ablations of TOTO remove, by their names in the paper's table."""
+"""Inputs that ablations of TOTO remove, by what their rows are called; the object history includes the present."""
 
 TextTraining = Literal["frozen", "trained"]
 
@@ -113,7 +113,7 @@ class TOTOConfig(HistorySizes):
         clock: origin of a token's time: the start of the "session", as published, or back from the
             "point". Tokens known from the start then have the session's time: both carry the same information.
         text: "frozen" vectors of a text encoder, or a "trained" encoder.
-        text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, where it is not a BERT's.
+        text_width, text_layers, text_tokens, vocabulary: of the trained text encoder, where it is not MiniLM.
         pretrained_text: whether the trained text encoder is MiniLM, where its weights are installed.
         lane_width: numbers of a lane's vector, a multiple of `map_heads`.
         map_heads: of the graph attention.

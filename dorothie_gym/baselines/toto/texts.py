@@ -100,8 +100,8 @@ def spread_of(table: Tensor) -> float:
     return float(table.square().mean().sqrt().clamp(min=_SMALLEST_SPREAD))
 
 
-class SmallBert(nn.Module):
-    """BERT of few layers over byte pairs, trained from random weights.
+class SmallTextEncoder(nn.Module):
+    """Transformer encoder of few layers over byte pairs, trained from random weights with the rest of the model.
 
     Args:
         vocabulary: number of pieces.

@@ -21,7 +21,7 @@ from dorothie_gym.rollout.closed_loop import RolloutSettings, roll_out
 from dorothie_gym.spaces import SpaceLimits
 from tests.benchmark.corpora import corpus
 
-MODELS = ("toto", "reader", "toto-bert")
+MODELS = ("toto", "reader", "toto-trained-text")
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_two_rollouts_with_one_worker_or_two_give_the_same_bytes(folders: dict[s
     assert session.physical_actions, "and drives"
 
 
-@pytest.mark.parametrize("model", ["toto", "toto-bert", "reader"])
+@pytest.mark.parametrize("model", ["toto", "toto-trained-text", "reader"])
 def test_every_kind_of_model_plays_whether_acts_are_observed_or_not(
     model: str, folders: dict[str, Path], tmp_path: Path
 ) -> None:
@@ -92,6 +92,14 @@ def test_another_encoder_than_the_model_was_trained_with_is_refused(folders: dic
     (other / "model.json").write_text(json.dumps({**page, "encoder_id": "hashing-0"}))
     with pytest.raises(ValueError, match="was trained with the encoder hashing-0"):
         BenchmarkModel.load(other)
+
+
+def test_a_model_of_a_version_with_other_names_plays(folders: dict[str, Path], tmp_path: Path) -> None:
+    other = shutil.copytree(folders["toto-trained-text"], tmp_path / "other")
+    page = json.loads((other / "model.json").read_text())
+    (other / "model.json").write_text(json.dumps({**page, "row": "toto-bert"}))
+    assert BenchmarkModel.load(other).row.command == page["row"] == "toto-trained-text"
+    assert roll_out(settings(other, 8.0), tmp_path / "sessions").errored == 0
 
 
 def test_model_card_of_another_version_is_refused(folders: dict[str, Path], tmp_path: Path) -> None:
