@@ -20,11 +20,13 @@ from dorothie_gym.benchmark.features import Batch
 from dorothie_gym.benchmark.predictions import file_schema
 from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.dialogue.grammar import parse_grammar
+from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.dialogue.talk_files import read_talk_files
-from dorothie_gym.maps import describe, load_town
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, describe, load_town, town_names
 from dorothie_gym.ontology import Question, WeatherParameter, paths
 from dorothie_gym.policies import policy_loader
-from dorothie_gym.recording import Task
+from dorothie_gym.recording import FRAME_RATE, Task
 from dorothie_gym.rollout.closed_loop import METRICS, RecoverySeconds
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.speech import CabinState, signal_to_noise
@@ -32,7 +34,7 @@ from dorothie_gym.studies.export import COLUMNS
 from dorothie_gym.studies.items import Item
 from dorothie_gym.studies.study import Study
 from dorothie_gym.studies.study_file import read_study
-from dorothie_gym.tasks import bind, load_template
+from dorothie_gym.tasks import bind, load_template, template_names
 from tests.recording.builders import write
 from tests.recording.dialogues import talk
 
@@ -229,6 +231,50 @@ def test_the_figures_of_the_data_sheet_are_those_of_a_corpus(tmp_path: Path, mon
     assert page.count("dorothie-gym generate --sessions 2 --seed 41 --out CORPUS") == 1
     assert "| utterances | 10 | 8,415 |" in page and "| 24 | speech trouble repaired | 0 | - |" in page
     assert page.startswith("# Data sheet") and page.count(script.BEGIN) == page.count(script.END) == 1
+
+
+_WORDS = {"two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7}
+
+
+def test_the_counts_of_the_data_sheet_are_those_of_the_shipped_storyboards_and_towns() -> None:
+    text = " ".join((DOCS / "data-sheet.md").read_text(encoding="utf-8").split())
+
+    def stated(pattern: str) -> tuple[int, ...]:
+        found = re.search(pattern, text)
+        assert found is not None, pattern
+        return tuple(_WORDS.get(each.lower(), 0) or int(each) for each in found.groups())
+
+    boards = [load_template(name) for name in template_names()]
+    errands = [len(board.subgoals) for board in boards]
+    at_first = [sum(not subgoal.trigger for subgoal in board.subgoals) for board in boards]
+    assert stated(r"with (\w+) to (\w+) errands, of one of (\d+) storyboards") == (
+        min(errands), max(errands), len(boards),
+    )  # fmt: skip
+    assert (min(at_first), max(at_first)) == (min(errands), max(errands)), "the list begins with as many"
+    assert stated(
+        r"In (\d+) of these an errand can be added, in (\d+) deleted, in (\d+) changed; in (\d+) a place is hidden"
+    ) == (
+        sum(any(subgoal.trigger for subgoal in board.subgoals) for board in boards),
+        sum(
+            any(subgoal.delete or subgoal.delete_after_subgoal is not None for subgoal in board.subgoals)
+            for board in boards
+        ),
+        sum(any(subgoal.change for subgoal in board.subgoals) for board in boards),
+        sum(bool(board.hidden) for board in boards),
+    )
+    assert stated(r"at (\d+) Hz; the surrounding .* at each decision, (\d+) in a second") == (
+        FRAME_RATE, EnvConfig().decision_frequency,
+    )  # fmt: skip
+    assert f"by default in {100 * EnvConfig().word_error_rate:.1f} % of the words" in text
+    assert stated(r"and (\w+) small towns") == (len(town_names()),)
+    assert stated(r"(\w+) towns are in `train` and in the seen folds") == (len(SEEN_TOWNS),)
+    assert "the fourth only in the unseen folds" in text and len(UNSEEN_TOWNS) == 1
+    assert f"Styles vary ({', '.join(register.name.lower() for register in Register)};" in text
+
+
+def test_the_page_of_storyboards_counts_the_templates() -> None:
+    text = " ".join((DOCS / "storyboards.md").read_text(encoding="utf-8").split())
+    assert f"The package ships {len(template_names())} templates" in text
 
 
 def test_the_page_of_transcripts_shows_three_sessions_of_different_kinds() -> None:
