@@ -280,7 +280,10 @@ class TownEnv(Restorable, TimeLimited, AbstractEnv):
     its goal, and `AttributesObservation` may read `ego`.
 
     ## Action Space
-    Set by `config["action"]` (default: highway-env's `DiscreteMetaAction`); all types work.
+    Set by `config["action"]` (default: highway-env's `DiscreteMetaAction`); all types work. There is no action mask,
+    neither in the infos nor as `action_masks()`: an action without effect, such as a lane change on the outer lane, is
+    ignored. sb3-contrib's MaskablePPO refuses the environment therefore, unless a wrapper makes a mask of highway-env's
+    `get_available_actions()` ([example](../integrations.md#sb3-contrib)).
 
     ## Rewards
     The progress on the road plus `config["collision_reward"]` for a crash. The progress is the speed along the lane as

@@ -72,6 +72,17 @@ def test_the_first_example_runs(tmp_path: Path) -> None:
     assert run(example(""), tmp_path).splitlines()[0] == "True"
 
 
+@pytest.mark.long
+def test_the_example_of_a_mask_for_town_runs_which_is_refused_without_it(tmp_path: Path) -> None:
+    pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
+    code = example("sb3-contrib")
+    run(code, tmp_path)
+    bare = code.replace("ActionMasker(gym.make", "(gym.make").replace(", effective)", ")")
+    assert bare != code
+    with pytest.raises(AssertionError, match="Environment does not support action masking"):
+        run(bare, tmp_path)
+
+
 @pytest.mark.integrations
 @pytest.mark.parametrize("library", LIBRARIES)
 def test_the_library_runs_its_example(library: str, tmp_path: Path) -> None:
