@@ -73,17 +73,17 @@ class Recipe:
 
 RECIPES: Final[Mapping[str, Recipe]] = {
     "co-wizard": Recipe(
-        description="The learned Co-Wizard understands, remembers, talks and drives",
+        description="A network decides memory, goal, commands and remarks; rules read, plan, answer and word",
         commands=(GENERATE_TALKS, "train co-wizard --corpus talks --workers 2 --out models"),
         folders=(f"models/co-wizard/seed-{SEED}",),
     ),
     "co-wizard-rl": Recipe(
-        description="The learned Co-Wizard, trained further by reinforcement",
+        description="The learned Co-Wizard, its commands and remarks trained further by reinforcement",
         commands=(GENERATE_TALKS, "train co-wizard-rl --corpus talks --workers 2 --out models"),
         folders=(f"models/co-wizard-rl/seed-{SEED}",),
     ),
     "participant": Recipe(
-        description="The learned participant chooses the next errand, guides and talks",
+        description="A network decides errand, guidance and remarks; rules read, plan and word",
         commands=(GENERATE_TALKS, "train participant --corpus talks --workers 2 --out models"),
         folders=(f"models/participant/seed-{SEED}",),
         role=Role.PARTICIPANT,
@@ -99,12 +99,12 @@ RECIPES: Final[Mapping[str, Recipe]] = {
         folders=("ppo", f"ppo/{BEST}"),
     ),
     "reader": Recipe(
-        description="The Junction Reader understands, answers and drives",
+        description="The Junction Reader chooses acts and turns; rules choose their times and word them",
         commands=(GENERATE, _READER.format(row="reader")),
         folders=(f"models/reader/small/seed-{SEED}",),
     ),
     "toto": Recipe(
-        description="TOTO (small) understands, answers and drives",
+        description="TOTO (small) chooses acts and turns; rules choose their times and word them",
         commands=(GENERATE, _READER.format(row="toto")),
         folders=(f"models/toto/small/seed-{SEED}",),
     ),

@@ -178,7 +178,8 @@ def _counts(facts: dict[str, Any]) -> Iterator[tuple[str, ...]]:
 def _shares(facts: dict[str, Any]) -> Iterator[tuple[str, ...]]:
     for name, row in facts["anchors"].items():
         label = f" ({row['label']})" if row.get("label") else ""
-        yield name.replace("_", " ") + label, _shown(row["share"]), _shown(row["paper"])
+        speaker = name.replace("human", "participant")  # the paper's word; here the participant may be a script
+        yield speaker.replace("_", " ") + label, _shown(row["share"]), _shown(row["paper"])
 
 
 def _shown(value: float | None) -> str:

@@ -102,7 +102,7 @@ def test_claims_of_the_paper_are_tested_one_by_one() -> None:
     assert (instructs["difference"], instructs["low"], instructs["high"], instructs["holds"]) == (1.0, 1.0, 1.0, True)
     assert rows["task_car_informs"]["difference"] is None and rows["task_car_informs"]["holds"] is False
     shown = stats("corpus", "--behaviour").stdout
-    assert "humans: mostly Instruct" in shown and "+1.000 to +1.000  holds" in shown and "does not hold" in shown
+    assert "participant: mostly Instruct" in shown and "+1.000 to +1.000  holds" in shown and "does not hold" in shown
 
 
 def test_consistent_annotation_passes() -> None:

@@ -1,6 +1,6 @@
 """What README.md shows runs as written."""
 
-import importlib
+import importlib.resources
 import re
 import tomllib
 from pathlib import Path
@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from dorothie_gym import EnvConfig
-from dorothie_gym.maps import town_names
+from dorothie_gym.maps import SEEN_TOWNS, load_town, town_names
+from dorothie_gym.ontology import Role
+from dorothie_gym.policies.pretrained import names_for
 
 README = Path(__file__).parents[1] / "README.md"
 SNIPPETS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), flags=re.DOTALL)
@@ -75,6 +77,21 @@ def test_readme_names_shipped_towns_only() -> None:
     text = README.read_text(encoding="utf-8")
     named = re.findall(r"--town (\S+)", text)
     assert named and set(named) <= set(town_names())
+
+
+def test_readme_measures_towns_and_counts_shipped_models_as_they_are() -> None:
+    text = " ".join(README.read_text(encoding="utf-8").split())
+    for name in town_names():
+        town = load_town(name)
+        fold = "seen" if name in SEEN_TOWNS else "unseen"
+        kilometres = sum(lane.length for lane in town.lanes) / 1000.0
+        assert f"| `{name}` | {fold} | {len(town.lanes)} | {kilometres:.1f} |" in text
+    files = (importlib.resources.files("dorothie_gym.maps").joinpath("data", f"{name}.yaml") for name in town_names())
+    lines = [len(file.read_text(encoding="utf-8").splitlines()) for file in files]
+    assert f"a [YAML file of {min(lines)} to {max(lines)} lines]" in text
+    words = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+    drivers, everyone = len(names_for(Role.CO_WIZARD)), len({name for role in Role for name in names_for(role)})
+    assert f"and so can {words[drivers]} of the {words[everyone]} [trained models]" in text
 
 
 def test_home_page_shows_what_the_package_is() -> None:

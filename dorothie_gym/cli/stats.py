@@ -45,10 +45,10 @@ _ROWS = (
     ("physical actions", "physical_actions"),
 )
 _ANCHORS = (
-    ("commonest human move (UfN)", "commonest_human_move"),
+    ("commonest move of the participant (UfN)", "commonest_human_move"),
     ("commonest car move (RfN)", "commonest_car_move"),
     ("commonest navigation (NfD)", "commonest_navigation_action"),
-    ("human moves without slot", "human_moves_without_slot"),
+    ("moves of the participant without slot", "human_moves_without_slot"),
     ("car moves without slot", "car_moves_without_slot"),
 )
 _NOT_PER_SESSION = ("sessions", "vocabulary")

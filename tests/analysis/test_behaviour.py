@@ -103,4 +103,4 @@ def test_comparison_without_exceptions_is_undefined() -> None:
 def test_a_verdict_is_json() -> None:
     (first, *_) = verdicts_of([as_in_the_paper()] * 2, resamples=10)
     assert list(first.to_json()) == ["name", "title", "difference", "low", "high", "holds"]
-    assert first.claim.title.startswith("humans") and DialogueMove.INSTRUCT.label in first.claim.title
+    assert first.claim.title.startswith("participant") and DialogueMove.INSTRUCT.label in first.claim.title

@@ -130,7 +130,7 @@ def listening_inputs(scene: Scene, *, queued: bool) -> Inputs:
 
 
 def acting_inputs(scene: Scene, memory: Memory, *, queued: bool) -> tuple[Inputs, list[Physical | None]]:
-    """Returns the inputs of the second step, which drives and talks, and the possible commands."""
+    """Returns the inputs of the second step, which chooses a command and remarks, and the possible commands."""
     step = _step(scene, memory)
     commands = list(drive_options(scene.view, memory.town).values())[:MAX_COMMANDS]
     vectors = command_vectors(commands, memory, scene.view, step)

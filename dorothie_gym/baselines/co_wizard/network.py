@@ -57,7 +57,7 @@ class Heard:
 
 
 class CoWizardNetwork(nn.Module):
-    """Listens, drives and talks."""
+    """Scores the next memory, commands and remarks."""
 
     def __init__(self, layout: Layout) -> None:
         super().__init__()

@@ -110,7 +110,7 @@ class Turn:
 
 
 class LearnedCoWizard(Policy[LearnedState]):
-    """Co-Wizard that listens, remembers, drives and talks by its own network.
+    """Co-Wizard whose memory, goal, commands and remarks are decided by a network.
 
     Memory and commands are the likeliest ones; remarks are drawn. Names, numbers and words of a remark are filled in
     (see `remarks`); belief updates say how the memory has changed.
@@ -143,7 +143,7 @@ class LearnedCoWizard(Policy[LearnedState]):
         )  # fmt: skip
 
     def step(self, observation: ObservationMapping, state: LearnedState) -> tuple[ActionDict, LearnedState]:
-        """Listens, remembers, drives and talks."""
+        """Updates the memory, and chooses a command and remarks."""
         turn = self.play(observation, state)
         return turn.action.encode(self.limits), turn.state
 
