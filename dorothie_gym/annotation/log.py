@@ -10,19 +10,19 @@ from __future__ import annotations
 import enum
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Final
 
 import msgspec
 from msgspec import Meta, Struct
 
+from dorothie_gym.annotation.log_file import Extent, appending, check_place
 from dorothie_gym.annotation.marks import Annotation, Change, check_change
 from dorothie_gym.annotation.rows import ChangeRows, change_of, rows_of
 from dorothie_gym.annotation.source_text import SourceText
 from dorothie_gym.errors import AnnotationError, SessionError, one_line
 from dorothie_gym.files import make_folder, sync
-from dorothie_gym.input_files import check_value_count, raising
 from dorothie_gym.recording.file_names import ANNOTATIONS_FOLDER
 from dorothie_gym.recording.header import parse_version
 from dorothie_gym.recording.json_io import decode_text, read_bytes
@@ -34,8 +34,6 @@ RECORDED: Final = "recorded"
 """Name that stands for the labels of the session itself; no annotator can have it."""
 
 LOG_VERSION: Final = "1.0"
-MAX_LINES: Final = 50_000
-"""Most lines of a log; a long session takes some 3,000 edits."""
 
 _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}")
 
@@ -86,6 +84,29 @@ class LogLine(Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=Tru
     label: Annotated[str, Meta(max_length=80)] = ""
     by: Annotated[str, Meta(max_length=40)] = ""
     source: Annotated[str, Meta(max_length=40)] = ""
+
+
+class StaleError(AnnotationError):
+    """The marks were changed elsewhere, such as in another window or by another program."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edit:
+    """Edit that a person asks for.
+
+    Attributes:
+        action: mark, undo or redo.
+        change: the new marks, of a mark.
+        label: what the annotator did, in words.
+        by: who decided, in the final version.
+        source: annotator whose marks are taken over, in the final version.
+    """
+
+    action: Action = Action.MARK
+    change: Change = field(default_factory=Change)
+    label: str = ""
+    by: str = ""
+    source: str = ""
 
 
 def check_name(name: str) -> str:
@@ -141,6 +162,7 @@ class AnnotationLog:
 
     Raises:
         SessionError: the log is damaged, or of another session; the message names file and line.
+        AnnotationError: the log or its folder is a link.
         OSError: the log cannot be read.
     """
 
@@ -157,11 +179,16 @@ class AnnotationLog:
         self.edits, self.lines = 0, list[LogLine]()
         self._undo, self._redo = list[_Done](), list[_Done]()
         self._size = self._torn = 0
+        self._extent = Extent()
         self.annotation = Annotation.empty(text)
         self.pre_annotated = pre_annotation
+        check_place(self.path)
         if self.path.exists():
             self._read()
-        elif start is not None:
+        if not self.lines:  # there is no log, or a program died while it wrote the beginning of one
+            self._torn, self._size, self._extent = self._torn + self._size, 0, Extent()
+            self.pre_annotated = pre_annotation
+        if not self.lines and start is not None:
             first = start.difference(self.annotation)
             self.annotation = start
             if first:
@@ -189,8 +216,9 @@ class AnnotationLog:
             source: annotator whose marks are taken over, in the final version.
 
         Raises:
-            AnnotationError: the change does not fit the text, or another program has written to the log.
-            OSError: the log cannot be written.
+            AnnotationError: the change does not fit the text, or the log is full or a link.
+            StaleError: another program has written to the log.
+            OSError: the log cannot be written; then nothing of the edit is kept.
         """
         check_change(change, self.text)
         done = self.annotation.after(change).difference(self.annotation)
@@ -210,6 +238,26 @@ class AnnotationLog:
             return False
         self._append(Action.REDO, self._redo[-1].back, self._redo[-1].label)
         return True
+
+    def edit(self, edit: Edit) -> None:
+        """Takes an edit over; raises `AnnotationError` if there is nothing to undo or redo, and otherwise as `mark`."""
+        if edit.action is Action.MARK:
+            self.mark(edit.change, edit.label, by=edit.by, source=edit.source)
+        elif not (self.undo() if edit.action is Action.UNDO else self.redo()):
+            raise AnnotationError(f"there is nothing to {edit.action.value}")
+
+    def ends_with(self, edit: Edit) -> bool:
+        """Returns whether an edit is the last one of the log: if its answer was lost, it is asked for again."""
+        last = self.lines[-1] if self.lines else None
+        if last is None or last.action is not edit.action:
+            return False
+        if edit.action is not Action.MARK:
+            return True
+        if (last.label, last.by, last.source) != (edit.label[:80], edit.by, edit.source):
+            return False
+        check_change(edit.change, self.text)
+        before = self.annotation.after(self._undo[-1].back)
+        return rows_of(before.after(edit.change).difference(before)) == last.change
 
     def _append(self, action: Action, change: Change, label: str, by: str = "", source: str = "") -> None:
         line = LogLine(
@@ -241,9 +289,10 @@ class AnnotationLog:
             rows = [head, *self.lines, line]
             make_folder(self.path.parent)
         content = b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
-        with self.path.open("ab") as file:
+        extent = self._extent_with(content)
+        with appending(self.path, self._size) as file:
             if file.tell() != self._size + self._torn:
-                raise AnnotationError(f"{self.path}: was changed by another program; load the annotation again")
+                raise StaleError(f"{self.path}: was changed by another program; load the annotation again")
             if self._torn:  # a program died while it wrote; that edit was not acknowledged
                 file.truncate(self._size)
             file.write(content)
@@ -252,16 +301,30 @@ class AnnotationLog:
         if not self._size:
             sync(self.path.parent)
         self._size, self._torn = self._size + len(content), 0
+        self._extent = extent
+
+    def _extent_with(self, content: bytes) -> Extent:
+        """Returns the extent of the log with further lines; raises `AnnotationError` if it could not be read back."""
+        extent = self._extent.plus(Extent.of(content))
+        if extent.excess:
+            raise AnnotationError(
+                f"{self.path}: is full ({extent.excess}); export the annotation, and import it under another name"
+            )
+        for line in content.split(b"\n")[0 if self._size else 1 : -1]:
+            try:
+                msgspec.json.decode(line, type=LogLine)
+            except msgspec.ValidationError as error:
+                raise AnnotationError(f"{self.path}: cannot hold the edit: {one_line(error)}") from None
+        return extent
 
     # --- reading ------------------------------------------------------------------------------------------------------
 
     def _read(self) -> None:
         content = read_bytes(self.path)
-        if content.count(b"\n") > MAX_LINES:
-            raise SessionError(f"{self.path}: has more than {MAX_LINES} lines, which no log has; it is not read")
-        with raising(SessionError):
-            check_value_count(content, self.path)
         *lines, torn = content.split(b"\n")
+        self._extent = Extent.of(content[: len(content) - len(torn)])
+        if self._extent.excess:
+            raise SessionError(f"{self.path}: has more than {self._extent.excess}, which no log has; it is not read")
         self._size, self._torn = len(content) - len(torn), len(torn)
         for number, line in enumerate(lines, start=1):
             where = f"{self.path}, line {number}"
@@ -294,7 +357,7 @@ def read_annotation(text: SourceText, folder: Path, name: str) -> Annotation:
     """Returns the marks of an annotator, or of the final version (`ADJUDICATED`).
 
     Raises:
-        AnnotationError: there is no such log.
+        AnnotationError: there is no such log, or it is a link.
         SessionError: the log is damaged, or of another session.
     """
     if not log_path(folder, name).is_file():
