@@ -17,8 +17,8 @@ class ServedApplication:
 
     port: int
 
-    def __init__(self, application: Any, **options: Any) -> None:
-        self.server = uvicorn.Server(uvicorn.Config(application, port=0, log_level="warning", **options))
+    def __init__(self, application: Any, port: int = 0, **options: Any) -> None:
+        self.server = uvicorn.Server(uvicorn.Config(application, port=port, log_level="warning", **options))
         self.thread = threading.Thread(target=self.server.run, daemon=True)
 
     def __enter__(self) -> Self:

@@ -21,24 +21,28 @@ class RequestError(AnnotationError):
     """A request is malformed."""
 
 
-class Mark(Struct, forbid_unknown_fields=True, frozen=True):
-    """New marks: number of the last edit that the browser has seen, the change, and what was done, in words."""
+class Step(Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
+    """Undo or redo.
+
+    Attributes:
+        base: number of the last edit that the browser has seen.
+        again: whether it was sent before and got no answer; then it counts once.
+    """
 
     base: _Edit
+    again: bool = False
+
+
+class Mark(Step, forbid_unknown_fields=True, frozen=True, kw_only=True):
+    """New marks: the change, and what was done, in words."""
+
     change: ChangeRows
     label: Annotated[str, Meta(max_length=80)] = ""
 
 
-class Step(Struct, forbid_unknown_fields=True, frozen=True):
-    """Undo or redo: number of the last edit that the browser has seen."""
-
-    base: _Edit
-
-
-class Adopt(Struct, forbid_unknown_fields=True, frozen=True):
+class Adopt(Step, forbid_unknown_fields=True, frozen=True, kw_only=True):
     """Marks of an annotator for an utterance, to be taken over into the final version."""
 
-    base: _Edit
     speaker: Label
     utterance: Annotated[int, Meta(ge=0, lt=2**53)]
     annotator: Label

@@ -7,7 +7,6 @@ import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, Final, TypeAlias
-from urllib.parse import urlsplit
 
 import msgspec
 from starlette.applications import Starlette
@@ -17,13 +16,13 @@ from starlette.responses import FileResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from dorothie_gym.annotation.log import Action
+from dorothie_gym.annotation.log import Action, Edit, StaleError
 from dorothie_gym.annotation.requests import MAX_BODY, Adopt, Mark, RequestError, Step, decode
 from dorothie_gym.annotation.rows import change_of, utterance_id
 from dorothie_gym.annotation.vocabulary import vocabulary
-from dorothie_gym.annotation.workplace import Seat, SeatKind, StaleError, Workplace
+from dorothie_gym.annotation.workplace import Seat, SeatKind, Workplace, digest_of
 from dorothie_gym.console.server import STATIC as CONSOLE_STATIC
-from dorothie_gym.console.server import SecurityHeaders
+from dorothie_gym.console.server import SecurityHeaders, is_same_origin
 from dorothie_gym.console.town_page import town_page
 from dorothie_gym.errors import DorothieGymError
 from dorothie_gym.recording.file_names import MAX_FRAME
@@ -122,17 +121,16 @@ class AnnotationServer:
 
     def _seat(self, request: Request) -> Seat:
         """Returns the seat of a request; refuses wrong tokens, foreign pages and too many requests."""
-        origin = request.headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc.lower() != request.headers.get("host", "").lower():
+        if not is_same_origin(request):
             raise RefusedError(403, "requests of other pages are refused")
         scheme, _, token = request.headers.get("authorization", "").partition(" ")
-        seat = self.workplace.seats.get(token.strip()) if scheme.lower() == "bearer" else None
+        seat = self.workplace.seats.get(digest_of(token.strip())) if scheme.lower() == "bearer" else None
         if seat is None:
-            raise RefusedError(401, "this link leads to no seat; it may be of an earlier server")
-        budget, seen = self._budgets.get(seat.token, (BURST, time.monotonic()))
+            raise RefusedError(401, "this link leads to no seat; ask for your link again")
+        budget, seen = self._budgets.get(seat.digest, (BURST, time.monotonic()))
         now = time.monotonic()
         budget = min(BURST, budget + RATE * (now - seen))
-        self._budgets[seat.token] = max(budget - 1.0, 0.0), now
+        self._budgets[seat.digest] = max(budget - 1.0, 0.0), now
         if budget < 1.0:
             raise RefusedError(429, "too many requests; wait a moment")
         return seat
@@ -173,18 +171,17 @@ class AnnotationServer:
 
     async def _mark(self, request: Request, seat: Seat) -> Reply:
         body = decode(await _body(request), Mark)
-        change = change_of(body.change)
-        return await asyncio.to_thread(self.workplace.mark, seat, _number(request), body.base, change, body.label)
+        return await self._edit(request, seat, body, Edit(change=change_of(body.change), label=body.label))
 
     async def _undo(self, request: Request, seat: Seat) -> Reply:
-        return await self._step(request, seat, Action.UNDO)
+        return await self._edit(request, seat, decode(await _body(request), Step), Edit(action=Action.UNDO))
 
     async def _redo(self, request: Request, seat: Seat) -> Reply:
-        return await self._step(request, seat, Action.REDO)
+        return await self._edit(request, seat, decode(await _body(request), Step), Edit(action=Action.REDO))
 
-    async def _step(self, request: Request, seat: Seat, action: Action) -> Reply:
-        body = decode(await _body(request), Step)
-        return await asyncio.to_thread(self.workplace.step, seat, _number(request), body.base, action)
+    async def _edit(self, request: Request, seat: Seat, body: Step, edit: Edit) -> Reply:
+        number = _number(request)
+        return await asyncio.to_thread(self.workplace.edit, seat, number, body.base, edit, again=body.again)
 
     # --- adjudication -------------------------------------------------------------------------------------------------
 
@@ -199,8 +196,9 @@ class AnnotationServer:
     async def _adopt(self, request: Request, seat: Seat) -> Reply:
         _check_adjudicator(seat)
         body = decode(await _body(request), Adopt)
-        id = utterance_id(body.speaker, body.utterance)
-        return await asyncio.to_thread(self.workplace.adopt, seat, _number(request), body.base, id, body.annotator)
+        id, number = utterance_id(body.speaker, body.utterance), _number(request)
+        adopt = self.workplace.adopt
+        return await asyncio.to_thread(adopt, seat, number, body.base, id, body.annotator, again=body.again)
 
 
 def _check_adjudicator(seat: Seat) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import enum
+import hashlib
 import secrets
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,16 +16,17 @@ from dorothie_gym.annotation.comparison import adopted, consensus, disagreements
 from dorothie_gym.annotation.corpus_agreement import pair_agreement
 from dorothie_gym.annotation.log import (
     ADJUDICATED,
-    Action,
     AnnotationLog,
+    Edit,
     LogLine,
+    StaleError,
     annotators_of,
     log_path,
     read_annotation,
 )
 from dorothie_gym.annotation.marks import Annotation, Change
 from dorothie_gym.annotation.pre_annotation import pre_annotation
-from dorothie_gym.annotation.rows import rows_of, to_json
+from dorothie_gym.annotation.rows import change_of, rows_of, to_json
 from dorothie_gym.annotation.session_page import SessionPage
 from dorothie_gym.annotation.source_text import SourceText, UtteranceId
 from dorothie_gym.errors import AnnotationError
@@ -50,12 +52,19 @@ class Seat:
     Attributes:
         name: name of the person.
         kind: what the person does.
-        token: secret of the link, 128 bits.
+        token: secret of the link, 128 bits; empty for a link that an earlier server gave.
+        known_digest: SHA-256 of the secret of such a link.
     """
 
     name: str
     kind: SeatKind
     token: str = field(default_factory=lambda: secrets.token_urlsafe(16))
+    known_digest: str = ""
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the secret of the link, in hexadecimal digits."""
+        return self.known_digest or digest_of(self.token)
 
     @property
     def log(self) -> str:
@@ -63,8 +72,9 @@ class Seat:
         return ADJUDICATED if self.kind is SeatKind.ADJUDICATOR else self.name
 
 
-class StaleError(AnnotationError):
-    """The marks were changed elsewhere, such as in another window."""
+def digest_of(token: str) -> str:
+    """Returns the SHA-256 of a secret in hexadecimal digits; it has 128 random bits, so no slower hash is needed."""
+    return hashlib.sha256(token.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 class OpenSession:
@@ -86,15 +96,18 @@ class OpenSession:
     def log(self, seat: Seat) -> AnnotationLog:
         """Returns the log of a seat, read from the file when it is first asked for."""
         if seat.log not in self._logs:
-            start: Annotation | None = None
-            if seat.kind is SeatKind.ADJUDICATOR:
-                if len(annotators_of(self.folder)) and not log_path(self.folder, ADJUDICATED).exists():
-                    start = consensus(self.text, self.annotations())
-            elif self._pre_annotate and not log_path(self.folder, seat.log).exists():
-                start = pre_annotation(self.page.session, self.text)
-            suggested = start is not None and seat.kind is SeatKind.ANNOTATOR
-            self._logs[seat.log] = AnnotationLog(self.text, self.folder, seat.log, start, pre_annotation=suggested)
+            log = AnnotationLog(self.text, self.folder, seat.log)
+            if not log.lines and (start := self._start(seat)) is not None:
+                suggested = seat.kind is SeatKind.ANNOTATOR
+                log = AnnotationLog(self.text, self.folder, seat.log, start, pre_annotation=suggested)
+            self._logs[seat.log] = log
         return self._logs[seat.log]
+
+    def _start(self, seat: Seat) -> Annotation | None:
+        """Returns the marks with which a new log begins; None for an empty one."""
+        if seat.kind is SeatKind.ADJUDICATOR:
+            return consensus(self.text, self.annotations()) if annotators_of(self.folder) else None
+        return pre_annotation(self.page.session, self.text) if self._pre_annotate else None
 
     def forget(self, seat: Seat) -> None:
         """Reads the log of a seat again when it is next asked for."""
@@ -124,7 +137,7 @@ class Workplace:
         pre_annotate: bool = True,
     ) -> None:
         self.entries = tuple(entries)
-        self.seats = {seat.token: seat for seat in seats}
+        self.seats = {seat.digest: seat for seat in seats}
         self._maps, self._pre_annotate = maps, pre_annotate
         self._open: OrderedDict[int, OpenSession] = OrderedDict()
         self._lock = threading.RLock()
@@ -166,41 +179,40 @@ class Workplace:
             session.forget(seat)
             return _state(session.log(seat))
 
-    def mark(self, seat: Seat, number: int, base: int, change: Change, label: str) -> dict[str, Any]:
-        """Takes new marks over.
+    def edit(self, seat: Seat, number: int, base: int, edit: Edit, *, again: bool = False) -> dict[str, Any]:
+        """Takes an edit over: new marks, undo, or redo.
 
         Args:
-            seat: who marks.
+            seat: who edits.
             number: the session.
             base: number of the edit that the browser has seen last.
-            change: the new marks.
-            label: what was done, in words.
+            edit: what is to be done.
+            again: whether the browser asked for it before and got no answer; then it is done once only.
 
         Raises:
             StaleError: there were later edits.
-            AnnotationError: the change does not fit the session.
+            AnnotationError: the change does not fit the session, or there is nothing to undo or redo.
+            OSError: the log cannot be written.
         """
         with self._lock:
-            log = self._log(seat, number, base)
-            by = seat.name if seat.kind is SeatKind.ADJUDICATOR else ""
-            before = log.annotation
-            log.mark(change, label, by=by)
-            return _state(log, log.annotation.difference(before))
-
-    def step(self, seat: Seat, number: int, base: int, action: Action) -> dict[str, Any]:
-        """Takes the last edit back, or does it again. Errors as `mark`."""
-        with self._lock:
-            log = self._log(seat, number, base)
-            before = log.annotation
-            if not (log.undo() if action is Action.UNDO else log.redo()):
-                raise AnnotationError(f"there is nothing to {action.value}")
-            return _state(log, log.annotation.difference(before))
-
-    def _log(self, seat: Seat, number: int, base: int) -> AnnotationLog:
-        log = self.open(number).log(seat)
-        if base != log.edits:
-            raise StaleError("these marks were changed elsewhere; they are loaded again")
-        return log
+            session = self.open(number)
+            log = session.log(seat)
+            if seat.kind is SeatKind.ADJUDICATOR:
+                edit = replace(edit, by=seat.name)
+            if again and base == log.edits - 1 and log.ends_with(edit):
+                done = change_of(log.lines[-1].change)
+            elif base != log.edits:
+                raise StaleError("these marks were changed elsewhere; they are loaded again")
+            else:
+                before = log.annotation
+                try:
+                    log.edit(edit)
+                except OSError:
+                    session.forget(seat)  # what is in the file counts
+                    raise
+                done = log.annotation.difference(before)
+            # Only now is it settled with which suggestions a log begins: a server that was started anew may differ.
+            return _state(log, None if base == 0 else done)
 
     # --- adjudication -------------------------------------------------------------------------------------------------
 
@@ -225,20 +237,20 @@ class Workplace:
                 ],
             }
 
-    def adopt(self, seat: Seat, number: int, base: int, id: UtteranceId, annotator: str) -> dict[str, Any]:
-        """Takes the marks of an annotator for an utterance over into the final version. Errors as `mark`."""
+    def adopt(
+        self, seat: Seat, number: int, base: int, id: UtteranceId, annotator: str, *, again: bool = False
+    ) -> dict[str, Any]:  # fmt: skip
+        """Takes the marks of an annotator for an utterance over into the final version. Errors as `edit`."""
         with self._lock:
-            log = self._log(seat, number, base)
             session = self.open(number)
             if annotator not in annotators_of(session.folder):
                 raise AnnotationError(f"{annotator!r} has not annotated the session")
             source = read_annotation(session.text, session.folder, annotator)
             if id not in session.text.by_id:
                 raise AnnotationError(f"{id}: session {session.text.session} has no such utterance")
-            before = log.annotation
-            label = f"take over from {annotator}"
-            log.mark(adopted(session.text, source, id), label, by=seat.name, source=annotator)
-            return _state(log, log.annotation.difference(before))
+            change = adopted(session.text, source, id)
+            edit = Edit(change=change, label=f"take over from {annotator}", source=annotator)
+            return self.edit(seat, number, base, edit, again=again)
 
     def history(self, number: int, seat: Seat) -> list[dict[str, Any]]:
         """Returns the edits of the final version, the latest first."""
@@ -258,6 +270,7 @@ def _state(log: AnnotationLog, change: Change | None = None) -> dict[str, Any]:
         "pre_annotated": log.pre_annotated,
         "done": sum(span.act is not None for span in spans),
         "spans": len(spans),
+        "whole": change is None,
         "change": to_json(rows_of(shown)),
     }
 

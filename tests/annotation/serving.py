@@ -17,13 +17,17 @@ from tests.served_application import ServedApplication
 class Served(ServedApplication):
     """Server with the annotators Anna and Ben, and the adjudicator Carol."""
 
-    def __init__(self, corpus: Path, *, pre_annotate: bool = False) -> None:
-        self.seats = {name: Seat(name, SeatKind.ANNOTATOR) for name in ("anna", "ben")}
-        self.seats["carol"] = Seat("carol", SeatKind.ADJUDICATOR)
+    def __init__(
+        self, corpus: Path, *, pre_annotate: bool = False, seats: dict[str, Seat] | None = None, port: int = 0
+    ) -> None:
+        self.seats = seats or {
+            **{name: Seat(name, SeatKind.ANNOTATOR) for name in ("anna", "ben")},
+            "carol": Seat("carol", SeatKind.ADJUDICATOR),
+        }
         self.corpus = corpus
         workplace = Workplace(Corpus.load(corpus).entries, list(self.seats.values()), pre_annotate=pre_annotate)
         self.application = AnnotationServer(workplace)
-        super().__init__(self.application.app())
+        super().__init__(self.application.app(), port=port)
 
     def link(self, name: str) -> str:
         return f"http://127.0.0.1:{self.port}/annotate#{self.seats[name].token}"

@@ -2,119 +2,24 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 pytest.importorskip("playwright.sync_api", reason="needs playwright")
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
 from dorothie_gym.annotation.corpus_agreement import corpus_agreement
-from dorothie_gym.annotation.log import ADJUDICATED, read_annotation
-from dorothie_gym.annotation.marks import Annotation, SpanMark
-from dorothie_gym.annotation.source_text import SourceText
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import AGENT_ROLES, DialogueMove, LandmarkName, UnitEnd
-from dorothie_gym.policies import make_policy
-from dorothie_gym.recording import Corpus, EventType, Session
-from dorothie_gym.rollout import play_session
-from dorothie_gym.speech import encode_flac
+from dorothie_gym.annotation.log import ADJUDICATED
+from dorothie_gym.ontology import DialogueMove, LandmarkName, UnitEnd
+from dorothie_gym.recording import Corpus, Session
 from tests.annotation.builders import recorded
+from tests.annotation.people import Room, press
 from tests.annotation.serving import Served
-from tests.chromium import IN_CHROMIUM, WAIT, chromium
+from tests.chromium import IN_CHROMIUM
 
 pytestmark = IN_CHROMIUM
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium("--autoplay-policy=no-user-gesture-required") as launched:
-        yield launched
-
-
-@pytest.fixture(scope="module")
-def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
-    """Session of 40 s in brookside, with tones of half a second as audio of its spans where FLAC can be written."""
-    folder = tmp_path_factory.mktemp("recorded")
-    engine = SessionEngine("brookside", config=EnvConfig(max_seconds=40.0))
-    engine.reset(seed=7)
-    policies = {role: make_policy("scripted", role, engine.limits) for role in AGENT_ROLES}
-    play_session(engine, policies, seed=7, folder=folder / "plain")
-    recorded = Session.load(folder / "plain")
-    if find_spec("soundfile") is None:
-        return recorded
-    tone = encode_flac((0.2 * np.sin(np.arange(8000) / 5.0)).astype(np.float32))
-    events, files = [], {}
-    for k, event in enumerate(recorded.events):
-        if event.type is EventType.DIALOGUE_MOVE:
-            name = f"utterance_{k}_0.flac"
-            (folder / name).write_bytes(tone)
-            files[name] = folder / name
-            event = replace(event, data={**event.data, "audio": name})
-        events.append(event)
-    return replace(recorded, events=tuple(events), audio=files)
-
-
-class Room:
-    """Browsers of annotators; mistakes of the page fail the test."""
-
-    def __init__(self, browser: Any, served: Served, session: Session) -> None:
-        self.browser, self.served = browser, served
-        self.folder = served.corpus / "one"
-        self.text = SourceText.of(session)
-        self.errors: list[str] = []
-        self.pages: list[Any] = []
-
-    def open(self, name: str, width: int = 1280, height: int = 720, **options: Any) -> Any:
-        page = self.browser.new_context(viewport={"width": width, "height": height}, **options).new_page()
-        page.set_default_timeout(WAIT)
-        page.on("pageerror", lambda error: self.errors.append(f"{name}: {error}"))
-        page.on("console", lambda line: self.errors.append(f"{name}: {line.text}") if line.type == "error" else None)
-        page.goto(self.served.link(name))
-        page.wait_for_selector("body[data-ready=annotator], body[data-ready=adjudicator]")
-        self.pages.append(page)
-        return page
-
-    def marks(self, name: str) -> Annotation:
-        return read_annotation(self.text, self.folder, name)
-
-    def line(self, name: str, k: int) -> tuple[SpanMark, ...]:
-        return self.marks(name).utterances[self.text.lines[k].id]
-
-    def until(self, reached: Callable[[], object], seconds: float = 30.0) -> None:
-        end = time.monotonic() + seconds
-        while True:
-            try:
-                if reached():
-                    return
-            except ValueError:  # nothing has been written yet
-                pass
-            assert time.monotonic() < end, "not in time"
-            self.pages[0].wait_for_timeout(50)
-
-
-@pytest.fixture
-def room(browser: Any, session: Session, tmp_path: Path) -> Iterator[Room]:
-    session.save(tmp_path / "corpus" / "one")
-    with Served(tmp_path / "corpus") as served:
-        made = Room(browser, served, session)
-        yield made
-        for page in made.pages:
-            page.context.close()
-    assert not made.errors
-
-
-def press(page: Any, *keys: str) -> None:
-    for key in keys:
-        page.keyboard.press(key)
-        page.wait_for_timeout(30)
 
 
 def test_a_session_is_annotated_by_keyboard_alone(room: Room) -> None:
@@ -260,7 +165,7 @@ def test_a_second_window_notices_edits_of_the_first(room: Room) -> None:
     press(first, "i")
     room.until(lambda: room.line("anna", 0)[0].move is DialogueMove.INSTRUCT)
     press(second, "ArrowDown", "c")
-    second.wait_for_selector(".notices >> text=changed elsewhere")
+    second.wait_for_selector("#dropped >> text=changed elsewhere")
     second.wait_for_selector(".span.decided >> text=Instruct")
     room.errors = [line for line in room.errors if "409" not in line]  # the browser reports the refusal
 

@@ -96,6 +96,66 @@ def test_edits_of_two_windows_do_not_overwrite_each_other(served: Served) -> Non
     assert served.ask("sessions/0/marks")["edit"] == 1
 
 
+def test_an_edit_that_is_sent_again_counts_once(served: Served) -> None:
+    row = {"speaker": "participant", "utterance": 0, "spans": [INSTRUCT]}
+    requests: list[tuple[str, dict[str, object]]] = [
+        ("mark", {"base": 0, "label": "a", "change": {"utterances": [row]}}),
+        ("undo", {"base": 1}),
+        ("redo", {"base": 2}),
+    ]
+    for edit, (action, body) in enumerate(requests, start=1):
+        first = served.ask(f"sessions/0/{action}", body)
+        again = served.ask(f"sessions/0/{action}", {**body, "again": True})
+        assert first == again and again["edit"] == edit, action
+        assert served.raw(f"/api/sessions/0/{action}", json.dumps(body).encode())[0] == 409, "another window"
+    other = {"base": 2, "again": True, "label": "b", "change": {"utterances": [row]}}
+    assert served.raw("/api/sessions/0/mark", json.dumps(other).encode())[0] == 409, "the last edit is a redo"
+    served.mark(3, 0, {"words": 4, "move": "Check"})
+    late = {"base": 2, "again": True}
+    assert served.raw("/api/sessions/0/redo", json.dumps(late).encode())[0] == 409, "there was another edit since"
+    for label, move in (("test", "Align"), ("other", "Check")):
+        change = {"utterances": [{**row, "spans": [{"words": 4, "move": move}]}]}
+        body = {"base": 3, "again": True, "label": label, "change": change}
+        assert served.raw("/api/sessions/0/mark", json.dumps(body).encode())[0] == 409
+    adopt = {"base": 0, "speaker": "participant", "utterance": 0, "annotator": "anna"}
+    first = served.ask("sessions/0/adopt", adopt, "carol")
+    assert served.ask("sessions/0/adopt", {**adopt, "again": True}, "carol") == first
+    assert len((served.corpus / "one" / "annotations" / "anna.jsonl").read_text().splitlines()) == 5
+
+
+def test_logs_that_are_links_are_refused_and_not_written(served: Served) -> None:
+    outside = served.corpus.parent / "outside"
+    outside.write_bytes(b"a secret")
+    folder = served.corpus / "one" / "annotations"
+    folder.mkdir()
+    (folder / "anna.jsonl").symlink_to(outside)
+    (folder / "adjudicated.jsonl").symlink_to(outside.parent / "missing")
+    body = json.dumps(
+        {"base": 0, "change": {"utterances": [{"speaker": "participant", "utterance": 0, "spans": [INSTRUCT]}]}}
+    )
+    for name, path, content in (
+        ("anna", "marks", None), ("anna", "mark", body), ("anna", "undo", '{"base":0}'), ("carol", "mark", body),
+        ("carol", "versions", None),
+    ):  # fmt: skip
+        status, _, answer = served.raw(f"/api/sessions/0/{path}", content and content.encode(), name)
+        assert status == 400 and "is a link" in json.loads(answer)["reason"], (name, path, answer)
+    assert outside.read_bytes() == b"a secret" and not (outside.parent / "missing").exists()
+    assert served.mark(0, 0, INSTRUCT, name="ben")["edit"] == 1, "others are not concerned"
+
+
+def test_the_first_answer_has_all_marks_with_which_the_log_begins(tmp_path: Path) -> None:
+    _, text = recorded(tmp_path / "c" / "one")
+    with Served(tmp_path / "c") as running:
+        assert running.ask("sessions/0/marks", name="carol")["done"] == 0
+        seats = running.seats
+    session, _ = recorded(tmp_path / "copy")
+    annotate(tmp_path / "c" / "one", text, "anna", recorded_annotation(session, text))
+    with Served(tmp_path / "c", seats=seats) as running:  # it begins with what all agree on by now
+        state = running.mark(0, 0, {"words": 4, "move": "Check"}, name="carol")
+        assert state["whole"] and state["done"] == 7 and len(state["change"]["utterances"]) == 5
+        assert not running.mark(1, 0, {"words": 4, "move": "Align"}, name="carol")["whole"]
+
+
 def test_the_adjudicator_decides_with_a_history(served: Served) -> None:
     session, text = recorded(served.corpus.parent / "copy")
     first = recorded_annotation(session, text)
@@ -152,6 +212,32 @@ def test_wrong_tokens_and_pages_of_other_hosts_are_refused(served: Served) -> No
         assert served.raw("/api/seat", name=None, Authorization=token)[0] == 401
     assert served.raw("/api/seat", Origin="https://example.org")[0] == 403
     assert served.raw("/api/seat", Origin=f"http://127.0.0.1:{served.port}")[0] == 200
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "http://[",
+        "http://[::1",
+        "http://[x]",
+        "//[",
+        "http://a]b",
+        "null",
+        "",
+        "x",
+        "http://\xe9.example",
+        "http://a:b@[",
+    ],
+)
+def test_a_malformed_origin_is_refused_before_the_token_is_looked_at(
+    served: Served, caplog: pytest.LogCaptureFixture, origin: str
+) -> None:
+    bodies = {"sessions/0/mark": json.dumps({"base": 0, "change": {}}).encode(), "sessions/0/undo": b"{"}
+    for path in ("seat", "sessions/0/marks", "sessions/0/mark", "sessions/0/undo", "sessions/99999999999999"):
+        for headers in ({}, {"Authorization": "Bearer x"}, {"Authorization": f"Bearer {served.seats['anna'].token}"}):
+            status, _, content = served.raw(f"/api/{path}", bodies.get(path), None, Origin=origin, **headers)
+            assert status == 403 and "other pages" in json.loads(content)["reason"], (path, headers)
+    assert not caplog.records and not (served.corpus / "one" / "annotations").exists()
 
 
 def test_every_answer_forbids_foreign_content(served: Served) -> None:

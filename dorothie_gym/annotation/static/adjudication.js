@@ -17,7 +17,9 @@ export class Adjudication {
   }
 
   async load(transcript) {
-    this.versions = await this.api.json(`sessions/${this.number}/versions`);
+    try {
+      this.versions = await this.api.patiently(`sessions/${this.number}/versions`);
+    } catch (error) { this.figures.textContent = error.message; return; }
     const at = new Map(this.page.utterances.map((line, k) => [`${line.speaker}/${line.utterance}`, k]));
     transcript.flagged = new Map(this.versions.disagreements.map(({ speaker, utterance, layers }) => [at.get(`${speaker}/${utterance}`), layers.map(layer => LAYERS[layer] ?? layer).join(', ')]));
     this.names = Object.keys(this.versions.annotators);
@@ -49,8 +51,8 @@ export class Adjudication {
   take(n) { if (this.names?.[n]) this.marks.adopt(this.k, this.names[n]); }
 
   async history() {
-    await this.marks.chain;
-    const rows = await this.api.json(`sessions/${this.number}/history`);
+    await this.marks.settled();
+    const rows = await this.api.patiently(`sessions/${this.number}/history`);
     popover('History of the final version', close => [
       rows.length ? h('ol', { class: 'history', tabindex: '0', 'aria-label': 'Decisions, the latest first' }, rows.map(row => h('li', { text: `${row.edit}. ${row.by || 'start'}: ${row.action === 'mark' ? '' : `${row.action} `}${row.label || (row.action === 'start' ? 'what all annotators agree on' : 'mark')}${row.utterances.length === 1 ? ` (${row.utterances[0].join(' ')})` : ''}` }))) : h('p', { text: 'Nothing has been decided yet.' }),
       h('button', { type: 'button', class: 'primary', onclick: close }, 'Close'),

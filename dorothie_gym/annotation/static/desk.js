@@ -6,15 +6,18 @@ import { Adjudication } from './adjudication.js';
 import { Decision } from './decision.js';
 import { Film } from './film.js';
 import { Marks } from './marks.js';
+import { closePopover } from './popover.js';
+import { chooseWord } from './split.js';
 import { Timeline } from './timeline.js';
 import { Transcript } from './transcript.js';
 import { chooseExchange, chooseTransaction } from './units.js';
 import { chooseValues } from './values.js';
 
 export class Desk {
-  static async open(api, seat, number, onstate) {
-    const page = await api.json(`sessions/${number}`);
+  static async open(api, seat, number, onstate, onwait) {
+    const page = await api.patiently(`sessions/${number}`, { onwait });
     const marks = new Marks(api, number, page.utterances);
+    marks.addEventListener('change', () => onwait(marks.trouble), { once: true });
     await marks.load();
     return new Desk(api, seat, number, page, marks, onstate);
   }
@@ -34,7 +37,8 @@ export class Desk {
     this.adjudication = seat.kind === 'adjudicator' ? new Adjudication(api, number, page, marks, this.keys) : null;
     const left = h('div', { class: 'left' }, this.film.element, this.adjudication?.element ?? this.about());
     this.element = h('div', { class: 'desk' }, left, this.transcript.element, side, this.timeline.element);
-    marks.addEventListener('change', () => { this.refresh(); onstate({ waiting: marks.waiting, lost: marks.lost, pre: marks.preAnnotated }); });
+    marks.addEventListener('change', () => { this.refresh(); onstate(marks); });
+    marks.addEventListener('dropped', () => closePopover());
     this.addKeys();
     this.onkey = event => this.control(event);
     addEventListener('keydown', this.onkey);
@@ -149,11 +153,11 @@ export class Desk {
     const { marks, k, s } = this, { words: count } = this.span;
     if (count < 2) return;
     const first = marks.first(k, s), said = this.page.utterances[k].words.slice(first, first + count);
-    import('./split.js').then(({ chooseWord }) => chooseWord(said, at => {
+    chooseWord(said, at => {
       const spans = marks.spans[k].flatMap((span, i) => (i === s ? [{ ...span, words: at }, { ...span, words: count - at }] : [span]));
       this.remark('split', spans);
       this.select(k, s, { seek: false });
-    }));
+    });
   }
 
   merge() {

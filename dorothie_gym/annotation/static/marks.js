@@ -1,6 +1,7 @@
-// Marks of the annotator: spans by utterance, exchanges, transactions; edits are sent one after the other.
-
-import { notice } from '/static/dom.js';
+// Marks of the annotator: spans by utterance, exchanges, transactions. Edits wait in a queue and are sent one by one.
+//
+// What is shown is the state of the server with the marks that wait. Each load begins a generation: edits of an earlier
+// one were made on marks that are no longer there, so they are dropped and named.
 
 const key = (speaker, utterance) => `${speaker}/${utterance}`;
 
@@ -8,27 +9,39 @@ export class Marks extends EventTarget {
   /** @param api connection. @param number session. @param lines utterances of the session. */
   constructor(api, number, lines) {
     super();
-    Object.assign(this, { api, number, lines, spans: [], exchanges: new Map(), transactions: new Map(), edit: 0, undo: null, redo: null, waiting: 0, chain: Promise.resolve() });
+    Object.assign(this, { api, number, lines, spans: [], exchanges: new Map(), transactions: new Map(), edit: 0, undo: null, redo: null, generation: 0, queue: [], sending: false, trouble: null, refused: null });
     this.index = new Map(lines.map((line, k) => [key(line.speaker, line.utterance), k]));
   }
 
+  /** Number of edits that wait for the server. */
+  get waiting() { return this.queue.length; }
+
   async load() {
-    const state = await this.api.json(`sessions/${this.number}/marks`);
-    this.spans = this.lines.map(line => [{ words: line.words.length }]);
-    this.exchanges.clear(); this.transactions.clear();
-    this.take(state, true);
+    const state = await this.ask('marks');
+    this.generation++;
+    this.take(state);
   }
 
-  take(state, withChange) {
+  /** Takes the state of the server after an edit or a load; marks that wait are shown on top of it. */
+  take(state) {
     Object.assign(this, { edit: state.edit, undo: state.undo, redo: state.redo, done: state.done, total: state.spans, preAnnotated: state.pre_annotated });
-    if (withChange) this.apply(state.change);
+    if (state.whole) this.served = { spans: this.lines.map(line => [{ words: line.words.length }]), exchanges: new Map(), transactions: new Map() };
+    this.apply(state.change, this.served);
+    this.show();
+  }
+
+  /** Shows the state of the server with the marks that wait. */
+  show() {
+    const { spans, exchanges, transactions } = this.served;
+    Object.assign(this, { spans: [...spans], exchanges: new Map(exchanges), transactions: new Map(transactions) });
+    for (const { generation, body } of this.queue) if (generation === this.generation && body.change) this.apply(body.change, this);
     this.changed();
   }
 
-  apply({ utterances = [], exchanges = [], transactions = [] }) {
-    for (const row of utterances) this.spans[this.index.get(key(row.speaker, row.utterance))] = row.spans;
-    for (const { exchange, ...mark } of exchanges) this.exchanges.set(exchange, mark);
-    for (const { transaction, ...mark } of transactions) this.transactions.set(transaction, mark);
+  apply({ utterances = [], exchanges = [], transactions = [] }, to) {
+    for (const row of utterances) to.spans[this.index.get(key(row.speaker, row.utterance))] = row.spans;
+    for (const { exchange, ...mark } of exchanges) to.exchanges.set(exchange, mark);
+    for (const { transaction, ...mark } of transactions) to.transactions.set(transaction, mark);
   }
 
   changed() { this.dispatchEvent(new Event('change')); }
@@ -41,30 +54,71 @@ export class Marks extends EventTarget {
       utterances: [...utterances].map(([k, spans]) => ({ speaker: this.lines[k].speaker, utterance: this.lines[k].utterance, spans: spans.map(plain) })),
       exchanges, transactions,
     };
-    this.apply(change);
-    this.send(() => this.api.json(`sessions/${this.number}/mark`, { base: this.edit, label, change }), false);
+    const [k] = utterances.keys();
+    this.send('mark', { label, change }, label, k);
   }
 
-  step(action) { this.send(() => this.api.json(`sessions/${this.number}/${action}`, { base: this.edit }), true); }
+  step(action) { this.send(action, {}, action); }
 
   adopt(k, annotator) {
     const { speaker, utterance } = this.lines[k];
-    this.send(() => this.api.json(`sessions/${this.number}/adopt`, { base: this.edit, speaker, utterance, annotator }), true);
+    this.send('adopt', { speaker, utterance, annotator }, `take over from ${annotator}`, k);
   }
 
-  send(request, withChange) {
-    this.waiting++;
+  /** Queues an edit; `label` names it, with the words of utterance `k` if it is about one. */
+  send(action, body, label, k) {
+    if (this.refused) { notice(`Not saved: ${this.refused}. Reload the page.`, 'error'); return; }
+    const said = k === undefined ? '' : this.lines[k].words.join(' ');
+    const name = said ? `${label}: “${said.length > 40 ? `${said.slice(0, 40)} …` : said}”` : label;
+    this.queue.push({ action, body, name, generation: this.generation });
+    this.show();
+    this.work();
+  }
+
+  /** Sends the edits that wait, one after the other. */
+  async work() {
+    if (this.sending) return;
+    this.sending = true;
+    while (this.queue.length) await this.sendFirst();
+    this.sending = false;
     this.changed();
-    this.chain = this.chain.then(request).then(
-      state => { this.waiting--; this.take(state, withChange || !this.waiting); },
-      error => this.failed(error));
+    this.dispatchEvent(new Event('saved'));
   }
 
-  async failed(error) {
-    this.waiting = Math.max(0, this.waiting - 1);
-    notice(error.status ? sentence(error.message) : 'Not saved: the server does not answer. The last edit was taken back.', 'error');
-    try { await this.load(); } catch { this.lost = true; this.changed(); }
+  async sendFirst() {
+    const { action, body } = this.queue[0], base = this.edit;
+    let state;
+    try {
+      state = await this.ask(action, again => ({ ...body, base, ...(again && { again }) }));
+    } catch (error) {
+      await this.failed(error, this.queue[0]);
+      return;
+    }
+    this.queue.shift();
+    this.take(state);
   }
+
+  /** Drops what cannot be saved: an undo without anything to undo, or all edits that were made on former marks. */
+  async failed(error, edit) {
+    if (edit.action !== 'mark' && error.status === 400) {
+      this.queue.shift();
+      notice(sentence(error.message), 'error');
+      return;
+    }
+    try { await this.load(); } catch (later) { this.refused = later.message; }
+    const dropped = this.queue.filter(({ generation }) => this.refused || generation < this.generation);
+    this.queue = this.queue.filter(each => !dropped.includes(each));
+    this.show();
+    this.dispatchEvent(new CustomEvent('dropped', { detail: { reason: this.refused ?? error.message, names: dropped.map(({ name }) => name) } }));
+  }
+
+  ask(path, body) {
+    const onwait = trouble => { if (trouble !== this.trouble) { this.trouble = trouble; this.changed(); } };
+    return this.api.patiently(`sessions/${this.number}/${path}`, { body, onwait, waits: refusal => refusal.passes || refusal.isOfLink });
+  }
+
+  /** Waits until no edit waits. */
+  async settled() { while (this.queue.length) await new Promise(resolve => this.addEventListener('saved', resolve, { once: true })); }
 
   // --- views --------------------------------------------------------------------------------------------------------
 

@@ -2,11 +2,16 @@
 
 import { h } from '/static/dom.js';
 
+let closeOpen = () => {};
+
+/** Closes the dialog that is open, such as when what it is about has changed. */
+export function closePopover() { closeOpen(); }
+
 /** Shows a dialog. `keys` maps keys to functions; `make(close)` returns its content. */
 export function popover(title, make, keys = {}) {
-  document.querySelector('.popover')?.remove();
+  closePopover();
   const before = document.activeElement;
-  const close = () => { box.remove(); removeEventListener('pointerdown', outside, true); if (before?.isConnected) before.focus(); };
+  const close = () => { box.remove(); removeEventListener('pointerdown', outside, true); closeOpen = () => {}; if (before?.isConnected) before.focus(); };
   const outside = event => { if (!box.contains(event.target)) close(); };
   const box = h('div', { class: 'popover centred', role: 'dialog', 'aria-label': title });
   const fill = () => {
@@ -22,6 +27,7 @@ export function popover(title, make, keys = {}) {
     if (run) { event.preventDefault(); run(close, fill); return; }
     if (event.key === 'Tab') trap(event, box);
   });
+  closeOpen = close;
   fill();
   document.body.append(box);
   addEventListener('pointerdown', outside, true);
