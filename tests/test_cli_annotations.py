@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import urllib.error
 import urllib.request
 from pathlib import Path
 from typing import Any
@@ -156,6 +157,51 @@ def test_annotate_prints_a_link_for_each_person_and_ends_at_a_signal(tmp_path: P
         finally:
             server.send_signal(signal.SIGTERM)
         server.wait(20)
+
+
+def _serve(folder: Path, *more: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "dorothie_gym.cli", "annotate", "corpus", "--port", "0", "--json", *more]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ, cwd=folder)
+
+
+def _status(address: str, token: str) -> int:
+    request = urllib.request.Request(address.replace("/annotate", "/api/seat"))
+    request.add_header("Authorization", f"Bearer {token}")
+    try:
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as error:
+        with error:
+            return error.code
+
+
+@pytest.mark.long
+def test_links_live_on_after_a_kill_until_new_ones_are_asked_for(tmp_path: Path) -> None:
+    pytest.importorskip("uvicorn", reason="needs the extra console")
+    corpus()
+    tokens: dict[str, str] = {}
+    people = ("--annotator", "anna", "--adjudicator", "carol")
+    for options, new in (
+        (people, ["anna", "carol"]), ((*people, "--annotator", "ben"), ["ben"]), (people, []),
+        ((*people, "--new-links"), ["anna", "carol"]),
+    ):  # fmt: skip
+        old = dict(tokens)
+        with _serve(tmp_path, *options) as server:
+            try:
+                assert server.stdout is not None
+                found = json.loads(server.stdout.readline())
+                assert sorted(name for name, link in found["links"].items() if link) == new
+                tokens |= {name: link.split("#")[1] for name, link in found["links"].items() if link}
+                for name in found["links"]:
+                    assert _status(found["address"], tokens[name]) == 200
+                if "--new-links" in options:
+                    assert [_status(found["address"], token) for token in old.values()] == [401] * 3
+                elif "ben" in tokens and "ben" not in found["links"]:
+                    assert _status(found["address"], tokens["ben"]) == 401, "Ben does not take part this time"
+            finally:
+                server.kill()
+    kept = (tmp_path / "corpus" / "annotations" / "links.json").read_text(encoding="utf-8")
+    assert not any(token in kept for token in tokens.values())
 
 
 @pytest.mark.long

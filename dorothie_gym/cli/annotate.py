@@ -14,7 +14,7 @@ from dorothie_gym.cli.serving import LOCAL, Host, Port, address, check_libraries
 from dorothie_gym.cli.warm_up import compile_first
 
 if TYPE_CHECKING:
-    from dorothie_gym.annotation.workplace import Seat
+    from dorothie_gym.annotation.workplace import SeatKind
 
 PORT = 8024
 """Usual port of the annotation tool."""
@@ -33,6 +33,9 @@ def annotate(
     pre_annotation: Annotated[
         bool, typer.Option(help="Begin with marks of the classifier, which the annotator accepts or corrects.")
     ] = True,
+    new_links: Annotated[
+        bool, typer.Option("--new-links", help="Give everybody a new link; links given before stop working.")
+    ] = False,
     maps: Maps = None,
     host: Host = LOCAL,
     port: Port = PORT,
@@ -41,38 +44,45 @@ def annotate(
     """Annotate sessions in the browser: prints a link for each annotator, who do not see each other's marks.
 
     Marks are written at once into the folder annotations of each session; the session itself is never changed.
+    Links go on working when the server is started again; only hashes of their secrets are kept.
     """
     check_libraries("annotate")
     with reporting_errors():
+        from dorothie_gym.annotation.links import keep_links, seats_of
         from dorothie_gym.annotation.server import AnnotationServer
         from dorothie_gym.annotation.workplace import Workplace
 
-        seats = _seats(annotator or ([] if adjudicator is not None else ["annotator"]), adjudicator)
+        people = _people(annotator or ([] if adjudicator is not None else ["annotator"]), adjudicator)
         entries = load_corpus(path, maps).entries
+        seats = seats_of(path, people, renew=new_links)
         workplace = Workplace(entries, seats, maps=maps, pre_annotate=pre_annotation)
         if len(entries) == 1:
             workplace.open(0)  # a session that cannot be annotated is refused here
     compile_first(pictures=True)
     listener = listen(host, port)
     server = address(host, listener.getsockname()[1])
-    links = {seat.name: f"{server}/annotate#{seat.token}" for seat in seats}
+    with reporting_errors():
+        keep_links(path, seats, renew=new_links)
+    links = {seat.name: f"{server}/annotate#{seat.token}" if seat.token else None for seat in seats}
     if as_json:
-        print_json({"links": links, "sessions": len(entries)})
+        print_json({"address": f"{server}/annotate", "links": links, "sessions": len(entries)})
     else:
-        for seat in seats:
-            stdout().print(f"{seat.name:<13} {links[seat.name]}", soft_wrap=True)
+        for name, link in links.items():
+            stdout().print(f"{name:<13} {link or f'has a link: {server}/annotate# and the secret'}", soft_wrap=True)
+        if None in links.values():
+            stdout().print("Links given before still work; --new-links replaces them.", soft_wrap=True)
         stdout().print("Marks are saved at once. Ctrl-C ends the server.", soft_wrap=True)
     serve(AnnotationServer(workplace).app(), listener)
 
 
-def _seats(annotators: Sequence[str], adjudicator: str | None) -> list[Seat]:
+def _people(annotators: Sequence[str], adjudicator: str | None) -> list[tuple[str, SeatKind]]:
     from dorothie_gym.annotation.log import check_name
-    from dorothie_gym.annotation.workplace import Seat, SeatKind
+    from dorothie_gym.annotation.workplace import SeatKind
 
-    seats = [Seat(check_name(name), SeatKind.ANNOTATOR) for name in annotators]
+    people = [(check_name(name), SeatKind.ANNOTATOR) for name in annotators]
     if adjudicator is not None:
-        seats.append(Seat(check_name(adjudicator), SeatKind.ADJUDICATOR))
-    names = [seat.name.lower() for seat in seats]
+        people.append((check_name(adjudicator), SeatKind.ADJUDICATOR))
+    names = [name.lower() for name, _ in people]
     if len(set(names)) < len(names):
         fail("two people have the same name; give each a name of its own")
-    return seats
+    return people
