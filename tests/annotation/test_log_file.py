@@ -117,7 +117,7 @@ def fill(log: AnnotationLog, changes: Sequence[Change], until: Extent) -> None:
     ("spare", "words", "limit"),
     [
         (Extent(lines=3), 4, f"{MAX_LINES} lines"),
-        (Extent(size=5000), 4, "64 MiB"),
+        pytest.param(Extent(size=5000), 4, "64 MiB", marks=pytest.mark.slow),
         pytest.param(Extent(values=3000), LONG_TEXT, f"{MAX_VALUES} values", marks=pytest.mark.slow),
     ],
     ids=["lines", "bytes", "values"],

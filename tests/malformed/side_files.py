@@ -9,11 +9,14 @@ from pathlib import Path
 
 def make_annotations(folder: Path) -> None:
     from dorothie_gym.annotation.formats import Format, export_annotation
+    from dorothie_gym.annotation.links import keep_links
+    from dorothie_gym.annotation.workplace import Seat, SeatKind
     from tests.annotation.builders import annotate, random_annotation, recorded
 
     one, text = recorded(folder / "one")
     for seed, name in enumerate(("anna", "ben", "adjudicated")):
         annotate(folder / "one", text, name, random_annotation(text, random.Random(seed), complete=True))
+    keep_links(folder, [Seat("anna", SeatKind.ANNOTATOR, "secret"), Seat("carol", SeatKind.ADJUDICATOR, "other")])
     for to in (Format.JSONL, Format.ELAN):
         export_annotation(one, random_annotation(text, random.Random(7)), "carl", folder / f"carl{to.suffix}", to)
 
@@ -21,6 +24,7 @@ def make_annotations(folder: Path) -> None:
 def read_annotations(folder: Path) -> None:
     from dorothie_gym.annotation.corpus_agreement import corpus_agreement
     from dorothie_gym.annotation.formats import import_annotation
+    from dorothie_gym.annotation.links import read_links
     from dorothie_gym.errors import DorothieGymError
     from dorothie_gym.recording import Corpus, Session
 
@@ -29,6 +33,10 @@ def read_annotations(folder: Path) -> None:
     try:
         session = Session.load(folder / "one")
         corpus_agreement(Corpus.load(folder).entries, with_alpha=False)
+    except DorothieGymError as error:
+        refusals.append(error)
+    try:
+        read_links(folder)
     except DorothieGymError as error:
         refusals.append(error)
     for name in ("carl.jsonl", "carl.eaf"):
