@@ -34,9 +34,9 @@ from tests.annotation.marking import ANNA, content_of, mark_on_and_on, random_ed
 
 resource = pytest.importorskip("resource", reason="limits the size of files, which Windows cannot")
 
-WRITES = [(1, 40), pytest.param(2, 600, marks=pytest.mark.long)]
-KILLS = [(1, 4), pytest.param(2, 40, marks=pytest.mark.long), pytest.param(3, 300, marks=pytest.mark.slow)]
-SERVER_KILLS = [pytest.param(1, 4, marks=pytest.mark.long), pytest.param(2, 40, marks=pytest.mark.slow)]
+WRITES = [(1, 40), pytest.param(2, 400, marks=pytest.mark.long)]
+KILLS = [(1, 4), pytest.param(2, 25, marks=pytest.mark.long), pytest.param(3, 300, marks=pytest.mark.slow)]
+SERVER_KILLS = [pytest.param(1, 3, marks=pytest.mark.long), pytest.param(2, 40, marks=pytest.mark.slow)]
 
 
 @contextmanager
@@ -58,7 +58,7 @@ def test_writes_that_fail_lose_nothing_and_leave_nothing(
     _, text = recorded(tmp_path / "c" / "one")
     path, work, failed = log_path(tmp_path / "c" / "one", "anna"), workplace(tmp_path / "c"), 0
     base = work.marks(ANNA, 0)["edit"]
-    for _ in range(count):
+    for number in range(count):
         edit, before = random_edit(work, text, rng), path.read_bytes() if path.exists() else None
         size = len(before or b"")
         try:
@@ -70,7 +70,9 @@ def test_writes_that_fail_lose_nothing_and_leave_nothing(
             if rng.random() < 0.3:
                 work = workplace(tmp_path / "c")  # the server is started anew
             base = work.edit(ANNA, 0, base, edit, again=True)["edit"]
-        assert AnnotationLog(text, tmp_path / "c" / "one", "anna").annotation == work.open(0).log(ANNA).annotation
+        if number % 20 == 0 or number == count - 1:  # reading all of it takes long
+            log = AnnotationLog(text, tmp_path / "c" / "one", "anna")
+            assert (log.annotation, log.edits) == (work.open(0).log(ANNA).annotation, base)
     assert count / 10 < failed < count and base == work.open(0).log(ANNA).edits
     assert work.open(0).log(ANNA).lines[0].action is Action.START, "the suggestions were kept"
 
