@@ -15,7 +15,7 @@ from dorothie_gym.annotation.log import ADJUDICATED
 from dorothie_gym.ontology import DialogueMove, LandmarkName, UnitEnd
 from dorothie_gym.recording import Corpus, Session
 from tests.annotation.builders import recorded
-from tests.annotation.people import Room, press
+from tests.annotation.people import Room, forgive, press, saved
 from tests.annotation.serving import Served
 from tests.chromium import IN_CHROMIUM
 
@@ -190,6 +190,13 @@ def test_axe_finds_no_violation(room: Room, name: str) -> None:
     room.until(lambda: room.marks("anna").exchanges)
     page = first if name == "anna" else room.open(name, bypass_csp=True)
     page.wait_for_timeout(500)
+    if name == "anna":  # an edit that another window has overtaken is named
+        other = room.open("anna")
+        press(other, "e")
+        saved(room, other)
+        press(page, "c")
+        page.wait_for_selector("#dropped li")
+        forgive(room, "409")
     for keys in ((), ("g",), ("Escape", "x"), ("Escape", "s"), ("Escape", "?")):
         press(page, *keys)
         found = axe.run(page).response["violations"]

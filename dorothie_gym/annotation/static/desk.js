@@ -54,7 +54,7 @@ export class Desk {
   close() { this.film.close(); removeEventListener('keydown', this.onkey); this.keys.rows = []; this.element.remove(); }
 
   about() {
-    return h('section', { class: 'panel about', 'aria-labelledby': 'about-title' }, h('h2', { id: 'about-title', text: 'Session' }), this.page.story ? h('p', { class: 'story', text: this.page.story }) : null,
+    return h('section', { class: 'panel about', tabindex: '0', 'aria-labelledby': 'about-title' }, h('h2', { id: 'about-title', text: 'Session' }), this.page.story ? h('p', { class: 'story', text: this.page.story }) : null,
       h('ul', {}, this.page.errands.map(text => h('li', { text }))));
   }
 
