@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dorothie_gym.cli.options import AsJson
-from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, stdout
+from dorothie_gym.cli.output import FAILED, Facts, fail, print_json, reporting_errors, stdout
 from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_libraries, listen, serve
 from dorothie_gym.cli.warm_up import compile_first
 
@@ -179,26 +178,36 @@ def delete(
     as_json: AsJson = False,
 ) -> None:
     """Delete everything of a person; the server must be stopped. Exports made before still have the person."""
-    from dorothie_gym.studies.erasure import erase
+    from dorothie_gym.studies.erasure import erase, find_traces, finish_erasures, is_unfinished
     from dorothie_gym.studies.folder import open_study
     from dorothie_gym.studies.record_types import STUDY_FILE
     from dorothie_gym.studies.study_file import read_study
 
     with reporting_errors(), open_study(folder) as records:
-        known = read_study(folder / STUDY_FILE).recruitment.parameters
-        ids = _ids(participant, (records.find_platform_id(known[0], participant) if known else None))
-        name = next((each for each in ids if records.participant(each) is not None), None)
-        if name is None:
+        unfinished = is_unfinished(records)
+        left = finish_erasures(records)
+        key = next(iter(read_study(folder / STUDY_FILE).recruitment.parameters), None)
+        name = records.find_person(participant, key)
+        if name is None and not unfinished:
             fail(f"{folder}: has no participant {participant!r}")
-        sessions = erase(records, name)
+        sessions: list[str] = []
+        if name is not None:
+            ids = [] if key is None else records.platform_ids(name, key)
+            sessions, left = erase(records, name)
+            left += find_traces(records, [name, *ids], sessions)
+    _print_deletion(name, sessions, left, as_json)
+
+
+def _print_deletion(name: str | None, sessions: list[str], left: list[str], as_json: bool) -> None:
     if as_json:
-        print_json({"participant": name, "deleted_sessions": sessions})
+        print_json({"participant": name, "deleted_sessions": sessions, "left": left})
     else:
         taken = f", and the records of {', '.join(sessions)}" if sessions else ""
-        stdout().print(f"Everything of {name} is deleted{taken}.", soft_wrap=True)
-
-
-def _ids(given: str, by_platform: str | None) -> Iterator[str]:
-    yield given
-    if by_platform is not None:
-        yield by_platform
+        subject = "An interrupted deletion" if name is None else f"The deletion of {name}"
+        done = "An interrupted deletion is finished." if name is None else f"Everything of {name} is deleted{taken}."
+        screen = stdout()
+        screen.print(f"{subject} left something behind:" if left else done, soft_wrap=True)
+        for each in left:
+            screen.print(f"  {each}", soft_wrap=True)
+    if left:
+        raise typer.Exit(FAILED)

@@ -27,6 +27,10 @@ _PRAGMAS: Final = (
 """Settings of each connection; temporary tables in memory, so that no copies lie in other folders."""
 
 
+class StorageError(SessionError):
+    """Something cannot be stored or read at the moment: the disk is full or fails, or a database is locked."""
+
+
 class Database:
     """SQLite database in a file that only its owner can read.
 
@@ -59,17 +63,22 @@ class Database:
 
     @contextlib.contextmanager
     def transaction(self) -> Iterator[None]:
-        """Makes the changes of a block in one step, or none of them if it fails; blocks may be nested."""
+        """Makes the changes of a block in one step, or none of them if it fails; blocks may be nested.
+
+        Raises:
+            StorageError: nothing of the block is stored.
+        """
         if self._connection.in_transaction:
             yield
             return
-        self._connection.execute("BEGIN IMMEDIATE")
+        self.run("BEGIN IMMEDIATE")
         try:
             yield
+            self.run("COMMIT")
         except BaseException:
-            self._connection.execute("ROLLBACK")
+            if self._connection.in_transaction:  # after some errors, SQLite has gone back by itself
+                self.run("ROLLBACK")
             raise
-        self._connection.execute("COMMIT")
 
     @contextlib.contextmanager
     def snapshot(self) -> Iterator[None]:
@@ -81,12 +90,17 @@ class Database:
             self._connection.execute("ROLLBACK")
 
     def run(self, statement: str, *values: object) -> None:
-        """Runs a statement."""
-        self._connection.execute(statement, values)
+        """Runs a statement; raises `StorageError` if it fails."""
+        self.rows(statement, *values)
 
     def rows(self, query: str, *values: object) -> list[sqlite3.Row]:
-        """Returns the rows of a query."""
-        return self._connection.execute(query, values).fetchall()
+        """Returns the rows of a query; raises `StorageError` if it fails."""
+        try:
+            return self._connection.execute(query, values).fetchall()
+        except sqlite3.OperationalError as error:
+            raise StorageError(
+                f"{self.path}: cannot be read or written now ({error}); check the space on the disk and its state"
+            ) from error
 
     def row(self, query: str, *values: object) -> sqlite3.Row | None:
         """Returns the first row of a query; None if there is none."""
@@ -99,8 +113,8 @@ class Database:
         return None if found is None else found[0]
 
     def compact(self) -> None:
-        """Writes the file anew without the remains of deleted rows."""
-        self._connection.execute("VACUUM")
+        """Writes the file anew without the remains of deleted rows; raises `StorageError` if that fails."""
+        self.run("VACUUM")
 
     def close(self) -> None:
         """Closes the file."""

@@ -15,7 +15,7 @@ from dorothie_gym.console.seat import RoomState
 from dorothie_gym.console.server import Console
 from dorothie_gym.ontology import Role
 from dorothie_gym.recording import EndReason, SessionState
-from dorothie_gym.studies.erasure import remove_folders
+from dorothie_gym.studies.erasure import remove_attempts
 from dorothie_gym.studies.record_types import SessionRow
 from dorothie_gym.studies.records import StudyRecords
 from dorothie_gym.studies.room_building import RoomBuilder
@@ -31,6 +31,9 @@ IDLE_SECONDS: Final = 120.0
 
 LEAST_PATIENCE: Final = 15.0
 """Shortest time for the people of a new session to sit down [s]: pages have to load."""
+
+STOP_SECONDS: Final = 10.0
+"""Longest time for a session to end after it was asked to; then its room is closed as it is [s]."""
 
 
 @dataclass(eq=False)
@@ -110,7 +113,7 @@ class OpenRooms:
         state = self._builder.state(row)
         resumes = state is SessionState.PARTIAL
         if state is SessionState.ABSENT:
-            remove_folders(self._records, row.id)  # a server that died before the header was written
+            remove_attempts(self._records, row.id)  # a server that died before the header was written
             self._records.set_folder(row.id, row.id)  # before the record begins, so that a restart finds it
         return self._open(OpenRoom(people=dict(people), session=row, resumes=resumes))
 
@@ -145,7 +148,7 @@ class OpenRooms:
             self._console.open(room)
             if row is not None and place.resumes and room.record is not None:
                 self._records.set_folder(row.id, room.record.folder.name)
-                remove_folders(self._records, row.id, keep=room.record.folder.name)
+                remove_attempts(self._records, row.id, keep=room.record.folder.name)
         place.ready.set()
         self._changed()
 
@@ -210,7 +213,8 @@ class OpenRooms:
         await place.ready.wait()
         if place.room is None:
             return  # it could not be built
-        while place in self._rooms and not place.is_over:
+        end = time.monotonic() + STOP_SECONDS
+        while place in self._rooms and not place.is_over and time.monotonic() < end:
             place.room.end(reason)
             await asyncio.sleep(0.05)
         self.close(place)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from dorothie_gym.recording import EndReason
 from dorothie_gym.studies.assignment import Assigner, first_free
-from dorothie_gym.studies.erasure import erase
+from dorothie_gym.studies.erasure import erase_from_data, finish_erasures
 from dorothie_gym.studies.items import Answer, check_answers
 from dorothie_gym.studies.open_rooms import OpenRoom, OpenRooms
 from dorothie_gym.studies.presence import Presence
@@ -42,6 +42,7 @@ class Progress:
     def __init__(self, study: Study, records: StudyRecords, rooms: OpenRooms, presence: Presence) -> None:
         self.study, self.records, self.rooms = study, records, rooms
         self.assigner = Assigner(study)
+        self._left: list[str] = []
         self.waiting = WaitingRoom(study, records, rooms, presence, self.assigner)
 
     # --- entry ------------------------------------------------------------------------------------------------------
@@ -88,7 +89,8 @@ class Progress:
     def decline(self, person: Participant) -> None:
         """Deletes a person who does not agree."""
         check_stage(person.stage, Stage.CONSENT)
-        erase(self.records, person.id)
+        erase_from_data(self.records, person.id)
+        self.finish_erasures()
 
     def answer(self, person: Participant, stage: Stage, answers: Mapping[str, Answer]) -> None:
         """Stores the answers to the questionnaire of a stage; raises `AnswerError` if they are not allowed."""
@@ -242,20 +244,44 @@ class Progress:
 
     def forget_undecided(self) -> None:
         """Deletes people who neither agreed nor declined and have not been seen for long."""
-        for name in self.records.undecided():
-            erase(self.records, name)
+        names = self.records.undecided()
+        if names:
+            erase_from_data(self.records, *names)
+            self.finish_erasures()
 
     # --- withdrawal -------------------------------------------------------------------------------------------------
 
-    async def withdraw(self, person: Participant) -> None:
-        """Deletes everything of a person; a session in progress ends for everybody."""
-        tutorial = self.rooms.tutorial_of(person.id)
-        if tutorial is not None:
-            await self.rooms.stop(tutorial, EndReason.LEFT)
+    async def withdraw(self, person: Participant) -> bool:
+        """Deletes everything of a person; a session in progress ends for everybody.
+
+        Returns:
+            Whether nothing is left; otherwise the server tries again.
+
+        Raises:
+            StorageError: nothing is deleted; the person takes part as before.
+        """
         row = self.session_of(person) if person.stage is Stage.SESSION else None
-        place = None if row is None else self.rooms.of_session(row.id)
-        if place is not None:
-            await self.rooms.stop(place, EndReason.LEFT)
+        places = [self.rooms.tutorial_of(person.id), None if row is None else self.rooms.of_session(row.id)]
+        erase_from_data(self.records, person.id)
         self.waiting.forget(person.id)
-        erase(self.records, person.id)
         logger.info("a participant has withdrawn")
+        for place in places:
+            if place is not None:
+                try:
+                    await self.rooms.stop(place, EndReason.LEFT)
+                except Exception:  # such as a full disk; the record is removed all the same
+                    logger.exception("a room of a person who has withdrawn could not be closed")
+        return self.finish_erasures()
+
+    def finish_erasures(self) -> bool:
+        """Removes what deleted people have left in other files; returns whether nothing is left."""
+        left = finish_erasures(self.records)
+        for each in left if left != self._left else []:
+            logger.warning("still to be deleted: %s", each)
+        self._left = left
+        return not left
+
+    def retry_erasures(self) -> None:
+        """Tries again what could not be deleted."""
+        if self._left:
+            self.finish_erasures()

@@ -33,6 +33,9 @@ ABANDONED_SECONDS: Final = 1800.0
 The first holds before the first session, the second before the consent.
 """
 
+WITHDRAWN: Final = "withdrawn"
+"""Reason of the end of a session whose record was deleted."""
+
 
 class StudyRecords:
     """Records of a study folder.
@@ -123,6 +126,17 @@ class StudyRecords:
         query = "SELECT participant FROM parameters WHERE name = ? AND value = ?"
         name: str | None = self.recruitment.value(query, key, value)
         return name if name is not None and self.participant(name) is not None else None
+
+    def platform_ids(self, name: str, key: str) -> list[str]:
+        """Returns the values of a parameter of a participant's link."""
+        rows = self.recruitment.rows("SELECT value FROM parameters WHERE participant = ? AND name = ?", name, key)
+        return [row["value"] for row in rows]
+
+    def find_person(self, given: str, key: str | None) -> str | None:
+        """Returns the id of a participant by id, or by the parameter `key` of the link; None if there is none."""
+        if self.participant(given) is not None:
+            return given
+        return None if key is None else self.find_platform_id(key, given)
 
     def see(self, name: str) -> None:
         """Notes that the browser of a participant was heard of."""
@@ -265,22 +279,33 @@ class StudyRecords:
         ]  # fmt: skip
 
     def set_folder(self, session: str, folder: str | None) -> None:
-        """Notes the folder in which a session is recorded."""
-        self.data.run("UPDATE sessions SET folder = ? WHERE id = ?", folder, session)
+        """Notes the folder in which a session is recorded; one that is withdrawn keeps none."""
+        self.data.run(
+            "UPDATE sessions SET folder = ? WHERE id = ? AND (? IS NULL OR reason IS NOT ?)",
+            folder, session, folder, WITHDRAWN,
+        )  # fmt: skip
 
     def finish_session(self, session: str, reason: str, *, success: bool | None, seconds: float | None) -> None:
-        """Notes the end of a session."""
+        """Notes the end of a session; one that is withdrawn stays so."""
         self.data.run(
-            "UPDATE sessions SET reason = ?, success = ?, seconds = ? WHERE id = ?",
-            reason, None if success is None else int(success), seconds, session,
+            "UPDATE sessions SET reason = ?, success = ?, seconds = ? WHERE id = ? AND reason IS NOT ?",
+            reason, None if success is None else int(success), seconds, session, WITHDRAWN,
         )  # fmt: skip
 
     # --- erasure ----------------------------------------------------------------------------------------------------
 
-    def erase_later(self, folders: Sequence[str]) -> None:
-        """Notes folders that are to be removed, also after a crash."""
-        for folder in folders:
-            self.data.run("INSERT OR IGNORE INTO erasures VALUES (?)", folder)
+    def erase_later(self, sessions: Sequence[str]) -> None:
+        """Notes sessions whose records are to be removed, also after a crash."""
+        for session in sessions:
+            self.data.run("INSERT OR IGNORE INTO erasures VALUES (?)", session)
+
+    def pending_erasures(self) -> list[str]:
+        """Returns the ids of the sessions whose records are to be removed."""
+        return [row["folder"] for row in self.data.rows("SELECT folder FROM erasures ORDER BY folder")]
+
+    def erased(self, session: str) -> None:
+        """Notes that nothing of a session is left."""
+        self.data.run("DELETE FROM erasures WHERE folder = ?", session)
 
 
 def digest(secret: str) -> bytes:

@@ -22,7 +22,7 @@ from dorothie_gym.console.rate_limit import TokenBucket
 from dorothie_gym.console.server import Console, SecurityHeaders, is_same_origin
 from dorothie_gym.studies import requests as r
 from dorothie_gym.studies.answers import answer, refusal, set_secret
-from dorothie_gym.studies.erasure import finish_erasures
+from dorothie_gym.studies.database import StorageError
 from dorothie_gym.studies.experimenter import Experimenter
 from dorothie_gym.studies.items import AnswerError
 from dorothie_gym.studies.open_rooms import OpenRooms
@@ -109,7 +109,7 @@ class StudyServer:
         @contextlib.asynccontextmanager
         async def lifespan(app: Starlette) -> AsyncIterator[None]:
             async with self.console.running():
-                finish_erasures(self._records)
+                self.progress.finish_erasures()
                 self.progress.reopen()
                 task = asyncio.create_task(self._supervise())
                 try:
@@ -140,6 +140,7 @@ class StudyServer:
             try:
                 if time.monotonic() - cleaned > CLEANING_PERIOD:
                     self.progress.forget_undecided()
+                    self.progress.retry_erasures()
                     cleaned = time.monotonic()
                 changed = self.progress.note_ends()
                 for place in self.rooms.mind(time.monotonic()):
@@ -169,6 +170,9 @@ class StudyServer:
                 return await run(request)
             except r.BodyError as error:
                 return refusal(error.status, str(error))
+            except StorageError as error:
+                logger.warning("a request of the page could not be stored: %s", error)
+                return refusal(503, "This could not be stored. Please wait a moment.")
             except _NobodyError:
                 return refusal(401, "You do not take part in this study.")
             except (RefusedError, AnswerError) as error:
@@ -269,11 +273,18 @@ class StudyServer:
             raise RefusedError("Please confirm that you want to withdraw.")
         self._withdrawing.add(person.id)
         try:
-            await asyncio.shield(self.progress.withdraw(person))  # also if the browser has gone meanwhile
+            clean = await asyncio.shield(self.progress.withdraw(person))  # also if the browser has gone meanwhile
         finally:
             self._withdrawing.discard(person.id)
         self._presence.tell()
-        return _farewell(self.progress.study.texts.withdrawn)
+        study = self.progress.study
+        return _farewell(study.texts.withdrawn if clean else _NOT_YET.format(study.contact))
+
+
+_NOT_YET: Final = (
+    "You have withdrawn. A part of what was recorded about you could not be deleted at once; the server tries again "
+    "until it is. Contact: {}"
+)
 
 
 class _NobodyError(Exception):
