@@ -1,4 +1,4 @@
-"""`dorothie-gym study init|check|run|invite|export|delete`: studies with people."""
+"""`dorothie-gym study init|check|run|invite|readmit|export|delete`: studies with people."""
 
 from __future__ import annotations
 
@@ -20,6 +20,11 @@ study = typer.Typer(help="Studies with people in the browser, from consent to co
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.yaml", help="File of the study.")]
 Data = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of the study's data.")]
+
+Participant = Annotated[
+    str, typer.Argument(metavar="PARTICIPANT", help="Number in the data, or id of the recruiting platform.")
+]
+Site = Annotated[str, typer.Option("--address", metavar="URL", help="Address of the study for its people.")]
 
 
 @study.command()
@@ -130,9 +135,7 @@ def _print_links(found: Study, link: str, out: Path) -> None:
 def invite(
     folder: Data,
     count: Annotated[int, typer.Option(min=1, max=10_000, help="Number of invitations.")] = 1,
-    site: Annotated[
-        str, typer.Option("--address", metavar="URL", help="Address of the study for its people.")
-    ] = f"http://{LOCAL}:{PORT}/",
+    site: Site = f"http://{LOCAL}:{PORT}/",
     as_json: AsJson = False,
 ) -> None:
     """Print links of which each admits one person once; only their hashes are stored."""
@@ -150,6 +153,35 @@ def invite(
     else:
         for link in links:
             stdout().print(link, soft_wrap=True)
+
+
+@study.command()
+def readmit(
+    folder: Data,
+    participant: Participant,
+    site: Site = f"http://{LOCAL}:{PORT}/",
+    as_json: AsJson = False,
+) -> None:
+    """Print a link with which a person goes on in another browser, once; the old browser is then shut out."""
+    import contextlib
+
+    from dorothie_gym.studies.entrance import Entrance
+    from dorothie_gym.studies.folder import check_folder
+    from dorothie_gym.studies.record_types import STUDY_FILE
+    from dorothie_gym.studies.records import StudyRecords
+    from dorothie_gym.studies.study_file import read_study
+
+    with reporting_errors():
+        check_folder(folder)
+        with contextlib.closing(StudyRecords(folder)) as records:
+            token = Entrance(read_study(folder / STUDY_FILE), records).readmit(participant)
+    if token is None:
+        fail(f"{folder}: has no participant {participant!r}; give the number or the id of the recruiting platform")
+    link = f"{site.rstrip('/')}/#{token}"
+    if as_json:
+        print_json({"link": link})
+    else:
+        stdout().print(link, soft_wrap=True)
 
 
 @study.command()
@@ -172,9 +204,7 @@ def export(
 @study.command()
 def delete(
     folder: Data,
-    participant: Annotated[
-        str, typer.Argument(metavar="PARTICIPANT", help="Number in the data, or id of the recruiting platform.")
-    ],
+    participant: Participant,
     as_json: AsJson = False,
 ) -> None:
     """Delete everything of a person; the server must be stopped. Exports made before still have the person."""

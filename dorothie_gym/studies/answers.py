@@ -20,10 +20,18 @@ def answer(view: dict[str, Any]) -> Response:
     )
 
 
-def refusal(status: int, reason: str) -> Response:
-    """Answers that a request is refused."""
+def refusal(status: int, reason: str, retry: int | None = None) -> Response:
+    """Answers that a request is refused.
+
+    Args:
+        status: status of the answer.
+        reason: reason, which the page shows.
+        retry: time after which the same request may succeed [s]; None if it will not.
+    """
     refused = answer({"error": reason})
     refused.status_code = status
+    if retry is not None:
+        refused.headers["Retry-After"] = str(retry)
     return refused
 
 

@@ -14,6 +14,7 @@ from starlette.routing import Route
 from dorothie_gym.console.seat import EXPERIMENTER, RoomState
 from dorothie_gym.studies import requests as r
 from dorothie_gym.studies.answers import answer, refusal, set_secret
+from dorothie_gym.studies.entrance import Entrance
 from dorothie_gym.studies.open_rooms import OpenRoom
 from dorothie_gym.studies.progress import Progress
 from dorothie_gym.studies.records import digest
@@ -27,7 +28,7 @@ COOKIE: Final = "dorothie_experimenter"
 PATH: Final = "/study/experimenter"
 """Beginning of the paths of the experimenter's requests, to which alone the cookie is sent."""
 
-MAX_BYTES: Final = 1024
+MAX_BYTES: Final = 16 * 1024
 """Largest body of a request [bytes]."""
 
 Handler = Callable[[Request], Awaitable[Response]]
@@ -38,14 +39,15 @@ class Experimenter:
 
     Args:
         progress: participants of the study.
+        entrance: links with which people go on.
 
     Attributes:
         token: token of the link, which admits one browser; the next server has another one.
     """
 
-    def __init__(self, progress: Progress) -> None:
+    def __init__(self, progress: Progress, entrance: Entrance) -> None:
         self.token = secrets.token_urlsafe(16)
-        self._progress = progress
+        self._progress, self._entrance = progress, entrance
         self._unused = True
         self._browser: bytes | None = None
 
@@ -63,6 +65,7 @@ class Experimenter:
             Route("/experimenter", page),
             Route(f"{PATH}/enter", guarded(self._enter), methods=["POST"]),
             Route(f"{PATH}/overview", guarded(self._overview), methods=["POST"]),
+            Route(f"{PATH}/readmit", guarded(self._readmit), methods=["POST"]),
         ]
 
     def is_known(self, request: Request) -> bool:
@@ -89,11 +92,21 @@ class Experimenter:
         await r.read_body(request, r.Overview, MAX_BYTES)
         return answer(self.overview()) if self.is_known(request) else refusal(401, "Open the link of the experimenter.")
 
+    async def _readmit(self, request: Request) -> Response:
+        """Answers with the token of a link with which a person goes on in another browser, once."""
+        body = await r.read_body(request, r.Readmit, MAX_BYTES)
+        if not self.is_known(request):
+            return refusal(401, "Open the link of the experimenter.")
+        token = self._entrance.readmit(body.participant.strip())
+        if token is None:
+            raise RefusedError("Nobody with this number, or this id of the recruiting platform, takes part.")
+        return answer({"token": token})
+
     # --- content ------------------------------------------------------------------------------------------------------
 
     def overview(self) -> dict[str, Any]:
-        """Returns people who wait, numbers of people by stage, and open rooms with the token of the own seat there."""
-        progress = self._progress
+        """Returns people who wait, people by stage, and open rooms with the token of the own seat there."""
+        progress, present = self._progress, set(self._progress.present())
         rooms = [self._row(place) for place in progress.rooms.all() if place.room is not None]
         return {
             "title": progress.study.title,
@@ -101,6 +114,10 @@ class Experimenter:
             "waiting": [
                 {"id": person.id, "role": person.role and person.role.value, "seconds": round(seconds)}
                 for person, seconds in progress.waiting.present()
+            ],
+            "people": [
+                {"id": person.id, "stage": person.stage.value, "present": person.id in present}
+                for person in progress.records.participants()
             ],
             "rooms": sorted(rooms, key=lambda row: (row["session"] is None, row["session"] or "")),
         }

@@ -9,9 +9,11 @@ from typing import Any
 
 import msgspec
 
+from dorothie_gym.console.config import AfterAbsence
 from dorothie_gym.studies.progress import Progress
 from dorothie_gym.studies.record_types import Participant
 from dorothie_gym.studies.stages import QUESTIONNAIRES, Outcome, Stage
+from dorothie_gym.studies.study import Study
 
 
 def entrance_view(progress: Progress) -> dict[str, Any]:
@@ -40,7 +42,7 @@ def participant_view(progress: Progress, person: Participant) -> dict[str, Any]:
         view |= {"text": study.texts.no_partner if in_vain else study.texts.waiting, "in_vain": in_vain}
     elif stage is Stage.SESSION:
         token, row = progress.seat_token(person), progress.session_of(person)
-        view |= {"token": token, "over": row is not None and row.reason is not None}
+        view |= {"token": token, "over": row is not None and row.reason is not None, "away": _absence(study)}
     elif stage is Stage.DEBRIEFING:
         view["text"] = study.texts.debriefing
     elif stage is Stage.DONE:
@@ -48,3 +50,18 @@ def participant_view(progress: Progress, person: Participant) -> dict[str, Any]:
         end = study.recruitment.no_partner if in_vain else study.recruitment.completion
         view |= {"code": end.code, "url": end.url}
     return view
+
+
+def _absence(study: Study) -> dict[str, str]:
+    """Returns what happens next while others are away, and while the own browser has no connection."""
+    seconds, kind = f"{study.absence.seconds:.0f} s", study.absence.then
+    if kind is AfterAbsence.END:
+        others = f"After {seconds} the session ends; you then go on with the study and get your code."
+        lost = f"If it takes longer than {seconds}, the session ends; you can then still go on here."
+    elif kind is AfterAbsence.SCRIPT:
+        others = f"After {seconds} a computer program takes the place, and the session goes on."
+        lost = f"After {seconds} a computer program takes your place until you are back."
+    else:
+        others = "The session goes on as soon as everybody is back. You can withdraw at any time."
+        lost = "The session waits for you."
+    return {"others": others, "lost": f"There is no connection. This page tries again by itself. {lost}"}

@@ -15,7 +15,7 @@ from dorothie_gym.studies.presence import Presence
 from dorothie_gym.studies.record_types import Participant, SessionRow
 from dorothie_gym.studies.records import StudyRecords
 from dorothie_gym.studies.stages import QUESTIONNAIRES, Outcome, RefusedError, Stage, check_stage, next_stage
-from dorothie_gym.studies.study import Admission, Study
+from dorothie_gym.studies.study import Study
 from dorothie_gym.studies.waiting_room import WaitingRoom
 
 logger = logging.getLogger(__name__)
@@ -37,42 +37,15 @@ class Progress:
 
     Attributes:
         waiting: the waiting room.
+        present: returns the ids of the people whose browsers are connected.
     """
 
     def __init__(self, study: Study, records: StudyRecords, rooms: OpenRooms, presence: Presence) -> None:
         self.study, self.records, self.rooms = study, records, rooms
         self.assigner = Assigner(study)
+        self.present = presence.present
         self._left: list[str] = []
         self.waiting = WaitingRoom(study, records, rooms, presence, self.assigner)
-
-    # --- entry ------------------------------------------------------------------------------------------------------
-
-    def join(self, parameters: Mapping[str, str], invitation: str | None) -> tuple[str, str]:
-        """Adds a person; returns the id and the secret of the browser.
-
-        Args:
-            parameters: parameters of the link; unknown names are left out.
-            invitation: token of an invitation; None for none.
-
-        Raises:
-            RefusedError: the invitation is not valid, or the person takes part already.
-        """
-        kept = {name: parameters[name] for name in self.study.recruitment.parameters if parameters.get(name)}
-        key = next(iter(self.study.recruitment.parameters), None)
-        if key in kept and self.records.find_platform_id(key, kept[key]) is not None:
-            raise RefusedError("You take part in this study already. Please go on in the browser in which you began.")
-        if self.study.recruitment.admission is Admission.INVITED:
-            if invitation is None or not self.records.use_invitation(invitation):
-                raise RefusedError("This invitation is not valid, or it has been used. Please ask for a new one.")
-        return self.records.add_participant(kept)
-
-    def is_other_person(self, name: str, parameters: Mapping[str, str], invitation: str | None) -> bool:
-        """Returns whether a link was given to another person than the one who used this browser before."""
-        if invitation is not None and self.records.is_unused(invitation):
-            return True
-        key = next(iter(self.study.recruitment.parameters), None)
-        given = parameters.get(key, "") if key is not None else ""
-        return bool(given) and key is not None and self.records.find_platform_id(key, given) != name
 
     # --- stages -----------------------------------------------------------------------------------------------------
 
@@ -89,8 +62,7 @@ class Progress:
     def decline(self, person: Participant) -> None:
         """Deletes a person who does not agree."""
         check_stage(person.stage, Stage.CONSENT)
-        erase_from_data(self.records, person.id)
-        self.finish_erasures()
+        self._forget([person.id])
 
     def answer(self, person: Participant, stage: Stage, answers: Mapping[str, Answer]) -> None:
         """Stores the answers to the questionnaire of a stage; raises `AnswerError` if they are not allowed."""
@@ -246,8 +218,15 @@ class Progress:
         """Deletes people who neither agreed nor declined and have not been seen for long."""
         names = self.records.undecided()
         if names:
+            self._forget(names)
+
+    def _forget(self, names: Sequence[str]) -> None:
+        """Deletes people who have not agreed to anything; their invitations can be used again."""
+        with self.records.transaction():
+            for name in names:
+                self.records.free_invitation(name)
             erase_from_data(self.records, *names)
-            self.finish_erasures()
+        self.finish_erasures()
 
     # --- withdrawal -------------------------------------------------------------------------------------------------
 

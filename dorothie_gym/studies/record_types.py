@@ -41,6 +41,11 @@ CREATE TABLE IF NOT EXISTS sessions (
     condition TEXT NOT NULL, town TEXT NOT NULL, storyboard TEXT, seed INTEGER NOT NULL, folder TEXT, reason TEXT,
     success INTEGER, seconds REAL);
 CREATE TABLE IF NOT EXISTS invitations (token BLOB PRIMARY KEY, used INTEGER NOT NULL DEFAULT 0);
+CREATE TABLE IF NOT EXISTS visits (
+    participant TEXT PRIMARY KEY REFERENCES participants(id) ON DELETE CASCADE, invitation BLOB, visit BLOB);
+CREATE TABLE IF NOT EXISTS readmissions (
+    participant TEXT PRIMARY KEY REFERENCES participants(id) ON DELETE CASCADE, token BLOB NOT NULL UNIQUE,
+    visit BLOB);
 CREATE TABLE IF NOT EXISTS erasures (folder TEXT PRIMARY KEY);
 """
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
+import sqlite3
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -72,11 +73,15 @@ class StudyRecords:
 
     # --- participants -----------------------------------------------------------------------------------------------
 
-    def add_participant(self, parameters: Mapping[str, str]) -> tuple[str, str]:
+    def add_participant(
+        self, parameters: Mapping[str, str], *, invitation: str | None = None, visit: str | None = None
+    ) -> tuple[str, str]:
         """Adds a person before the consent; returns the id and the secret of the person's browser.
 
         Args:
             parameters: parameters of the link, which are kept apart.
+            invitation: token of an invitation, which is then used.
+            visit: random text of the browser's tab.
         """
         secret, name = secrets.token_urlsafe(32), self._new_id()
         with self.recruitment.transaction():  # first: rows without a participant are removed at the next start
@@ -88,6 +93,9 @@ class StudyRecords:
                 "INSERT INTO participants (id, secret, stage, seen, number) VALUES (?, ?, ?, ?, ?)",
                 name, digest(secret), Stage.CONSENT.value, time.time(), number,
             )  # fmt: skip
+            used, tab = (None if text is None else digest(text) for text in (invitation, visit))
+            self.data.run("UPDATE invitations SET used = 1 WHERE token = ?", used)
+            self.data.run("INSERT INTO visits VALUES (?, ?, ?)", name, used, tab)
         return name, secret
 
     def _new_id(self) -> str:
@@ -100,16 +108,11 @@ class StudyRecords:
     def participant(self, name: str) -> Participant | None:
         """Returns a participant by id; None if there is none."""
         found = self.data.row("SELECT * FROM participants WHERE id = ?", name)
-        if found is None:
-            return None
-        return Participant(
-            id=found["id"],
-            role=None if found["role"] is None else Role(found["role"]),
-            stage=Stage(found["stage"]),
-            position=found["position"],
-            outcome=None if found["outcome"] is None else Outcome(found["outcome"]),
-            seen=found["seen"],
-        )
+        return None if found is None else _participant(found)
+
+    def participants(self) -> list[Participant]:
+        """Returns all participants by id, so that their order says nothing about them."""
+        return [_participant(row) for row in self.data.rows("SELECT * FROM participants ORDER BY id")]
 
     def stage_counts(self) -> dict[Stage, int]:
         """Returns the number of participants at each stage that has any."""
@@ -126,6 +129,22 @@ class StudyRecords:
         query = "SELECT participant FROM parameters WHERE name = ? AND value = ?"
         name: str | None = self.recruitment.value(query, key, value)
         return name if name is not None and self.participant(name) is not None else None
+
+    def find_visit(self, visit: str) -> str | None:
+        """Returns the id of the participant at the consent whom a tab has brought; None if there is none."""
+        name: str | None = self.data.value(
+            "SELECT id FROM visits JOIN participants ON id = participant WHERE visit = ? AND stage = ?",
+            digest(visit), Stage.CONSENT.value,
+        )  # fmt: skip
+        return name
+
+    def renew_secret(self, name: str) -> str:
+        """Returns a new secret for the browser of a participant; the old one is void."""
+        secret = secrets.token_urlsafe(32)
+        self.data.run(
+            "UPDATE participants SET secret = ?, seen = ? WHERE id = ?", digest(secret), time.time(), name
+        )  # fmt: skip
+        return secret
 
     def platform_ids(self, name: str, key: str) -> list[str]:
         """Returns the values of a parameter of a participant's link."""
@@ -211,12 +230,38 @@ class StudyRecords:
         query = "SELECT 1 FROM invitations WHERE token = ? AND used = 0"
         return self.data.row(query, digest(token)) is not None
 
-    def use_invitation(self, token: str) -> bool:
-        """Uses a token up; returns whether it was valid and unused."""
+    def free_invitation(self, name: str) -> None:
+        """Makes the invitation of a participant valid again, who has not agreed to anything."""
+        query = "SELECT invitation FROM visits WHERE participant = ?"
+        self.data.run(f"UPDATE invitations SET used = 0 WHERE token = ({query})", name)
+
+    def readmit(self, name: str) -> str:
+        """Returns a token with which a participant can go on in another browser; only its hash is stored."""
+        token = secrets.token_urlsafe(16)
+        self.data.run("INSERT OR REPLACE INTO readmissions VALUES (?, ?, NULL)", name, digest(token))
+        return token
+
+    def is_unused_readmission(self, token: str) -> bool:
+        """Returns whether a token lets a participant go on in another browser."""
+        query = "SELECT 1 FROM readmissions WHERE token = ? AND visit IS NULL"
+        return self.data.row(query, digest(token)) is not None
+
+    def use_readmission(self, token: str, visit: str | None) -> str | None:
+        """Uses a token up; returns the id of its participant, or None if it is not valid.
+
+        Args:
+            token: the token.
+            visit: random text of the tab, for which the token stays valid.
+        """
+        tab = digest(visit if visit is not None else secrets.token_urlsafe(16))
         with self.data.transaction():
-            valid = self.is_unused(token)
-            self.data.run("UPDATE invitations SET used = 1 WHERE token = ?", digest(token))
-        return valid
+            name: str | None = self.data.value(
+                "SELECT participant FROM readmissions WHERE token = ? AND (visit IS NULL OR visit = ?)",
+                digest(token), tab,
+            )  # fmt: skip
+            if name is not None:
+                self.data.run("UPDATE readmissions SET visit = ? WHERE participant = ?", tab, name)
+        return name
 
     # --- groups and sessions ----------------------------------------------------------------------------------------
 
@@ -306,6 +351,17 @@ class StudyRecords:
     def erased(self, session: str) -> None:
         """Notes that nothing of a session is left."""
         self.data.run("DELETE FROM erasures WHERE folder = ?", session)
+
+
+def _participant(row: sqlite3.Row) -> Participant:
+    return Participant(
+        id=row["id"],
+        role=None if row["role"] is None else Role(row["role"]),
+        stage=Stage(row["stage"]),
+        position=row["position"],
+        outcome=None if row["outcome"] is None else Outcome(row["outcome"]),
+        seen=row["seen"],
+    )
 
 
 def digest(secret: str) -> bytes:

@@ -29,15 +29,18 @@ class Body(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 _Name: TypeAlias = Annotated[str, Meta(max_length=40)]
+_Parameter: TypeAlias = Annotated[str, Meta(max_length=200)]
+_Value: TypeAlias = Annotated[str, Meta(max_length=2000)]
 _Option: TypeAlias = Annotated[str, Meta(max_length=200)]
 _Text: TypeAlias = Annotated[str, Meta(max_length=MAX_TEXT)]
 
 
 class Join(Body, frozen=True):
-    """Entry: parameters of the link, and the token of an invitation."""
+    """Entry: parameters of the link, token of an invitation or readmission, and a random text of the tab."""
 
-    parameters: Annotated[dict[_Name, Annotated[str, Meta(max_length=200)]], Meta(max_length=30)] = {}
+    parameters: Annotated[dict[_Parameter, _Value], Meta(max_length=200)] = {}
     invitation: Annotated[str, Meta(max_length=64)] | None = None
+    visit: Annotated[str, Meta(min_length=20, max_length=64)] | None = None
 
 
 class News(Body, frozen=True):
@@ -75,6 +78,12 @@ class Enter(Body, frozen=True):
     """Entry of the experimenter: the token of the link."""
 
     token: Annotated[str, Meta(max_length=64)]
+
+
+class Readmit(Body, frozen=True):
+    """Wish of the experimenter for a link for a person: number, or id of the recruiting platform."""
+
+    participant: Annotated[str, Meta(min_length=1, max_length=2000)]
 
 
 class Overview(Body, frozen=True):

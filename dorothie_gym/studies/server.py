@@ -23,6 +23,7 @@ from dorothie_gym.console.server import Console, SecurityHeaders, is_same_origin
 from dorothie_gym.studies import requests as r
 from dorothie_gym.studies.answers import answer, refusal, set_secret
 from dorothie_gym.studies.database import StorageError
+from dorothie_gym.studies.entrance import Entrance
 from dorothie_gym.studies.experimenter import Experimenter
 from dorothie_gym.studies.items import AnswerError
 from dorothie_gym.studies.open_rooms import OpenRooms
@@ -64,8 +65,14 @@ CLEANING_PERIOD: Final = 300.0
 REQUESTS: Final = (40.0, 4.0)
 """Requests that a participant may send at once, and per second."""
 
-ENTRIES: Final = (60.0, 2.0)
-"""Requests without a participant that an address may send at once, and per second: a laboratory shares one."""
+ENTRIES: Final = (400.0, 10.0)
+"""Requests without a participant that an address may send at once, and per second.
+
+A laboratory or a lecture hall shares one address; an entry costs some 10 ms.
+"""
+
+RETRY_SECONDS: Final = 2
+"""Time after which a page that was refused as one of too many asks again [s]."""
 
 MOST_BUCKETS: Final = 10_000
 """Most participants and addresses whose requests are counted."""
@@ -82,6 +89,7 @@ class StudyServer:
     Attributes:
         console: rooms and seats.
         progress: participants.
+        entrance: links, invitations, and the way back.
         experimenter: page of the experimenter, and the token of its link.
 
     Raises:
@@ -96,7 +104,8 @@ class StudyServer:
             study, RoomBuilder(study, sources, records.folder), records, self.console, self._presence.tell
         )
         self.progress = Progress(study, records, self.rooms, self._presence)
-        self.experimenter = Experimenter(self.progress)
+        self.entrance = Entrance(study, records)
+        self.experimenter = Experimenter(self.progress, self.entrance)
         self._buckets: OrderedDict[str, TokenBucket] = OrderedDict()
         self._withdrawing: set[str] = set()
 
@@ -165,16 +174,16 @@ class StudyServer:
             person = self._person(request)
             known = person.id if person else "experimenter" if self.experimenter.is_known(request) else None
             if not self._admits(known or (request.client.host if request.client else ""), known is not None):
-                return refusal(429, "Too many requests. Please wait a moment.")
+                return refusal(429, "Many requests are coming in. Please wait a moment.", RETRY_SECONDS)
             try:
                 return await run(request)
             except r.BodyError as error:
                 return refusal(error.status, str(error))
             except StorageError as error:
                 logger.warning("a request of the page could not be stored: %s", error)
-                return refusal(503, "This could not be stored. Please wait a moment.")
+                return refusal(503, "This could not be stored. Please wait a moment.", RETRY_SECONDS)
             except _NobodyError:
-                return refusal(401, "You do not take part in this study.")
+                return refusal(401, f"You do not take part here any more. Contact: {self.progress.study.contact}")
             except (RefusedError, AnswerError) as error:
                 return refusal(409, str(error))
 
@@ -209,9 +218,9 @@ class StudyServer:
     async def _join(self, request: Request) -> Response:
         body = await r.read_body(request, r.Join, MAX_BYTES)
         person, given = self._person(request), (body.parameters, body.invitation)
-        if person is not None and not self.progress.is_other_person(person.id, *given):
+        if person is not None and not self.entrance.is_other_person(person.id, *given):
             return self._view(person)
-        name, secret = self.progress.join(*given)
+        name, secret = self.entrance.join(*given, body.visit)
         joined = answer(participant_view(self.progress, self._known(name)))
         set_secret(joined, request, COOKIE, secret, COOKIE_SECONDS)
         return joined
@@ -245,7 +254,7 @@ class StudyServer:
         person, body = await self._read(request, r.Consent)
         if body.agreed is None:
             self.progress.decline(person)
-            return _farewell(self.progress.study.texts.declined)
+            return _farewell(self.progress.study.texts.declined, again=True)
         self.progress.consent(person, body.agreed)
         return self._view(person)
 
@@ -291,8 +300,8 @@ class _NobodyError(Exception):
     """A request needs a participant and has none."""
 
 
-def _farewell(text: str) -> Response:
-    """Answers a person whose data have been deleted."""
-    gone = answer({"gone": text})
+def _farewell(text: str, *, again: bool = False) -> Response:
+    """Answers a person whose data have been deleted; `again` says whether the page offers to begin anew."""
+    gone = answer({"gone": text, "again": again})
     gone.delete_cookie(COOKIE, httponly=True, samesite="strict")
     return gone

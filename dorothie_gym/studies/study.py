@@ -148,6 +148,7 @@ class Recruitment(_Part, frozen=True, kw_only=True):
     Attributes:
         admission: who may take part.
         parameters: names of the parameters of the link that are kept; the first one identifies a person.
+        required: whether nobody can take part without the first parameter, by which the platform pays.
         completion: end of people who took part.
         no_partner: end of people who waited in vain.
     """
@@ -156,6 +157,7 @@ class Recruitment(_Part, frozen=True, kw_only=True):
     parameters: Annotated[list[Annotated[str, Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,39}$")]], Meta(max_length=8)] = (
         field(default_factory=lambda: ["PROLIFIC_PID", "STUDY_ID", "SESSION_ID"])
     )
+    required: bool = False
     completion: Completion = field(default_factory=Completion)
     no_partner: Completion = field(default_factory=Completion)
 

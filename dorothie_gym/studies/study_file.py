@@ -172,6 +172,8 @@ def _faults(study: Study) -> Iterator[tuple[str, str]]:
                 yield field, f"min is {item.min:g}, more than max, {item.max:g}"
             if isinstance(item, Choice):
                 yield from _repeated(f"questionnaires.{name}[{k}].options", item.options, "")
+    if study.recruitment.required and not study.recruitment.parameters:
+        yield ".recruitment.required", "there is no parameter that could be required; name one in 'parameters'"
     yield from _repeated("recruitment.parameters", study.recruitment.parameters, "")
 
 

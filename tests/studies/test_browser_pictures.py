@@ -158,7 +158,7 @@ def test_a_person_withdraws_in_a_session_and_the_partner_goes_on(laboratory: Lab
     two.click("text=Continue")
     at(two, "after")
     one.reload()
-    at(one, "consent")  # a new person
+    one.wait_for_selector("text=has been deleted")  # and no new person
 
 
 def test_axe_finds_no_violation_at_any_stage(laboratory: Laboratory) -> None:

@@ -19,22 +19,27 @@ const FINAL = {
 
 const main = document.getElementById('main'), bar = document.getElementById('bar');
 const time = h('time', { class: 'clock', text: '0:00' }), state = h('p', { class: 'state', role: 'status' }), net = h('span', { class: 'net' });
-let page = null, keys = null, seat = null, extras = [];
+let page = null, keys = null, seat = null, extras = [], next = {};
 
 /**
  * Opens the seat of a token in this page.
  * @param then button of the page that is shown at the end, and what it does; null for "Next session".
  * @param tools further elements of the bar.
+ * @param away what happens next while somebody else is away, or this browser (`lost`, `others`); sentences.
  * @param onFinal called with the reason if the connection has ended for good; shows it if it returns nothing.
  */
-export function openSeat(token, { then = null, tools = [], onFinal = null } = {}) {
+export function openSeat(token, { then = null, tools = [], away = {}, onFinal = null } = {}) {
   extras = tools;
+  next = away;
   const link = new Link(token);
   window.consoleLink = link;  // for measurements
   link.on('hello', hello => greet(link, hello)).on('frame', change => update(link, change, then))
     .on('refused', ({ reason }) => notice(reason, 'error'))
     .on('pong', ({ c }) => { net.textContent = `${Math.round(performance.now() - c)} ms`; })
-    .on('lost', () => { net.textContent = 'reconnecting …'; document.body.classList.add('lost'); })
+    .on('lost', () => {
+      if (next.lost && !document.body.classList.contains('lost')) notice(next.lost, 'error');
+      net.textContent = 'reconnecting …'; document.body.classList.add('lost');
+    })
     .on('final', why => { if (!onFinal?.(why)) finish(link, why); });
   link.connect();
 }
@@ -79,7 +84,7 @@ function update(link, { fields, talk, events, refused }, then) {
 const words = reason => reason[0].toUpperCase() + reason.slice(1);
 
 function showState({ state: now, why }) {
-  const text = { waiting: 'Waiting for the others', running: '', over: 'Over' }[now] ?? (why === 'experimenter' ? 'Paused by the experimenter' : 'Paused: somebody is away');
+  const text = { waiting: 'Waiting for the others', running: '', over: 'Over' }[now] ?? (why === 'experimenter' ? 'Paused by the experimenter' : `Paused: somebody is away. ${next.others ?? ''}`.trim());
   state.textContent = text;
   document.body.dataset.state = now;
 }

@@ -7,7 +7,7 @@ const PERIOD = 2000;  // between two looks [ms]
 const ROLES = { participant: 'Participant', co_wizard: 'Co-Wizard', ad_wizard: 'Ad-Wizard' };
 const STAGES = { consent: 'consent', before: 'questionnaire before', instructions: 'instructions', tutorial: 'practice drive', lobby: 'waiting room', session: 'session', after_session: 'questionnaire after a session', after: 'questionnaire after', debriefing: 'debriefing', done: 'finished' };
 const main = document.getElementById('main'), bar = document.getElementById('bar');
-const counts = h('p', {}), waiting = h('ul', {}), rooms = h('div', { class: 'rooms' });
+const counts = h('p', {}), people = h('ul', { class: 'people' }), made = h('p', { class: 'made', role: 'status' }), waiting = h('ul', {}), rooms = h('div', { class: 'rooms' });
 let seated = false;
 
 async function post(name, body) {
@@ -24,8 +24,10 @@ async function start() {
     history.replaceState(null, '', location.pathname);  // the token does not stay in the address
     open(view);
   } catch (error) {
-    const text = error.status ? error.message : 'The server does not answer. Load the page again in a moment.';
+    const again = !error.status || error.status === 429 || error.status >= 500;
+    const text = again ? 'The server does not answer. This page tries again.' : error.message;
     main.replaceChildren(h('div', { class: 'card' }, h('h1', { text: 'Experimenter' }), h('p', { text })));
+    if (again) setTimeout(start, PERIOD);
   }
 }
 
@@ -34,9 +36,26 @@ function open(view) {
   bar.className = 'experimenter';
   bar.replaceChildren(h('h1', { text: view.title }), h('span', { class: 'state', role: 'status' }));
   main.replaceChildren(h('div', { class: 'sheet' }, h('article', { class: 'text' },
-    h('h2', { text: 'People' }), counts, h('h2', { text: 'Waiting room' }), waiting, h('h2', { text: 'Rooms' }), rooms)));
+    h('h2', { text: 'People' }), counts, back(), h('h2', { text: 'Waiting room' }), waiting, h('h2', { text: 'Rooms' }), rooms)));
   show(view);
   setTimeout(look, PERIOD);
+}
+
+/** People by number, and links for those who cannot go on in their browser. */
+function back() {
+  const given = h('input', { id: 'person', type: 'text', autocomplete: 'off', maxlength: 2000 });
+  const form = h('form', { class: 'row', onsubmit: event => { event.preventDefault(); if (given.value.trim()) readmit(given.value.trim()); } },
+    h('label', { for: 'person', text: 'Number, or id of the recruiting platform' }), given, h('button', { type: 'submit', text: 'Make a link' }));
+  return h('details', {}, h('summary', { text: 'Somebody cannot go on' }),
+    h('p', { text: 'A person whose browser has lost its cookie, or who has changed to another one, goes on by a link. It works once; the old browser is then shut out.' }), form, made, people);
+}
+
+async function readmit(participant) {
+  try {
+    const { token } = await post('readmit', { participant });
+    const link = `${location.origin}/#${token}`;
+    made.replaceChildren(`Link for ${participant}: `, h('code', { text: link }), ' ', button('Copy', { class: 'soft', run: () => navigator.clipboard.writeText(link) }));
+  } catch (error) { made.textContent = error.status ? error.message : 'The server does not answer. Please try again in a moment.'; }
 }
 
 async function look() {
@@ -55,6 +74,8 @@ function show(view) {
   if (seated) return;
   const stages = Object.keys(STAGES).filter(stage => view.stages[stage]).map(stage => `${STAGES[stage]}: ${view.stages[stage]}`);
   rebuild(counts, stages, () => [stages.join(', ') || 'Nobody has opened the link yet.']);
+  rebuild(people, view.people, () => view.people.map(person =>
+    h('li', {}, `${person.id}, ${STAGES[person.stage]}${person.present ? '' : ' (away)'} `, button('Make a link', { class: 'soft', run: () => readmit(person.id), 'data-id': person.id, 'aria-label': `Make a link for ${person.id}` }))));
   rebuild(waiting, view.waiting, () => (view.waiting.length ? view.waiting : [null]).map(person =>
     h('li', { text: person ? `${person.id}, ${ROLES[person.role]}, for ${clock(person.seconds)}` : 'Nobody is waiting.' })));
   rebuild(rooms, view.rooms, () => (view.rooms.length ? view.rooms.map(room) : [h('p', { text: 'No room is open.' })]));

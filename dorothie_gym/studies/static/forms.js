@@ -4,11 +4,16 @@ import { h } from '/static/dom.js';
 
 let numbers = 0;
 
-/** Form of a questionnaire; what was filled in survives a reload of the tab until it is sent. */
+/** Removes drafts of questionnaires from this browser: all, or all but one. */
+export function forgetDrafts(but = null) {
+  for (const name of Object.keys(localStorage)) if (name.startsWith('draft-') && name !== but) localStorage.removeItem(name);
+}
+
+/** Form of a questionnaire; what was filled in survives a reload, and is shown in other tabs, until it is sent. */
 export class Questionnaire {
   /**
    * @param items items as the server sends them.
-   * @param key name of the draft in the tab's storage.
+   * @param key name of the draft in the browser's storage.
    * @param submit called with the answers.
    */
   constructor(items, key, submit) {
@@ -16,12 +21,17 @@ export class Questionnaire {
     this.fields = items.map(item => new Field(item));
     this.element = h('form', { class: 'questions', novalidate: true, oninput: () => this.keep(), onsubmit: event => { event.preventDefault(); if (this.check()) submit(this.answers()); } },
       this.fields.map(field => field.element), h('p', {}, h('button', { type: 'submit', class: 'primary', text: 'Continue' })));
-    const draft = JSON.parse(sessionStorage.getItem(key) ?? '{}');
-    for (const field of this.fields) if (draft[field.item.id] !== undefined) field.value = draft[field.item.id];
+    this.fill(localStorage.getItem(key));
+    addEventListener('storage', event => { if (event.key === key && event.newValue && this.element.isConnected) this.fill(event.newValue); });
+  }
+
+  fill(draft) {
+    const answers = JSON.parse(draft ?? '{}');
+    for (const field of this.fields) if (answers[field.item.id] !== undefined && !field.focused) { field.value = answers[field.item.id]; field.count?.(); }
   }
 
   answers() { return Object.fromEntries(this.fields.map(field => [field.item.id, field.value])); }
-  keep() { sessionStorage.setItem(this.key, JSON.stringify(this.answers())); }
+  keep() { localStorage.setItem(this.key, JSON.stringify(this.answers())); }
 
   /** Returns whether every answer is there and allowed; goes to the first that is not. */
   check() {
@@ -48,9 +58,22 @@ class Field {
     } else {
       const common = { id: this.name, name: item.id, 'aria-describedby': this.error.id, ...(item.required && { 'aria-required': 'true' }) };
       this.input = item.kind === 'number' ? h('input', { ...common, type: 'number', min: item.min, max: item.max, step: item.whole ? 1 : 'any', inputmode: item.whole ? 'numeric' : 'decimal' })
-        : item.long ? h('textarea', { ...common, maxlength: item.max_length, rows: 4 }) : h('input', { ...common, type: 'text', maxlength: item.max_length, autocomplete: 'off' });
-      this.element = h('div', { class: `field ${item.kind}` }, h('label', { for: this.name }, item.text, mark), this.input, this.error);
+        : item.long ? h('textarea', { ...common, rows: 4 }) : h('input', { ...common, type: 'text', autocomplete: 'off' });
+      this.length = item.kind === 'text' ? h('small', { class: 'length', role: 'status' }) : null;
+      this.element = h('div', { class: `field ${item.kind}`, oninput: () => this.count() }, h('label', { for: this.name }, item.text, mark), this.input, this.length, this.error);
     }
+  }
+
+  get focused() { return this.element.contains(document.activeElement) && document.hasFocus(); }
+
+  /** Number of characters, as the server counts them, above the most that are allowed. */
+  get excess() { return this.item.kind === 'text' ? [...this.input.value.trim()].length - this.item.max_length : 0; }
+
+  /** Says how much room is left when there is little; nothing is ever cut off. */
+  count() {
+    if (!this.length) return;
+    const { excess, item } = this;
+    this.length.textContent = excess > 0 ? `${excess} characters too many: at most ${item.max_length}.` : excess > -Math.max(10, item.max_length / 10) ? `${-excess} characters left.` : '';
   }
 
   get value() {
@@ -77,6 +100,7 @@ class Field {
     const empty = value === null || value === undefined || (Array.isArray(value) && !value.length);
     let wrong = '';
     if (this.input?.validity.badInput || (item.kind === 'number' && Number.isNaN(value))) wrong = 'Please enter a number.';
+    else if (this.excess > 0) wrong = `Please shorten this text by ${this.excess} characters; at most ${item.max_length} are allowed.`;
     else if (empty && item.required) wrong = item.kind === 'text' || item.kind === 'number' ? 'Please answer this question.' : 'Please choose an answer.';
     else if (!empty && item.kind === 'number' && (value < item.min || value > item.max || (item.whole && !Number.isInteger(value)))) wrong = `Please enter ${item.whole ? 'a whole number' : 'a number'} from ${item.min} to ${item.max}.`;
     this.error.textContent = wrong;

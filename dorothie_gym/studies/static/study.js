@@ -2,23 +2,38 @@
 
 import { button, h, notice } from '/static/dom.js';
 import { openSeat } from '/static/seat_page.js';
-import { Questionnaire } from './forms.js';
+import { Questionnaire, forgetDrafts } from './forms.js';
 import { prose } from './prose.js';
 
 const RETRY = 2000;  // [ms]
 const main = document.getElementById('main'), bar = document.getElementById('bar');
-let tag = '', shown = '', seated = false, asking = null, acting = null, over = false;
+let tag = '', shown = '', seated = false, asking = null, acting = null, over = false, contact = '', joined = 0;
 
 // --- server ----------------------------------------------------------------------------------------------------------
 
 async function post(name, body, signal) {
   const answer = await fetch(`/study/${name}`, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body), signal });
   const view = await answer.json();
-  if (!answer.ok) throw Object.assign(new Error(view.error), { status: answer.status });
+  if (!answer.ok) throw Object.assign(new Error(view.error), { status: answer.status, wait: 1000 * Number(answer.headers.get('Retry-After')) });
   return { view, newTag: answer.headers.get('ETag') };
 }
 
-/** Sends what the participant did, and shows what follows; no news are asked for meanwhile. */
+/** Whether the same request may succeed later: there is no connection, or the server has too much to do. */
+const passes = error => !error.status || error.status === 429 || error.status >= 500;
+
+const pause = time => new Promise(done => setTimeout(done, time));
+
+/** Waits before the next try; pages that were refused together do not come back together. */
+const before = error => pause(Math.max(RETRY, error.wait || 0) * (0.75 + Math.random() / 2));
+
+/** Shows in the bar, also of a seat, that there is no connection and what happens next; null: there is one. */
+function lost(text) {
+  document.body.classList.toggle('lost', text !== null);
+  const line = bar.querySelector('.state');
+  if (line && !seated) line.textContent = text ?? '';
+}
+
+/** Sends what the participant did until the server has answered, and shows what follows; no news are asked for meanwhile. */
 async function act(name, body) {
   if (acting) return;
   asking?.abort();
@@ -28,12 +43,21 @@ async function act(name, body) {
 }
 
 async function send(name, body) {
-  try {
-    show(await post(name, body));
-  } catch (error) {
-    if (error.status === 401) return gone('You do not take part in this study any more.');
-    notice(error.status ? error.message : 'The server does not answer. Please try again in a moment.', 'error');
-    if (error.status === 409) tag = shown = '';
+  for (let tries = 0; !over; tries++) {
+    try {
+      show(await post(name, body));
+      return lost(null);
+    } catch (error) {
+      if (error.status === 401) return name === 'withdraw' && tries ? gone('You have withdrawn.') : unknown(error);
+      if (!passes(error)) {
+        tag = shown = error.status === 409 ? '' : tag;
+        if (!tries) notice(error.message, 'error');  // else the first try had arrived, and only its answer was lost
+        return lost(null);
+      }
+      if (!tries) notice(`${error.status ? error.message : 'There is no connection to the server.'} This page tries again by itself; nothing is lost.`, 'error');
+      lost('No connection – trying again');
+      await before(error);
+    }
   }
 }
 
@@ -45,39 +69,68 @@ async function follow() {
     asking = new AbortController();
     try {
       show(await post('news', { have: tag }, asking.signal));
-      document.body.classList.remove('lost');
+      lost(null);
     } catch (error) {
       if (error.name === 'AbortError') continue;
-      if (error.status === 401) return gone('You do not take part in this study any more.');
-      document.body.classList.add('lost');
-      await pause(RETRY);
+      if (error.status === 401) return unknown(error);
+      lost('No connection – trying again');
+      await before(error);
     }
   }
 }
 
-const pause = time => new Promise(done => setTimeout(done, time));
+/** Goes on for a person whom the server does not know (any more). */
+function unknown(error) {
+  if (document.body.dataset.stage !== 'consent') return gone(error.message);
+  if (Date.now() - joined < 5000) return gone('Your browser does not keep the cookie of this page. Allow cookies for it, and open your link again.');
+  location.reload();  // it was open for long and nothing was agreed to: the person begins anew by the same link
+}
+
+// --- entrance --------------------------------------------------------------------------------------------------------
+
+/** Values of this tab that survive a reload. */
+const kept = {
+  get(name) { return JSON.parse(sessionStorage.getItem(`study-${name}`) ?? 'null'); },
+  set(name, value) { sessionStorage.setItem(`study-${name}`, JSON.stringify(value)); },
+};
+
+/** Returns the link with which this tab was opened; neither ids nor invitations stay in the address. */
+function link() {
+  const parameters = Object.fromEntries(new URLSearchParams(location.search)), invitation = /^#([\w-]{22})$/.exec(location.hash)?.[1];
+  if (Object.keys(parameters).length || invitation || !kept.get('link')) {
+    const visit = Array.from(crypto.getRandomValues(new Uint8Array(16)), byte => byte.toString(16).padStart(2, '0')).join('');
+    sessionStorage.clear();
+    kept.set('link', { parameters, visit, ...(invitation && { invitation }) });
+  }
+  history.replaceState(null, '', location.pathname);
+  return kept.get('link');
+}
 
 async function start() {
-  const parameters = Object.fromEntries(new URLSearchParams(location.search)), invitation = location.hash.slice(1) || null;
-  for (;;) {
+  const given = link(), farewell = kept.get('farewell');
+  if (farewell) return gone(farewell.text, farewell);
+  for (let refused = 0; ;) {
     try {
-      const entered = await post('join', { parameters, ...(invitation && { invitation }) });
-      history.replaceState(null, '', location.pathname);  // neither the ids nor the invitation stay in the address
+      const entered = await post('join', given);
+      joined = Date.now();
       show(entered);
       return follow();
     } catch (error) {
-      if (error.status) return gone(error.message);
-      main.replaceChildren(h('p', { class: 'card', text: 'The server does not answer. This page tries again.' }));
-      await pause(RETRY);
+      if (passes(error)) wait(error.status ? 'Many people are coming in at this moment.' : 'The server does not answer.');
+      else if (refused++) return gone(error.message, { keep: false });  // another tab may have just come in with the same link
+      await before(error);
     }
   }
 }
+
+const wait = text => main.replaceChildren(h('p', { class: 'card', role: 'status', text: `${text} This page tries again by itself; please leave it open.` }));
 
 // --- stages ----------------------------------------------------------------------------------------------------------
 
 function show({ view, newTag }) {
   tag = newTag;
-  if (view.gone) return gone(view.gone);
+  if (view.gone) return gone(view.gone, view);
+  ({ contact } = view);
   const { stage } = view, key = JSON.stringify([stage, view.part, view.in_vain, view.token, view.over && !seated]);
   if (key === shown || over) return;
   if (seated && (stage !== document.body.dataset.stage || view.token !== seated)) return location.reload();  // the seat's listeners go
@@ -85,13 +138,14 @@ function show({ view, newTag }) {
   if (seated) return;
   document.body.dataset.stage = stage;
   document.title = view.title;
+  if (!view.items) forgetDrafts();
   STAGES[stage](view);
 }
 
 /** Shows a page of text with a heading, which gets the focus. */
 function page(view, heading, ...children) {
   bar.className = 'study';
-  bar.replaceChildren(h('h1', { text: view.title }), h('span', { class: 'state' }), ...(view.stage === 'consent' ? [] : [withdrawal()]));
+  bar.replaceChildren(h('h1', { text: view.title }), h('span', { class: 'state', role: 'status' }), h('span', { class: 'number', title: 'Your number in this study', text: view.id }), ...(view.stage === 'consent' ? [] : [withdrawal()]));
   const title = h('h2', { tabindex: '-1', text: heading });
   main.replaceChildren(h('div', { class: 'sheet' }, h('article', { class: 'text' }, title, ...children.flat())));
   title.focus();
@@ -99,7 +153,8 @@ function page(view, heading, ...children) {
 }
 
 const next = (label, run) => h('p', {}, button(label, { class: 'primary', run }));
-const proceed = stage => () => act('proceed', { stage });
+/** Ends a stage; the second click of a double one, which began on the page before, does nothing. */
+const proceed = stage => event => { if (!(event?.detail > 1)) act('proceed', { stage }); };
 
 const STAGES = {
   consent(view) {
@@ -127,7 +182,7 @@ const STAGES = {
     page(view, 'Waiting room', prose(view.text), view.in_vain ? choice : h('p', { class: 'busy', role: 'status', text: 'Waiting …' }));
   },
   session(view) {
-    if (view.over) return page(view, 'The session is over', h('p', { text: 'It ended, or it was broken off because somebody left.' }), next('Continue', proceed('session')));
+    if (view.over) return page(view, 'The session is over', h('p', { text: 'It ended, or it was broken off because somebody left. Either way you go on to the last questions, and get your code.' }), next('Continue', proceed('session')));
     if (view.token) { document.title = `Now: ${view.title}`; return seat(view, []); }
     page(view, 'Your session is about to begin', h('p', { class: 'busy', role: 'status', text: 'The session is being prepared …' }));
   },
@@ -141,10 +196,8 @@ const STAGES = {
 
 function questions(view, heading) {
   const key = `draft-${view.id}-${view.stage}-${view.part}`;
-  const form = new Questionnaire(view.items, key, async answers => {
-    await act('answers', { stage: view.stage, answers });
-    if (document.body.dataset.stage !== view.stage) sessionStorage.removeItem(key);
-  });
+  forgetDrafts(key);
+  const form = new Questionnaire(view.items, key, answers => act('answers', { stage: view.stage, answers }));
   page(view, heading, form.element);
 }
 
@@ -152,7 +205,7 @@ function questions(view, heading) {
 function seat(view, tools) {
   seated = view.token;
   openSeat(view.token, {
-    then: { label: 'Continue', run: proceed(view.stage) }, tools: [...tools, withdrawal()],
+    then: { label: 'Continue', run: proceed(view.stage) }, away: view.away, tools: [...tools, withdrawal()],
     onFinal: why => {
       if (why === 'unknown') { again(); return true; }
       if (why !== 'failed') return false;
@@ -182,15 +235,22 @@ function withdrawal() {
   } });
 }
 
-/** Ends the page for a person who does not take part. */
-function gone(text) {
+/**
+ * Ends the page for a person who does not take part; a reload shows the same.
+ * @param again whether the person may begin anew.
+ * @param keep false if a reload asks the server once more.
+ */
+function gone(text, { again: anew = false, keep = true } = {}) {
   over = true;
   asking?.abort();
-  sessionStorage.clear();
   window.consoleLink?.stop();
+  forgetDrafts();
+  if (keep) kept.set('farewell', { text, again: anew });
+  const restart = () => { sessionStorage.removeItem('study-farewell'); location.reload(); };
   bar.replaceChildren();
   document.body.dataset.stage = 'gone';
-  main.replaceChildren(h('div', { class: 'card' }, h('h1', { tabindex: '-1', text: 'The study is over for you' }), prose(text)));
+  main.replaceChildren(h('div', { class: 'card' }, h('h1', { tabindex: '-1', text: keep ? 'The study is over for you' : 'You cannot go on here' }), prose(text),
+    anew || !keep ? button(keep ? 'Begin again' : 'Try again', { run: restart }) : null));
   main.querySelector('h1').focus();
 }
 
