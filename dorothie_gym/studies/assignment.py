@@ -1,14 +1,14 @@
-"""Assignment of conditions, scenarios, seeds and roles: endless sequences of shuffled blocks.
+"""Assignment of conditions, scenarios and seeds to groups, and of roles to people.
 
-Entry n of a sequence depends on the seed and n only. Groups, and people, take the first free number. The number of a
-group or person that drops out is free again, so that balance is kept across dropouts and restarts.
+Conditions are an endless sequence of shuffled blocks, of which entry n depends on the seed and n only. Groups take the
+first free number. The number of a group that drops out is free again, so that balance is kept across dropouts and
+restarts. Roles follow the people who are there: each gets the one that the next group lacks (`needed_role`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import count
 from typing import Final, TypeVar
 
 import numpy as np
@@ -20,6 +20,23 @@ _T = TypeVar("_T")
 
 _CONDITIONS, _ROLES = 0, 1
 """Numbers of the two random streams of a study."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """Person who has a role and plays no session yet.
+
+    Attributes:
+        name: id of the participant.
+        role: role.
+        certainty: share of people like this one who come to a session.
+        movable: whether the role can still be changed.
+    """
+
+    name: str
+    role: Role
+    certainty: float = 1.0
+    movable: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +75,7 @@ def balanced_latin_square(size: int) -> list[list[int]]:
 
 
 class Assigner:
-    """Slots of groups, and roles of people, by number.
+    """Slots of groups by number.
 
     Args:
         study: the study.
@@ -71,8 +88,6 @@ class Assigner:
             self._rows = [[names[k] for k in row] for row in balanced_latin_square(len(names))]
         else:
             self._rows = [[name] for name in names]
-        crews = [study.condition(row[0]).people for row in self._rows]
-        self._roles = list(crews[0]) if len(set(crews)) == 1 else [role for crew in crews for role in crew]
 
     @property
     def block_size(self) -> int:
@@ -96,19 +111,15 @@ class Assigner:
             seeds=tuple(study.assignment.seed + number * len(row) + k for k in turns),
         )
 
-    def role(self, number: int) -> Role:
-        """Returns the role of the person with a number."""
-        return self._entry(self._roles, number, _ROLES)
+    def shuffled(self, roles: Sequence[Role], number: int) -> list[Role]:
+        """Returns roles in the random order of the person with a number."""
+        order = np.random.default_rng([self._study.assignment.seed, _ROLES, number]).permutation(len(roles))
+        return [roles[k] for k in order]
 
     def _entry(self, rows: Sequence[_T], number: int, stream: int) -> _T:
         block, place = divmod(number, len(rows))
         order = np.random.default_rng([self._study.assignment.seed, stream, block]).permutation(len(rows))
         return rows[int(order[place])]
-
-
-def first_free(taken: Collection[int]) -> int:
-    """Returns the smallest number that is not taken."""
-    return next(number for number in count() if number not in taken)
 
 
 MOST_SLOTS: Final = 100_000
@@ -127,17 +138,72 @@ def match(
         waiting: people who wait and their roles, the longest waiting first.
         taken: numbers of slots that other groups have.
     """
-    forming: dict[int, dict[Role, str]] = {}
-    slots: dict[int, Slot] = {}
+    return [(slot, group) for slot, group in _form(assigner, waiting, taken) if len(group) == len(slot.people)]
+
+
+def _form(
+    assigner: Assigner, waiting: Sequence[tuple[str, Role]], taken: Collection[int]
+) -> list[tuple[Slot, dict[Role, str]]]:
+    """Returns the free slots up to the last one that has a person, with their people."""
+    slots, groups, free = list[Slot](), list[dict[Role, str]](), _free(taken)
     for person, role in waiting:
-        for number in range(MOST_SLOTS):
-            if number in taken:
-                continue
-            slot = slots.setdefault(number, assigner.slot(number))
-            group = forming.setdefault(number, {})
-            if role in slot.people and role not in group:
-                group[role] = person
-                break
-    return [
-        (slots[number], group) for number, group in sorted(forming.items()) if len(group) == len(slots[number].people)
-    ]
+        k = 0
+        while k == len(slots) or role not in slots[k].people or role in groups[k]:
+            if k == len(slots):
+                slots.append(assigner.slot(next(free)))
+                groups.append({})
+            else:
+                k += 1
+        groups[k][role] = person
+    return list(zip(slots, groups, strict=True))
+
+
+def _free(taken: Collection[int]) -> Iterator[int]:
+    return (number for number in range(MOST_SLOTS) if number not in taken)
+
+
+def needed_role(assigner: Assigner, there: Sequence[Candidate], taken: Collection[int], number: int) -> Role:
+    """Returns the role for a person: one that the first group lacks which the people who are there do not fill.
+
+    Of several, it is the one with the fewest people who are sure to come, so that a substitute is on the way; of equal
+    ones a random one.
+
+    Args:
+        assigner: slots of the study.
+        there: people with a role who are there, the nearest to a session first.
+        taken: numbers of slots that other groups have.
+        number: number of the person, which decides what is random.
+    """
+    formed = _form(assigner, [(each.name, each.role) for each in there], taken)
+    lacking = next((slot for slot, group in formed if len(group) < len(slot.people)), None)
+    if lacking is None:
+        lacking, group = assigner.slot(next(_free({*taken, *(slot.number for slot, _ in formed)}))), dict[Role, str]()
+    else:
+        group = next(group for slot, group in formed if slot is lacking)
+    sure = {role: sum(each.certainty for each in there if each.role is role) for role in lacking.people}
+    open_roles = assigner.shuffled([role for role in lacking.people if role not in group], number)
+    return min(open_roles, key=lambda role: round(sure[role], 6))
+
+
+def changed_role(
+    assigner: Assigner, there: Sequence[Candidate], taken: Collection[int]
+) -> tuple[Candidate, Role] | None:
+    """Returns a person whose role should change, and the new role: one more group can then be formed.
+
+    Args:
+        assigner: slots of the study.
+        there: see `needed_role`; of the people who can change, the last one does.
+        taken: numbers of slots that other groups have.
+
+    Returns:
+        None if no change of one person forms another group.
+    """
+    people = [(each.name, each.role) for each in there]
+    formed = _form(assigner, people, taken)
+    complete = sum(len(group) == len(slot.people) for slot, group in formed)
+    lacking = {role for slot, group in formed for role in slot.people if role not in group}
+    for k in range(len(there) - 1, -1, -1):
+        for role in sorted(lacking - {there[k].role}) if there[k].movable else ():
+            if len(match(assigner, [*people[:k], (there[k].name, role), *people[k + 1 :]], taken)) > complete:
+                return there[k], role
+    return None

@@ -34,7 +34,7 @@ def participant_view(progress: Progress, person: Participant) -> dict[str, Any]:
         view["items"] = msgspec.to_builtins(study.questionnaire(QUESTIONNAIRES[stage]))
         view["part"] = person.position
     elif stage is Stage.INSTRUCTIONS and person.role is not None:
-        view["text"] = study.texts.instructions.of(person.role)
+        view |= {"text": study.texts.instructions.of(person.role), "part": person.role.value}
     elif stage is Stage.TUTORIAL and person.role is not None:
         view |= {"text": study.texts.tutorial.of(person.role), "token": progress.seat_token(person)}
     elif stage is Stage.LOBBY:

@@ -12,6 +12,9 @@ from typing import Final
 PRESENT_SECONDS: Final = 8.0
 """Time after the end of the last request for news for which a person counts as present [s]: a reload takes some."""
 
+LONGEST: Final = 60.0
+"""Time for which the last sign of a person is remembered [s]."""
+
 
 class Presence:
     """People whose browsers are connected."""
@@ -33,11 +36,19 @@ class Presence:
             if not self._asking[name]:
                 del self._asking[name]
 
-    def present(self) -> list[str]:
-        """Returns the ids of the people who are present."""
-        limit = time.monotonic() - PRESENT_SECONDS
-        self._seen = {name: seen for name, seen in self._seen.items() if seen >= limit}
-        return sorted({*self._asking, *self._seen})
+    def see(self, name: str) -> None:
+        """Notes that a participant has just sent something."""
+        self._seen[name] = time.monotonic()
+
+    def present(self, within: float = PRESENT_SECONDS) -> list[str]:
+        """Returns the ids of the people who are present.
+
+        Args:
+            within: time without a request after which a person has left [s], at most `LONGEST`.
+        """
+        now = time.monotonic()
+        self._seen = {name: seen for name, seen in self._seen.items() if now - seen <= LONGEST}
+        return sorted({*self._asking, *(name for name, seen in self._seen.items() if now - seen <= within)})
 
     def tell(self) -> None:
         """Wakes everybody who waits for news."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from dorothie_gym.recording import EndReason
-from dorothie_gym.studies.assignment import Assigner, first_free
+from dorothie_gym.studies.assignment import Assigner
 from dorothie_gym.studies.erasure import erase_from_data, finish_erasures
 from dorothie_gym.studies.items import Answer, check_answers
 from dorothie_gym.studies.open_rooms import OpenRoom, OpenRooms
@@ -55,8 +55,6 @@ class Progress:
         if list(agreed) != [True] * len(self.study.statements):
             raise RefusedError("Please agree to every statement, or do not take part.")
         with self.records.transaction():
-            ticket = first_free(self.records.taken_tickets())
-            self.records.set_role(person.id, self.assigner.role(ticket), ticket)
             self._advance(person)
 
     def decline(self, person: Participant) -> None:
@@ -95,6 +93,8 @@ class Progress:
         cut_short = person.stage is Stage.AFTER_SESSION and not more and person.outcome is None
         outcome = Outcome.INTERRUPTED if cut_short else None
         stage = next_stage(self.study, person.stage, more_sessions=more)
+        if stage is Stage.INSTRUCTIONS:
+            self.waiting.give_role(person)  # as late as possible: the instructions are those of the role
         self.records.set_stage(person.id, stage, outcome=outcome)
 
     def _plays_on(self, person: Participant) -> bool:

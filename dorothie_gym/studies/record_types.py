@@ -23,7 +23,7 @@ RECRUITMENT_FILE: Final = "recruitment.sqlite"
 
 SCHEMA: Final = """
 CREATE TABLE IF NOT EXISTS participants (
-    id TEXT PRIMARY KEY, secret BLOB NOT NULL UNIQUE, role TEXT, ticket INTEGER, stage TEXT NOT NULL,
+    id TEXT PRIMARY KEY, secret BLOB NOT NULL UNIQUE, role TEXT, stage TEXT NOT NULL,
     position INTEGER NOT NULL DEFAULT 0, outcome TEXT, seen REAL NOT NULL, number INTEGER NOT NULL);
 CREATE TABLE IF NOT EXISTS marks (
     participant TEXT NOT NULL REFERENCES participants(id) ON DELETE CASCADE, stage TEXT NOT NULL, at REAL NOT NULL);
@@ -61,7 +61,7 @@ class Participant:
 
     Attributes:
         id: pseudonymous id.
-        role: role in the sessions; None before the consent.
+        role: role in the sessions; None before the instructions.
         stage: present stage.
         position: number of the next session of the participant's group, or of the present one.
         outcome: outcome; None before the end.

@@ -29,10 +29,7 @@ from dorothie_gym.studies.record_types import (
 from dorothie_gym.studies.stages import Outcome, Stage
 
 ABANDONED_SECONDS: Final = 1800.0
-"""Time without a sign of a person after which the role is given to somebody else, or what is known is deleted [s].
-
-The first holds before the first session, the second before the consent.
-"""
+"""Time without a sign of a person before the consent after which what is known is deleted [s]."""
 
 WITHDRAWN: Final = "withdrawn"
 """Reason of the end of a session whose record was deleted."""
@@ -167,21 +164,13 @@ class StudyRecords:
         rows = self.data.rows("SELECT id FROM participants WHERE stage = ? AND seen < ?", Stage.CONSENT.value, limit)
         return [row["id"] for row in rows]
 
-    def taken_tickets(self) -> set[int]:
-        """Returns the numbers of the people who have a role, without those who dropped out or are away for long."""
-        early = ", ".join(
-            f"'{stage.value}'" for stage in (Stage.BEFORE, Stage.INSTRUCTIONS, Stage.TUTORIAL, Stage.LOBBY)
-        )
-        rows = self.data.rows(
-            f"SELECT ticket FROM participants WHERE ticket IS NOT NULL AND (outcome IS NULL OR outcome = ?) "
-            f"AND NOT (stage IN ({early}) AND position = 0 AND seen < ?)",
-            Outcome.COMPLETED.value, time.time() - ABANDONED_SECONDS,
-        )  # fmt: skip
-        return {row["ticket"] for row in rows}
+    def number(self, name: str) -> int:
+        """Returns the number of a participant in the order of arrival; it never leaves the server."""
+        return int(self.data.value("SELECT number FROM participants WHERE id = ?", name))
 
-    def set_role(self, name: str, role: Role, ticket: int) -> None:
+    def set_role(self, name: str, role: Role) -> None:
         """Gives a participant a role."""
-        self.data.run("UPDATE participants SET role = ?, ticket = ? WHERE id = ?", role.value, ticket, name)
+        self.data.run("UPDATE participants SET role = ? WHERE id = ?", role.value, name)
 
     def set_stage(
         self, name: str, stage: Stage, *, outcome: Outcome | None = None, position: int | None = None

@@ -8,6 +8,7 @@ import msgspec
 from msgspec import Meta, Struct
 from starlette.requests import ClientDisconnect, Request
 
+from dorothie_gym.ontology import Role
 from dorothie_gym.studies.items import MAX_TEXT
 from dorothie_gym.studies.stages import Stage
 
@@ -63,9 +64,10 @@ class Answers(Body, frozen=True):
 
 
 class Proceed(Body, frozen=True):
-    """Wish to end a stage."""
+    """Wish to end a stage; `role` is the one whose instructions were read."""
 
     stage: Stage
+    role: Role | None = None
 
 
 class Wait(Body, frozen=True):

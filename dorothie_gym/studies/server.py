@@ -156,6 +156,7 @@ class StudyServer:
                     self.progress.dissolve(place)
                     changed = True
                 changed = self.progress.waiting.pair() or changed
+                changed = self.progress.waiting.mend_roles() or changed
             except Exception:
                 logger.exception("the study could not go on; it tries again")
                 await asyncio.sleep(5.0)
@@ -207,6 +208,7 @@ class StudyServer:
         person = self._person(request)  # after the body has come, which may take long
         if person is None:
             raise _NobodyError
+        self._presence.see(person.id)
         return person, body
 
     def _view(self, person: Participant) -> Response:
@@ -265,6 +267,8 @@ class StudyServer:
 
     async def _proceed(self, request: Request) -> Response:
         person, body = await self._read(request, r.Proceed)
+        if body.role is not None and body.role is not person.role:
+            raise RefusedError("Your role has just changed. Please read the new instructions.")
         self.progress.proceed(person, body.stage)
         return self._view(person)
 

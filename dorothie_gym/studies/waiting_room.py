@@ -1,11 +1,12 @@
-"""Waiting room: pairing of people who are present, later sessions of a group, and people who wait in vain."""
+"""Roles, and the waiting room: pairing of people who are present, later sessions of a group, waiting in vain."""
 
 from __future__ import annotations
 
 import logging
 import time
+from typing import Final
 
-from dorothie_gym.studies.assignment import Assigner, match
+from dorothie_gym.studies.assignment import Assigner, Candidate, changed_role, match, needed_role
 from dorothie_gym.studies.open_rooms import OpenRooms
 from dorothie_gym.studies.presence import Presence
 from dorothie_gym.studies.record_types import Group, Participant
@@ -14,6 +15,12 @@ from dorothie_gym.studies.stages import Outcome, RefusedError, Stage, check_stag
 from dorothie_gym.studies.study import Study
 
 logger = logging.getLogger(__name__)
+
+GONE_SECONDS: Final = 20.0
+"""Time after the last sign of a page after which its person is not counted on any more [s]; a reload takes some."""
+
+CERTAINTY: Final = {Stage.LOBBY: 1.0, Stage.TUTORIAL: 0.93, Stage.INSTRUCTIONS: 0.85}
+"""Share of people at the stages before a session who come to it, if 30 % of all drop out (`benchmarks/arrivals.py`)."""
 
 
 class WaitingRoom:
@@ -33,6 +40,8 @@ class WaitingRoom:
         self._study, self._records, self._rooms, self._presence = study, records, rooms, presence
         self._assigner = assigner
         self._waiting_since: dict[str, float] = {}
+        self._looked_at: list[Candidate] = []
+        self._opened = time.monotonic()
 
     def present(self) -> list[tuple[Participant, float]]:
         """Returns the people who wait and are present, and since when [s]; the longest waiting first."""
@@ -68,6 +77,52 @@ class WaitingRoom:
                 stage = next_stage(self._study, Stage.AFTER_SESSION)
                 self._records.set_stage(person.id, stage, outcome=Outcome.INTERRUPTED)
         self.forget(person.id)
+
+    # --- roles ------------------------------------------------------------------------------------------------------
+
+    def give_role(self, person: Participant) -> None:
+        """Gives a person the role that the people who are there lack; does nothing for one who has a role."""
+        if person.role is None:
+            there = [each for each in self._there() if each.name != person.id]
+            number = self._records.number(person.id)
+            role = needed_role(self._assigner, there, self._records.taken_slots(), number)
+            self._records.set_role(person.id, role)
+
+    def mend_roles(self) -> bool:
+        """Changes the role of somebody who reads the instructions, if otherwise others wait in vain.
+
+        Returns:
+            Whether a role has changed.
+        """
+        there = self._there()
+        if there == self._looked_at or time.monotonic() - self._opened < GONE_SECONDS:  # pages come back first
+            return False
+        self._looked_at = there
+        change = changed_role(self._assigner, there, self._records.taken_slots())
+        if change is None:
+            return False
+        person, role = change
+        logger.info("a person who reads the instructions gets another role, as the partner has left")
+        with self._records.transaction():
+            self._records.set_role(person.name, role)
+            self._records.set_stage(person.name, Stage.INSTRUCTIONS)
+        return True
+
+    def _there(self) -> list[Candidate]:
+        """Returns the people with a role who are there and play no session yet, the nearest to a session first."""
+        people = [self._records.participant(name) for name in self._presence.present(GONE_SECONDS)]
+        found = [each for each in people if each is not None and each.position == 0 and each.stage in CERTAINTY]
+        now, order = time.monotonic(), list(CERTAINTY)
+        found.sort(key=lambda each: (order.index(each.stage), self._waiting_since.get(each.id, now)))
+        return [
+            Candidate(
+                name=each.id, role=each.role, certainty=CERTAINTY[each.stage], movable=each.stage is Stage.INSTRUCTIONS
+            )
+            for each in found
+            if each.role is not None
+        ]  # fmt: skip
+
+    # --- sessions ---------------------------------------------------------------------------------------------------
 
     def pair(self) -> bool:
         """Forms groups of people who wait and are present, and continues groups; returns whether any session begins."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections import Counter
 from pathlib import Path
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dorothie_gym.ontology import Role
-from dorothie_gym.studies.assignment import Assigner, balanced_latin_square, first_free, match
+from dorothie_gym.studies.assignment import Assigner, Candidate, balanced_latin_square, changed_role, match, needed_role
 from dorothie_gym.studies.study import Study
 from dorothie_gym.studies.study_file import read_study
 from tests.studies.content import SOLO, STUDY, write_study
@@ -65,18 +66,60 @@ def test_no_person_meets_a_scenario_twice_in_a_latin_square(tmp_path: Path) -> N
         assert len(set(slot.seeds)) == 2
 
 
-def test_roles_are_shared_out_in_pairs(tmp_path: Path) -> None:
+def there(*roles: Role, movable: bool = False) -> list[Candidate]:
+    return [Candidate(name=str(k), role=role, movable=movable) for k, role in enumerate(roles)]
+
+
+def test_a_person_gets_the_role_that_those_who_are_there_lack(tmp_path: Path) -> None:
     assigner = Assigner(study(tmp_path))
-    roles = [assigner.role(number) for number in range(40)]
-    assert all(set(roles[k : k + 2]) == set(BOTH) for k in range(0, 40, 2))
-    assert len({tuple(roles[k : k + 2]) for k in range(0, 40, 2)}) == 2, "in random order"
+    for number in range(20):
+        assert needed_role(assigner, there(BOTH[0]), set(), number) is BOTH[1]
+        assert needed_role(assigner, there(BOTH[1]), {0, 1}, number) is BOTH[0]
+        assert needed_role(assigner, there(BOTH[0], BOTH[0], BOTH[1]), {3}, number) is BOTH[1]
+    first = [needed_role(assigner, [], set(), number) for number in range(200)]
+    assert 60 < first.count(BOTH[0]) < 140, "in random order"
+    assert first == [needed_role(assigner, [], set(), number) for number in range(200)]
+
+
+def test_a_substitute_is_on_the_way_for_the_partner_who_may_still_leave(tmp_path: Path) -> None:
+    assigner = Assigner(study(tmp_path))
+    waits = Candidate(name="a", role=BOTH[0])
+    reads = Candidate(name="b", role=BOTH[1], certainty=0.8)
+    assert {needed_role(assigner, [waits, reads], set(), number) for number in range(20)} == {BOTH[1]}
+
+
+def test_a_role_changes_only_if_one_more_group_can_then_begin(tmp_path: Path) -> None:
+    assigner = Assigner(study(tmp_path))
+    waits, reads = there(BOTH[0])[0], Candidate(name="r", role=BOTH[0], movable=True)
+    assert changed_role(assigner, [waits, reads], set()) == (reads, BOTH[1])
+    assert changed_role(assigner, there(BOTH[0], BOTH[0]), {2}) is None, "who has read the instructions keeps the role"
+    assert changed_role(assigner, [*there(*BOTH), reads], set()) is None
+    assert changed_role(assigner, there(*BOTH, movable=True), set()) is None
+    late = Candidate(name="l", role=BOTH[0], movable=True)
+    assert changed_role(assigner, [waits, reads, late], set()) == (late, BOTH[1]), "the one who has read least"
+
+
+def test_roles_of_conditions_for_one_and_for_two_people_are_filled_in_their_order(tmp_path: Path) -> None:
+    mixed = [{"name": "alone"}, {"name": "pair", "co_wizard": "human"}]
+    assigner = Assigner(study(tmp_path, conditions=mixed))
+    given = Counter[Role]()
+    taken: set[int] = set()
+    waiting: list[Candidate] = []
+    for number in range(60):
+        role = needed_role(assigner, waiting, taken, number)
+        given[role] += 1
+        waiting.append(Candidate(name=str(number), role=role))
+        for slot, group in match(assigner, [(each.name, each.role) for each in waiting], taken):
+            taken.add(slot.number)
+            waiting = [each for each in waiting if each.name not in group.values()]
+    assert given == {Role.PARTICIPANT: 40, Role.CO_WIZARD: 20} and taken == set(range(40)) and not waiting
 
 
 @given(st.integers(0, 2**32))
 def test_balance_is_kept_when_groups_drop_out(seed: int) -> None:
     drawn, taken, lost = random.Random(seed), set[int](), 0
     for _ in range(60):
-        number = first_free(taken)
+        number = next(number for number in itertools.count() if number not in taken)
         if drawn.random() < 0.3:
             lost += 1
         else:
@@ -101,8 +144,6 @@ def test_conditions_for_one_person_do_not_keep_those_for_two_waiting(tmp_path: P
     assert groups["pair"][Role.CO_WIZARD] == "c"
     assert set(groups["alone"].values()) | set(groups["pair"].values()) == {"a", "b", "c"}
     assert [slot.number for slot, _ in match(assigner, waiting[:1], {1 - alone})] == [alone]
-    roles = Counter(assigner.role(number) for number in range(30))
-    assert roles == {Role.PARTICIPANT: 20, Role.CO_WIZARD: 10}
 
 
 @pytest.mark.parametrize("content", [SOLO, STUDY])

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-Error = pytest.importorskip("playwright.sync_api", reason="needs playwright").Error
+pytest.importorskip("playwright.sync_api", reason="needs playwright")
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
 from tests.chromium import IN_CHROMIUM, WAIT, chromium
@@ -76,6 +76,8 @@ def agree(page: Any) -> None:
 
 def until(page: Any, reached: str) -> None:
     """Waits for an expression of the page; its policy forbids Playwright's own way."""
+    from playwright.sync_api import Error
+
     end = time.monotonic() + 40.0
     while True:
         with contextlib.suppress(Error):  # the page is being loaded

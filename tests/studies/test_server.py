@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import time
 from pathlib import Path
 
 import pytest
@@ -198,6 +199,35 @@ def test_all_conditions_are_played_in_turn(tmp_path: Path) -> None:
     assert [(row["session"], row["number"]) for row in answers] == list(zip(played, ["2.0", "6.0"], strict=True))
     assert [row["condition"] for row in answers] == list(played.values())
     assert exported(tmp_path / "data", tmp_path / "out", "participants")[0]["outcome"] == "completed"
+
+
+@pytest.mark.long
+def test_a_person_who_reads_the_instructions_gets_the_role_of_a_partner_who_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dorothie_gym.studies.waiting_room.GONE_SECONDS", 3.0)
+    with ServedStudy(write_study(tmp_path, STUDY), tmp_path / "data") as served:
+        one, two, three, four = (Client(served.port) for _ in range(4))
+        one.enter()
+        for each in (two, three, four):
+            each.do("join")
+            each.do("consent", {"agreed": [True, True]})
+            each.do("answers", {"stage": "before", "answers": {"age": 30}})
+            one.do("news")
+        assert two.view["part"] == three.view["part"] != four.view["part"], "a partner, a substitute, and the next one"
+        before = four.view["part"]
+        end = time.monotonic() + 30.0
+        while four.view["part"] == before:  # the second and the third have closed their pages
+            assert time.monotonic() < end
+            for each in (one, four):
+                each.tag = ""
+                each.do("news")
+            time.sleep(0.2)
+        assert four.stage == "instructions" and four.view["text"] == STUDY["texts"]["instructions"][four.view["part"]]
+        assert four.post("proceed", {"stage": "instructions", "role": before}) == 409, "it was not read yet"
+        four.do("proceed", {"stage": "instructions", "role": four.view["part"]})
+        four.do("proceed", {"stage": "tutorial"})
+        seat(one, four)
 
 
 def test_a_script_takes_over_for_a_person_who_leaves(tmp_path: Path) -> None:

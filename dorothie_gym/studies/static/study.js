@@ -7,7 +7,7 @@ import { prose } from './prose.js';
 
 const RETRY = 2000;  // [ms]
 const main = document.getElementById('main'), bar = document.getElementById('bar');
-let tag = '', shown = '', seated = false, asking = null, acting = null, over = false, contact = '', joined = 0;
+let tag = '', shown = '', seated = false, asking = null, acting = null, over = false, contact = '', joined = 0, role = '';
 
 // --- server ----------------------------------------------------------------------------------------------------------
 
@@ -154,7 +154,7 @@ function page(view, heading, ...children) {
 
 const next = (label, run) => h('p', {}, button(label, { class: 'primary', run }));
 /** Ends a stage; the second click of a double one, which began on the page before, does nothing. */
-const proceed = stage => event => { if (!(event?.detail > 1)) act('proceed', { stage }); };
+const proceed = (stage, more = {}) => event => { if (!(event?.detail > 1)) act('proceed', { stage, ...more }); };
 
 const STAGES = {
   consent(view) {
@@ -171,7 +171,12 @@ const STAGES = {
   before: view => questions(view, 'Before you begin'),
   after_session: view => questions(view, 'About this drive'),
   after: view => questions(view, 'At the end'),
-  instructions: view => page(view, 'Instructions', prose(view.text), next('Continue', proceed('instructions'))),
+  instructions(view) {
+    const changed = role && role !== view.part;  // a partner has left, and somebody else would wait in vain
+    role = view.part;
+    page(view, changed ? 'New instructions' : 'Instructions', changed ? h('p', { class: 'changed', text: 'Your role has changed, as somebody has left. Please read these instructions; those before do not hold any more.' }) : null,
+      prose(view.text), next('Continue', proceed('instructions', { role })));
+  },
   tutorial(view) {
     const go = button('Start the practice drive', { class: 'primary', run: () => seat(view, [button('End practice', { class: 'soft', run: proceed('tutorial') })]) });
     page(view, 'Practice drive', prose(view.text ?? 'In a short practice drive with an automatic partner you can try everything out. It is not recorded.'),
