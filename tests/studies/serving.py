@@ -56,7 +56,7 @@ class ServedStudy:
     def __exit__(self, *error: object) -> None:
         assert self._server is not None
         self._server.should_exit = True
-        self._thread.join(15.0)
+        self._thread.join(60.0)  # on a busy machine
         assert not self._thread.is_alive()
 
     @property
