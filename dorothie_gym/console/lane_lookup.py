@@ -27,6 +27,7 @@ class LaneLookup:
     """
 
     def __init__(self, town: Town) -> None:
+        self._lanes = town.lanes
         rows, points, headings = [], [], []
         for lane in town.lanes:
             for station in np.arange(0.0, lane.length, SPACING).tolist():
@@ -45,6 +46,11 @@ class LaneLookup:
             return None
         lane, metres, _ = self._rows[self._open[found]].tolist()
         return LanePosition(lane=lane, metres=metres)
+
+    def position(self, lane: int, station: float) -> tuple[float, float]:
+        """Returns the point (x, y) [m] at a distance along a lane [m]."""
+        x, y = self._lanes[lane].position(station).tolist()
+        return x, y
 
     def heading(self, x: float, y: float) -> float:
         """Returns the direction of the lane nearest to a point (x, y) [m] in [rad]."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.console.config import ConsoleConfig
 from dorothie_gym.console.connection import Connection, changes, encode
 from dorothie_gym.console.lane_lookup import LaneLookup
@@ -16,8 +17,9 @@ from dorothie_gym.console.views import role_view, static_view
 from dorothie_gym.console.vocabulary import vocabulary
 from dorothie_gym.console.windscreen import Windscreen
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology import AGENT_ROLES, ARRIVAL_DISTANCE, Role
 from dorothie_gym.recording import EndReason
+from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +96,7 @@ class SeatFrames:
 
     def _view(self, seat: Seat) -> dict[str, Any]:
         if seat.role is None:
-            return spectator_view(self._engine.session)
+            return spectator_view(self._engine.session, self._places)
         observation = self._engine.observations[seat.role.value]
         return role_view(seat.role, observation, self._engine.mask(seat.role), self._places)
 
@@ -142,8 +144,16 @@ class SeatFrames:
             "repeatable": self._config.repeatable,
             "speech": self._config.speech and seat.role in (Role.PARTICIPANT, Role.CO_WIZARD),
             "vocabulary": vocabulary(),
+            "stop": {"within": ARRIVAL_DISTANCE, "braking": PLANNED_BRAKING},
+            "camera": self._camera(),
             **static_view(observed, len(town.streets)),
         }
+
+    def _camera(self) -> dict[str, float]:
+        """Returns the geometry of the pictures: browsers mark places above them, nothing is drawn into them."""
+        camera = self._engine.config.camera or CameraConfig()
+        mount = camera.mount
+        return {"view": camera.field_of_view, "forward": mount.forward, "up": mount.up, "pitch": mount.pitch}
 
     # --- pictures ---------------------------------------------------------------------------------------------------
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+from dorothie_gym.console.lane_lookup import LaneLookup
+from dorothie_gym.console.pins import Pin, pin_rows
 from dorothie_gym.console.views import KMH, RoleView, weather_shares
 from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.ontology import ObjectClass
 from dorothie_gym.recording import Event, EventType
 from dorothie_gym.rendering.exception_words import exception_words
+from dorothie_gym.tasks.storyboard import Landmark
 
 
-def spectator_view(session: LiveSession) -> RoleView:
+def spectator_view(session: LiveSession, places: LaneLookup) -> RoleView:
     """Returns the view of a spectator: true and estimated pose, all bodies, tasks, weather and faults."""
     world, task = session.world, session.task
     x, y = world.car.position.tolist()
@@ -27,8 +31,7 @@ def spectator_view(session: LiveSession) -> RoleView:
         "lights": bool(world.ego.lights),
         "hazard": None if hazard is None else [hazard.kind.label, 0],
         "landmarks": [
-            [landmark.name.label, round(float(landmark.position[0]), 1), round(float(landmark.position[1]), 1)]
-            for landmark in task.storyboard.landmarks
+            list(row) for row in pin_rows(_pins(task.storyboard.landmarks), session.scenario.street_names, places)
         ],
         "hidden": [landmark.hidden for landmark in task.storyboard.landmarks],
         "tasks": [
@@ -55,6 +58,10 @@ def spectator_view(session: LiveSession) -> RoleView:
         "weather": weather_shares(world.weather.values),
         "faults": [sensor.value for sensor in world.faults],
     }
+
+
+def _pins(landmarks: Sequence[Landmark]) -> list[Pin]:
+    return [Pin(each.name, each.position, each.lane, each.station, each.street) for each in landmarks]
 
 
 def event_rows(events: tuple[Event, ...]) -> list[RoleView]:

@@ -7,11 +7,12 @@ from typing import Any
 
 from dorothie_gym.console.speech_input import act_json
 from dorothie_gym.dialogue import Utterance
-from dorothie_gym.ontology import DialogueMove, Role
+from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, Role, StreetName
 from dorothie_gym.spaces import ObservationMapping, heard_acts
 
 Entry = dict[str, Any]
-"""Line of the talk in JSON types: `t` [s], `who`, `text`; for own utterances also `utterance` (number) and `spans`."""
+"""Line of the talk in JSON types: `t` [s], `who`, `text`; for own utterances also `utterance` (number) and `spans`,
+for heard ones that name landmarks `places` and `streets` (labels, as they were understood)."""
 
 
 class TalkLog:
@@ -37,8 +38,8 @@ class TalkLog:
         for speaker in (Role.PARTICIPANT, Role.CO_WIZARD):
             text = observation.get(f"{speaker}_text", "")
             if text:
-                self.entries.append({"t": time, "who": speaker.value, "text": text})
                 acts = heard_acts(observation, speaker)
+                self.entries.append({"t": time, "who": speaker.value, "text": text, **_places_in(acts or ())})
                 self.awaiting = acts[-1].move if acts else None
         if message := observation.get("message", ""):
             self.entries.append({"t": time, "who": Role.AD_WIZARD.value, "text": message})
@@ -67,6 +68,15 @@ class TalkLog:
     def note(self, who: str, text: str, time: float) -> None:
         """Appends a message of the experimenter or a note."""
         self.entries.append({"t": round(time, 1), "who": who, "text": text})
+
+
+def _places_in(acts: Sequence[DialogueAct]) -> Entry:
+    """Returns the labels of the landmarks and streets that were heard, in order, if there are landmarks."""
+    unknown = (LandmarkName.UNKNOWN, LandmarkName.QUERIED, StreetName.UNKNOWN, StreetName.QUERIED)
+    heard = [value for act in acts for value in act.ordered if value not in unknown]
+    landmarks = [value.label for value in heard if isinstance(value, LandmarkName)]
+    streets = [value.label for value in heard if isinstance(value, StreetName)]
+    return {"places": list(dict.fromkeys(landmarks)), "streets": list(dict.fromkeys(streets))} if landmarks else {}
 
 
 def own_entry(utterance: Utterance, number: int, time: float) -> Entry:

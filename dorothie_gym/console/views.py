@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.console.lane_lookup import LaneLookup
+from dorothie_gym.console.pins import Pin, pin_rows
 from dorothie_gym.ontology import (
     ExceptionKind,
     GoalStatus,
@@ -53,7 +54,7 @@ def role_view(
         mask: action mask of the role.
         places: lanes of the static map; vehicles in sight are drawn along them.
     """
-    return {**_common(observation), **_VIEWS[role](observation, mask, places)}
+    return {**_common(observation, places), **_VIEWS[role](observation, mask, places)}
 
 
 def static_view(observation: ObservationMapping, streets: int) -> RoleView:
@@ -70,17 +71,13 @@ def static_view(observation: ObservationMapping, streets: int) -> RoleView:
     }
 
 
-def _common(observation: ObservationMapping) -> RoleView:
+def _common(observation: ObservationMapping, places: LaneLookup) -> RoleView:
     x, y, heading = observation["pose"].tolist()
     return {
         "time": round(float(observation["time"][0]), 2),
         "pose": [round(x, 2), round(y, 2), round(heading, 3)],
         "speed": round(float(observation["speed"][0]) * KMH, 1),
-        "landmarks": [
-            [LandmarkName(int(row[LandmarkColumn.NAME])).label, _r(row[LandmarkColumn.X]), _r(row[LandmarkColumn.Y])]
-            for row in observation["landmarks"]
-            if row[LandmarkColumn.NAME]
-        ],
+        "landmarks": _landmarks(observation, places),
     }
 
 
@@ -189,6 +186,22 @@ def weather_shares(values: Mapping[WeatherParameter, float]) -> dict[str, float]
         parameter.value: round((value - parameter.low) / (parameter.high - parameter.low), 3)
         for parameter, value in values.items()
     }
+
+
+def _landmarks(observation: ObservationMapping, places: LaneLookup) -> list[list[Any]]:
+    pins = [
+        Pin(
+            LandmarkName(int(row[LandmarkColumn.NAME])),
+            (float(row[LandmarkColumn.X]), float(row[LandmarkColumn.Y])),
+            int(row[LandmarkColumn.LANE]),
+            float(row[LandmarkColumn.STATION]),
+            int(row[LandmarkColumn.STREET]),
+        )
+        for row in observation["landmarks"]
+        if row[LandmarkColumn.NAME]
+    ]
+    streets = [StreetName(int(name)) for name in observation["street_names"]]
+    return [list(row) for row in pin_rows(pins, streets, places)]
 
 
 def _talk_state(observation: ObservationMapping) -> RoleView:

@@ -259,7 +259,7 @@ def _split_run_on(sentence: str) -> list[str]:
 
 def _is_boundary(head: str, rest: str) -> bool:
     """Returns whether the texts before and after a comma are separate acts."""
-    if rest.lower().strip(" .?!,") in word_lists().vocatives:
+    if any(part.lower().strip(" .?!,") in word_lists().vocatives for part in (head, rest)):
         return False
     first, second = guess_act(head), guess_act(rest)
     if second.move is DialogueMove.ALIGN:

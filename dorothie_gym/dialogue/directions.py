@@ -53,6 +53,7 @@ class WordLists:
     affirming: frozenset[str]
     denying: frozenset[str]
     vocatives: frozenset[str]
+    addressing: frozenset[str]
 
 
 @functools.cache
@@ -61,7 +62,10 @@ def word_lists() -> WordLists:
     data = read_data("cues.yaml")
     lists = {
         **data.get("directions", {}),
-        **{name: data.get(name) for name in ("ordinal_nouns", "dropping", "affirming", "denying", "vocatives")},
+        **{
+            name: data.get(name)
+            for name in ("ordinal_nouns", "dropping", "affirming", "denying", "vocatives", "addressing")
+        },
     }
     if lists.keys() != WordLists.__dataclass_fields__.keys():
         raise PhraseFileError(

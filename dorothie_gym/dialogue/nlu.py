@@ -82,6 +82,15 @@ _ARTICLES = frozenset({"the", "a", "an", "about", "of", "to"})
 _SPEED_UNITS = frozenset({"km", "kmh", "kilometers", "kilometres", "kph", "mph", "miles"})
 _DISTANCE_UNITS = frozenset({"m", "meter", "meters", "metre", "metres", "feet", "yards"})
 _OPENING = frozenset({",", "oh", "well", "hmm", "um", "uh", "er", "ah", "hm", "like", "okay", "ok"})
+_ENDEARING = frozenset({"my", "dear", "lovely", "old"})
+_AFTER_ADDRESSEE = frozenset(
+    {
+        ",", "?", "please", "can", "could", "would", "will", "are", "do", "did", "have", "is", "how", "what", "where",
+        "which", "who", "i", "we", "let's", "turn", "stop", "go", "take", "drive", "slow", "keep", "head", "follow",
+        "make", "pull",
+    }
+)  # fmt: skip
+"""Words behind a vocative that has no comma: "hey car ahead" warns of a car, "hey car turn left" speaks to it."""
 _DENIAL = re.compile(
     r"(don't|do not|dont|never|not|instead of|rather than|without)"
     r"( even| yet| be| try to| go| take| make| a| the| to| that)* $"
@@ -227,9 +236,10 @@ def _stated(text: str) -> str:
 
 
 def _without_vocative(words: list[str], lists: WordLists) -> list[str]:
-    """Returns the words without a vocative at the end ("stop here, man") or at the beginning."""
+    """Returns the words without a vocative at the end ("stop here, man"), at the beginning or behind a greeting."""
     while words and words[-1] == ",":
         words.pop()
+    words = _without_addressee(words, lists)
     marked = words[-1:] == ["?"]
     end = len(words) - marked
     for length in (1, 2):
@@ -241,6 +251,19 @@ def _without_vocative(words: list[str], lists: WordLists) -> list[str]:
             return words[: end - length - 1] + words[end:]
         if len(words) > length + 1 and words[length] == "," and " ".join(words[:length]) in lists.vocatives:
             return words[length + 1 :]
+    return words
+
+
+def _without_addressee(words: list[str], lists: WordLists) -> list[str]:
+    """Returns the words without a vocative that follows a greeting or thanks without a comma: "hello dear car"."""
+    opening = next((n for n in (2, 1) if " ".join(words[:n]) in lists.addressing and len(words) > n), 0)
+    if not opening:
+        return words
+    begin = opening + (words[opening] in _ENDEARING and len(words) > opening + 1)
+    for end in (begin + 2, begin + 1):
+        if " ".join(words[begin:end]) in lists.vocatives and (end >= len(words) or words[end] in _AFTER_ADDRESSEE):
+            joint = [","] if end < len(words) and words[end] not in (",", "?") else []
+            return words[:opening] + joint + words[end:]
     return words
 
 

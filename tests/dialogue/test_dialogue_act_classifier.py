@@ -135,3 +135,28 @@ def test_one_utterance_may_contain_several_acts(text, moves):
 def test_any_text_gets_acts(text, after):
     assert isinstance(guess_act(text, after), DialogueAct)
     assert all(span.text.strip() for span in guess_spans(text, after))
+
+
+@pytest.mark.parametrize("greeting", ["Hello", "Hi", "hey", "Good morning", "Hello there", "Good evening,", "Hi,"])
+@pytest.mark.parametrize("addressee", ["car", "dear car", "robot", "my friend", ""])
+def test_a_greeting_opens_the_channel_whoever_it_addresses(greeting, addressee):
+    (span,) = guess_spans(f"{greeting} {addressee}".strip(" ,") + ".")
+    assert span.act == DialogueAct(DialogueMove.ALIGN)
+
+
+@pytest.mark.parametrize(
+    ("text", "move", "slots"),
+    [
+        ("Thank you car", "Acknowledge", {}),
+        ("hey car turn left", "Instruct", {"Action": ["JTurn"]}),
+        ("Hello car, please turn left.", "Instruct", {"Action": ["JTurn"]}),
+        ("Car, turn left.", "Instruct", {"Action": ["JTurn"]}),
+        ("Hi car, can you hear me?", "Align", {}),
+        ("Hey, a car!", "Explain", {"Object": ["Vehicles"]}),
+        ("hey car ahead", "Explain", {"Object": ["Vehicles"]}),
+        ("There is a car ahead.", "Explain", {"Object": ["Vehicles"]}),
+    ],
+)
+def test_a_car_that_is_spoken_to_is_no_vehicle_in_sight(text, move, slots):
+    (span,) = guess_spans(text)
+    assert span.act == parse_act(move, slots)
