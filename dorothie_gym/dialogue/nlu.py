@@ -255,11 +255,12 @@ def _without_vocative(words: list[str], lists: WordLists) -> list[str]:
 
 
 def _without_addressee(words: list[str], lists: WordLists) -> list[str]:
-    """Returns the words without a vocative that follows a greeting or thanks without a comma: "hello dear car"."""
+    """Returns the words without a vocative that follows a greeting or thanks, with or without a comma: "hi dear car"."""
     opening = next((n for n in (2, 1) if " ".join(words[:n]) in lists.addressing and len(words) > n), 0)
     if not opening:
         return words
-    begin = opening + (words[opening] in _ENDEARING and len(words) > opening + 1)
+    begin = opening + (words[opening] == ",")
+    begin += words[begin : begin + 1] != [] and words[begin] in _ENDEARING
     for end in (begin + 2, begin + 1):
         if " ".join(words[begin:end]) in lists.vocatives and (end >= len(words) or words[end] in _AFTER_ADDRESSEE):
             joint = [","] if end < len(words) and words[end] not in (",", "?") else []

@@ -1,7 +1,9 @@
 // Seat of the Ad-Wizard: the world from above, weather, props and actors by clicks, faults, changes of the task.
 
 import { button, h, icon, notice, panel, rebuild, words } from './dom.js';
+import { errandMarks } from './errands.js';
 import { MapView } from './map.js';
+import { PinLinks, where, zoomButtons } from './pins.js';
 import { Talk } from './talk.js';
 
 const FAULTS = { blur: 'Blurred view', gps: 'No position (GPS)', view: 'No view' };
@@ -23,6 +25,7 @@ export class AdWizardPage {
     this.weather = h('div', { class: 'sliders' });
     this.faults = h('div', { class: 'grid' });
     this.tasks = h('ul', { class: 'tasks editable' });
+    this.links = new PinLinks(this.map, this.tasks, 'Errand');
     this.placed = h('ul', { class: 'placed' });
     this.message = h('input', { type: 'text', maxlength: '300', 'aria-label': 'Message to the participant', placeholder: 'Message to the participant …' });
     const form = h('form', { class: 'say', onsubmit: event => { event.preventDefault(); this.sendMessage(); } }, this.message, h('button', { type: 'submit', class: 'primary', 'aria-label': 'Send the message' }, icon('send')));
@@ -36,14 +39,13 @@ export class AdWizardPage {
     for (const [key, part] of parts) keys.add(key, `Go to “${part.querySelector('h2').textContent}”`, () => part.querySelector('button, input')?.focus());
     keys.add('Escape', 'Put the tool down', () => this.take(null));
     this.element = h('div', { class: 'page ad_wizard' },
-      h('section', { class: 'panel map', 'aria-label': 'Map' }, this.canvas, h('div', { class: 'tools' }, h('div', { class: 'zoom', role: 'group', 'aria-label': 'Map' },
-        h('button', { type: 'button', class: 'round', 'aria-label': 'Zoom in', onclick: () => this.map.zoom(1.4) }, icon('plus')), h('button', { type: 'button', class: 'round', 'aria-label': 'Zoom out', onclick: () => this.map.zoom(1 / 1.4) }, icon('minus')),
-        h('button', { type: 'button', class: 'round', 'aria-label': 'Follow the car', onclick: () => { this.map.follow = true; } }, icon('target'))))),
+      h('section', { class: 'panel map', 'aria-label': 'Map' }, this.canvas, this.links.element, h('div', { class: 'tools' }, zoomButtons(this.map))),
       h('div', { class: 'controls' }, parts.map(([, part]) => part)), this.talk.element);
   }
 
-  begin() {
+  begin(hello) {
     this.map.scale = 2.6;
+    this.map.within = hello.stop.within;
     this.drafts.clear();
     const { vocabulary } = this.link.hello;
     const made = [...vocabulary.props.map(kind => [kind, words(kind), { prop: kind }]), ['vehicles', 'Vehicles', { what: 'vehicles' }], ['pedestrians', 'Pedestrians', { what: 'pedestrians' }]];
@@ -98,7 +100,7 @@ export class AdWizardPage {
     this.state = state;
     if (fields.weather) for (const [name, each] of this.sliders) each.set(state.weather[name]);
     if (fields.faults) for (const [sensor, each] of this.switches) each.setAttribute('aria-pressed', String(state.faults.includes(sensor)));
-    if (fields.tasks) this.showTasks(state);
+    if (fields.tasks || fields.landmarks) this.showTasks(state);
     if (fields.props) this.showProps(state);
   }
 
@@ -108,9 +110,10 @@ export class AdWizardPage {
       button('Remove', { class: 'soft', 'data-id': `remove-${item}`, run: () => this.link.command('remove', { item }) }))));
   }
 
-  showTasks({ tasks }) {
-    rebuild(this.tasks, tasks, () => tasks.map(task => h('li', { class: task.live || task.status === 'abandoned' ? task.status : 'untold' },
-      h('p', {}, task.text, h('small', { text: task.live ? task.status : task.status === 'abandoned' ? 'dropped' : 'not yet' })),
+  showTasks({ tasks, landmarks }) {
+    this.map.mark(errandMarks(tasks));
+    rebuild(this.tasks, [tasks, landmarks], () => tasks.map((task, k) => h('li', { class: task.live || task.status === 'abandoned' ? task.status : 'untold', 'data-pin': String(task.landmark) },
+      h('p', {}, h('span', {}, task.text, where(task, k, landmarks)), h('small', { text: task.live ? task.status : task.status === 'abandoned' ? 'dropped' : 'not yet' })),
       task.may.map(change => h('form', { class: 'change', onsubmit: event => { event.preventDefault(); const text = event.target.elements.text.value.trim(); this.link.command('task', { change, item: task.item, message: text }); } },
         h('input', { name: 'text', type: 'text', maxlength: '300', value: this.drafts.get(`${change}-${task.item}`) ?? task.messages[change], 'data-id': `text-${change}-${task.item}`, oninput: event => this.drafts.set(`${change}-${task.item}`, event.target.value), 'aria-label': `Message with which the participant learns it: ${CHANGES[change]} “${task.text}”`, placeholder: 'Message to the participant' }),
         h('button', { type: 'submit', 'data-id': `${change}-${task.item}`, title: change === 'change' ? task.after_change : '', text: CHANGES[change] }))))));

@@ -1,9 +1,13 @@
 // Seat of the Co-Wizard: map with what it knows, actions, beliefs, talk.
 
-import { button, h, icon, notice, panel, rebuild, words } from './dom.js';
+import { button, clock, h, icon, notice, panel, rebuild, words } from './dom.js';
+import { Hints } from './hints.js';
 import { COLOURS, MapView } from './map.js';
+import { PinLinks, zoomButtons } from './pins.js';
 import { Speech } from './speech.js';
+import { NEAR, rule, StopSign } from './stops.js';
 import { Talk } from './talk.js';
+import { toldPlaces } from './told.js';
 import { Windscreen } from './windscreen.js';
 
 const QUICK = ['Okay.', 'Where would you like to go?', 'Which way?', 'Is it on this street?', 'Are we there?', 'Turning left.', 'Turning right.', 'I have to turn around.', 'Sorry, could you say that again?'];
@@ -28,16 +32,28 @@ export function turnName(angle) {
   return `${size < 50 ? 'slightly ' : size > 115 ? 'sharply ' : ''}${angle > 0 ? 'left' : 'right'}`;
 }
 
+const kindOf = key => key.split('#')[0];
+
 export class CoWizardPage {
   constructor(link, keys) {
-    Object.assign(this, { link, mode: null, plan: [], goals: [], statuses: {}, marked: null });
-    this.windscreen = new Windscreen(link, { rate: 5 });
+    this.link = link;
+    this.forget();
+    this.mode = null;
+    this.windscreen = new Windscreen(link, { rate: 5, stops: () => this.stops() });
     this.talk = new Talk(link, { own: 'co_wizard', quick: QUICK, keys, alt: true });
     this.speech = new Speech(link, this.talk, keys);
     this.canvas = h('canvas', { 'aria-label': 'Map with what the car knows; press a mode below it, then click' });
     this.map = new MapView(this.canvas, { onclick: (at, reach) => this.click(at, reach) });
     this.map.layers.push((ink, px) => this.paintPlan(ink, px));
     this.status = h('dl', { class: 'status' });
+    this.sign = new StopSign({ drives: true });
+    this.rule = h('p', { class: 'rule' });
+    this.hints = new Hints([
+      ['You do not know the errands. Ask your passenger where to go: press Alt 2, or Enter and type.', () => this.talk.list.querySelector('.line.own:not(.waiting)')],
+      ['The car follows its lane. Choose where it turns at the next junction: keys 1 to 8.', () => this.driven],
+      ['Near a place, press S so that the car stands in the ring beside the pin; G goes on.', () => false],
+    ]);
+    this.talk.element.querySelector('h2').after(this.hints.element);
     this.exits = h('div', { class: 'exits', role: 'group', 'aria-label': 'Turns at the next junction' });
     this.buttons = ACTIONS.map(([action, label, glyph, key, more]) => {
       const made = button(label, { glyph, key, run: () => this.drive(action, more) });
@@ -49,11 +65,13 @@ export class CoWizardPage {
     this.lights.dataset.action = 'LightChange';
     keys.add('l', 'Head lights on or off', () => this.lights.click());
     for (let k = 1; k <= 8; k++) keys.add(String(k), `Turn number ${k} at the next junction`, () => this.exits.children[k - 1]?.click());
+    this.noteRows = h('ul', { class: 'notes' });
+    this.links = new PinLinks(this.map, this.noteRows, 'Place');
     this.element = h('div', { class: 'page co_wizard' },
-      h('section', { class: 'panel map', 'aria-label': 'Map' }, this.canvas, this.status, this.windscreen.element, this.modes(keys)),
+      h('section', { class: 'panel map', 'aria-label': 'Map' }, this.canvas, this.links.element, this.status, this.sign.element, this.windscreen.element, this.modes(keys)),
       h('div', { class: 'controls' },
         panel('Next junction', { class: 'turns' }, this.exits),
-        panel('Driving', { class: 'driving' }, h('div', { class: 'grid' }, this.buttons, this.lights)),
+        panel('Driving', { class: 'driving' }, h('div', { class: 'grid' }, this.buttons, this.lights), this.rule),
         this.notes(keys)),
       this.talk.element);
     keys.add('v', 'View through the windscreen on or off', () => this.windscreen.turn(!this.windscreen.on));
@@ -73,15 +91,10 @@ export class CoWizardPage {
     keys.add('c', 'Clear the plan', () => this.sendPlan([]));
     keys.add('Escape', 'Leave the mode', () => this.setMode(null));
     this.hint = h('p', { class: 'hint', 'aria-live': 'polite' });
-    const zoom = h('div', { class: 'zoom', role: 'group', 'aria-label': 'Map' },
-      h('button', { type: 'button', class: 'round', 'aria-label': 'Zoom in', onclick: () => this.map.zoom(1.4) }, icon('plus')),
-      h('button', { type: 'button', class: 'round', 'aria-label': 'Zoom out', onclick: () => this.map.zoom(1 / 1.4) }, icon('minus')),
-      h('button', { type: 'button', class: 'round', 'aria-label': 'Follow the car', onclick: () => { this.map.follow = true; } }, icon('target')));
-    return h('div', { class: 'tools' }, h('div', { class: 'modes', role: 'group', 'aria-label': 'Clicks on the map' }, this.modeButtons, this.clearPlan), this.hint, zoom);
+    return h('div', { class: 'tools' }, h('div', { class: 'modes', role: 'group', 'aria-label': 'Clicks on the map' }, this.modeButtons, this.clearPlan), this.hint, zoomButtons(this.map));
   }
 
   notes(keys) {
-    this.noteRows = h('ul', { class: 'notes' });
     keys.add('n', 'Go to the notes', () => this.noteRows.querySelector('button, select')?.focus());
     const other = button('Other change of belief', { key: 'b', class: 'soft', run: () => this.link.command('other') });
     keys.add('b', 'Note another change of what you believe', () => other.click());
@@ -98,8 +111,8 @@ export class CoWizardPage {
 
   click([x, y], reach) {
     if (this.mode === 'goal') {
-      const near = (this.state.landmarks ?? []).map(([name, lx, ly]) => [Math.hypot(lx - x, ly - 1.5 * reach - y), name]).filter(([d]) => d < 2.2 * reach).sort((a, b) => a[0] - b[0])[0];
-      if (near) this.toggleGoal(near[1]); else notice('There is no known place; click a pin.');
+      const near = (this.state.landmarks ?? []).map(([, lx, ly], k) => [Math.hypot(lx - x, ly - 1.5 * reach - y), k]).filter(([d]) => d < 2.2 * reach).sort((a, b) => a[0] - b[0])[0];
+      if (near) this.toggleGoal(this.keyOf(near[1])); else notice('There is no known place; click a pin.');
     } else if (this.mode === 'mark') {
       if (!this.marked) { notice('Choose a place in the notes first.'); return; }
       this.link.command('mark', { landmark: this.marked, x, y });
@@ -114,21 +127,77 @@ export class CoWizardPage {
 
   sendPlan(plan) { this.plan = plan; this.link.command('plan', { junctions: plan }); }
 
-  toggleGoal(name) {
-    this.goals = this.goals.includes(name) ? this.goals.filter(other => other !== name) : [...this.goals, name];
-    this.map.goals = this.goals;
-    this.link.command('goal', { landmarks: this.goals });
+  // Notes are kept for each pin; the car knows kinds of places only, so that two houses are one goal to it.
+
+  /** Returns the key of the notes on a pin: the landmark, with its number among those of its kind if there are several. */
+  keyOf(pin) {
+    const landmarks = this.state.landmarks ?? [], name = landmarks[pin][0], same = landmarks.flatMap(([other], k) => (other === name ? [k] : []));
+    return same.length > 1 ? `${name}#${same.indexOf(pin)}` : name;
+  }
+
+  toggleGoal(key) {
+    this.goals = this.goals.includes(key) ? this.goals.filter(other => other !== key) : [...this.goals, key];
+    this.link.command('goal', { landmarks: [...new Set(this.goals.map(kindOf))] });
     this.showNotes();
   }
 
+  setStatus(key, status) {
+    this.statuses[key] = status;
+    if (status) this.link.command('status', { landmark: kindOf(key), status });
+    this.showNotes();
+  }
+
+  /** Takes lines of the talk: places that the passenger has named are told. */
+  hear(entries) {
+    const before = this.heard.length;
+    for (const entry of entries) if (entry.who === 'participant' && entry.places) this.heard.push(entry);
+    if (this.heard.length > before) this.showNotes();
+  }
+
+  /** Returns the rows of the notes: what was told first, in the order of telling. */
+  rowsOfNotes() {
+    const { vocabulary } = this.link.hello, landmarks = this.state?.landmarks ?? [], told = toldPlaces(this.heard, landmarks);
+    const known = landmarks.map(([name, , , label], pin) => ({ key: this.keyOf(pin), name, label, pin, told: told.get(pin) }));
+    const missing = vocabulary.landmarks.filter(name => !landmarks.some(([other]) => other === name)).map(name => ({ key: name, name, label: words(name), pin: null, told: told.get(name) }));
+    return [...known, ...missing].sort((a, b) => (a.told?.number ?? 1e9) - (b.told?.number ?? 1e9));
+  }
+
   showNotes() {
-    const { vocabulary } = this.link.hello, known = new Set((this.state.landmarks ?? []).map(([name]) => name));
-    rebuild(this.noteRows, [[...known], this.goals, this.statuses, this.marked], () => vocabulary.landmarks.map(name => h('li', {},
-      h('button', { type: 'button', class: 'goal', 'data-id': `goal-${name}`, 'aria-pressed': String(this.goals.includes(name)), title: 'Goal', 'aria-label': `Goal: ${words(name)}`, onclick: () => this.toggleGoal(name) }, icon('flag')),
-      h('span', { text: words(name) }, known.has(name) ? null : h('small', { text: ' not on the map' })),
-      h('button', { type: 'button', class: 'mark', 'data-id': `mark-${name}`, 'aria-pressed': String(this.marked === name), title: 'Mark where it is', 'aria-label': `Mark the place of ${words(name)}`, onclick: () => { this.marked = name; this.setMode('mark'); this.showNotes(); this.canvas.focus(); } }, icon('pin')),
-      h('select', { 'aria-label': `State of ${words(name)}`, 'data-id': `status-${name}`, onchange: event => { this.statuses[name] = event.target.value; if (event.target.value) this.link.command('status', { landmark: name, status: event.target.value }); } },
-        h('option', { value: '', text: 'state' }), vocabulary.statuses.map(status => h('option', { value: status, text: status.toLowerCase(), selected: this.statuses[name] === status }))))));
+    const rows = this.rowsOfNotes();
+    this.markPins(rows);
+    rebuild(this.noteRows, [rows, this.goals, this.statuses, this.marked], () => rows.map(row => this.note(row)));
+  }
+
+  note({ key, name, label, pin, told }) {
+    const told_ = told ? h('small', { text: `${told.sure ? '' : 'perhaps: '}“${told.text}” ${clock(told.t)}` }) : null;
+    const title = pin === null ? h('span', { text: label }) : h('button', { type: 'button', class: 'where', 'data-id': `pin-${key}`, title: 'Show it on the map' }, told ? h('b', { text: told.mark }) : null, label);
+    return h('li', { class: told ? 'told' : '', ...(pin !== null && { 'data-pin': String(pin) }) },
+      h('button', { type: 'button', class: 'goal', 'data-id': `goal-${key}`, 'aria-pressed': String(this.goals.includes(key)), title: 'Goal', 'aria-label': `Goal: ${label}`, onclick: () => this.toggleGoal(key) }, icon('flag')),
+      h('div', {}, title, pin === null ? h('small', { text: ' not on the map' }) : null, told_),
+      h('button', { type: 'button', class: 'mark', 'data-id': `mark-${key}`, 'aria-pressed': String(this.marked === name), title: 'Mark where it is', 'aria-label': `Mark the place of ${label}`, onclick: () => { this.marked = name; this.setMode('mark'); this.showNotes(); this.canvas.focus(); } }, icon('pin')),
+      h('select', { 'aria-label': `State of ${label}`, 'data-id': `status-${key}`, onchange: event => this.setStatus(key, event.target.value) },
+        h('option', { value: '', text: 'state' }), this.link.hello.vocabulary.statuses.map(status => h('option', { value: status, text: status.toLowerCase(), selected: this.statuses[key] === status }))));
+  }
+
+  markPins(rows) {
+    const marks = new Map();
+    for (const { key, pin, told } of rows) {
+      const goal = this.goals.includes(key), status = this.statuses[key]?.toLowerCase();
+      if (pin === null || !(told || goal || status)) continue;
+      const open = !['complete', 'abandoned'].includes(status);
+      marks.set(pin, { text: told?.mark ?? '', colour: COLOURS[status] ?? (goal ? COLOURS.ongoing : COLOURS.pending), open, next: open });
+    }
+    this.map.mark(marks);
+  }
+
+  /** Returns the stopping places near the car: of goals and told places, if any are near, or else of all places on its map. */
+  stops() {
+    const { landmarks = [], pose } = this.link.state;
+    if (!pose) return [];
+    const near = landmarks.map(([, , , name, x, y], pin) => ({ name, x, y, mark: this.map.marks.get(pin), colour: this.map.marks.get(pin)?.colour ?? COLOURS.none }))
+      .filter(({ x, y }) => Math.hypot(x - pose[0], y - pose[1]) <= NEAR);
+    const wanted = near.filter(({ mark }) => mark?.open);
+    return wanted.length ? wanted : near.filter(({ mark }) => !mark);
   }
 
   paintPlan(ink, px) {
@@ -144,9 +213,18 @@ export class CoWizardPage {
 
   // --- driving ------------------------------------------------------------------------------------------------------
 
-  drive(action, more) { this.link.command('drive', { action, ...more }); }
+  drive(action, more) { this.driven = true; this.link.command('drive', { action, ...more }); }
 
-  begin(hello) { this.speech.begin(hello); Object.assign(this, { plan: [], goals: [], statuses: {}, marked: null }); this.map.goals = []; this.windscreen.begin(); this.setMode(null); }
+  forget() { Object.assign(this, { plan: [], goals: [], statuses: {}, marked: null, heard: [], driven: false }); }
+
+  begin(hello) {
+    this.speech.begin(hello);
+    this.forget();
+    this.map.within = hello.stop.within;
+    this.rule.textContent = `${rule(hello)} Notes neither steer nor stop it; before a goal it slows down.`;
+    this.windscreen.begin();
+    this.setMode(null);
+  }
 
   update(state, fields) {
     this.state = state;
@@ -155,6 +233,8 @@ export class CoWizardPage {
     if (fields.exits || 'manoeuvre' in fields) this.showExits(state);
     if (fields.landmarks) this.showNotes();
     this.showStatus(state);
+    this.sign.update(state, this.stops().filter(({ mark }) => mark), this.link.hello.stop);
+    this.hints.update(state);
   }
 
   showExits({ exits, manoeuvre, feasible }) {

@@ -1,7 +1,9 @@
 // Seats of the experimenter and of spectators: the true state of everything, and the control of the session.
 
 import { button, clock, h, icon, panel, rebuild, words } from './dom.js';
+import { errandMarks, nextStops } from './errands.js';
 import { MapView } from './map.js';
+import { PinLinks, where } from './pins.js';
 import { Talk } from './talk.js';
 import { Windscreen } from './windscreen.js';
 
@@ -11,16 +13,17 @@ const BY = { person: 'a person', policy: 'a policy', nobody: 'nobody' };
 export class ExperimenterPage {
   constructor(link, keys, { controls }) {
     Object.assign(this, { link, controls });
-    this.windscreen = new Windscreen(link, { rate: 5 });
+    this.windscreen = new Windscreen(link, { rate: 5, stops: () => nextStops(link.state, this.map.marks) });
     this.talk = new Talk(link, { names: { co_wizard: 'Co-Wizard', ad_wizard: 'Ad-Wizard, to the participant' } });
     this.canvas = h('canvas', { 'aria-label': 'Map with the true state of the world' });
     this.map = new MapView(this.canvas);
     this.facts = h('dl', { class: 'status' });
     this.events = h('div', { class: 'events', role: 'log', 'aria-label': 'Events', tabindex: '0' });
     this.tasks = h('ol', { class: 'tasks' });
+    this.links = new PinLinks(this.map, this.tasks, 'Errand');
     this.seats = h('ul', { class: 'seats' });
     this.element = h('div', { class: 'page experimenter' },
-      h('section', { class: 'panel map', 'aria-label': 'Map' }, this.canvas, this.facts, this.windscreen.element),
+      h('section', { class: 'panel map', 'aria-label': 'Map' }, this.canvas, this.links.element, this.facts, this.windscreen.element),
       h('div', { class: 'controls' }, controls ? this.panelOfControls(keys) : null, panel('Errands', { class: 'errands' }, this.tasks), panel('Events', { class: 'log' }, this.events)),
       this.talk.element);
     keys.add('v', 'View through the windscreen on or off', () => this.windscreen.turn(!this.windscreen.on));
@@ -40,7 +43,7 @@ export class ExperimenterPage {
 
   control(act) { this.link.send({ k: 'control', act }); }
 
-  begin() { this.map.scale = 2.6; this.events.replaceChildren(); this.windscreen.begin(); }
+  begin(hello) { this.map.scale = 2.6; this.map.within = hello.stop.within; this.events.replaceChildren(); this.windscreen.begin(); }
 
   update(state, fields) {
     if (this.controls) {
@@ -49,9 +52,15 @@ export class ExperimenterPage {
       this.start.hidden = state.state !== 'waiting';
       if (fields.seats) rebuild(this.seats, state.seats, () => state.seats.map(({ role, plan, present, by }) => h('li', { class: by }, h('b', { text: NAMES[role] }), h('span', { text: plan }), h('small', { text: `${present ? 'connected, ' : ''}played by ${BY[by]}` }))));
     }
-    if (fields.tasks) rebuild(this.tasks, state.tasks, () => state.tasks.map(task => h('li', { class: task.live || task.status === 'abandoned' ? task.status : 'untold' }, h('span', { text: task.text }), h('small', { text: task.live ? task.status : task.status === 'abandoned' ? 'dropped' : 'not yet' }))));
+    if (fields.tasks || fields.landmarks) this.showTasks(state);
     const rows = [['Time', clock(state.time ?? 0)], ['Speed', `${Math.round(state.speed ?? 0)} km/h`], ['Goals', state.goals?.map(words).join(', ') || '–'], ['Faults', state.faults?.join(', ') || 'none'], ['Fog', `${Math.round(100 * (state.weather?.fog_density ?? 0))} %`]];
     rebuild(this.facts, rows, () => rows.map(([name, value]) => h('div', {}, h('dt', { text: name }), h('dd', { text: value }))));
+  }
+
+  showTasks({ tasks, landmarks }) {
+    this.map.mark(errandMarks(tasks));
+    rebuild(this.tasks, [tasks, landmarks], () => tasks.map((task, k) => h('li', { class: task.live || task.status === 'abandoned' ? task.status : 'untold', 'data-pin': String(task.landmark) },
+      h('div', {}, h('span', { text: task.text }), where(task, k, landmarks)), h('small', { text: task.live ? task.status : task.status === 'abandoned' ? 'dropped' : 'not yet' }))));
   }
 
   addEvents(events) {

@@ -7,6 +7,7 @@ const TYPING = 'input:not([type=range], [type=checkbox], [type=radio]), textarea
 export class Keys {
   constructor() {
     this.rows = [];
+    this.note = '';
     addEventListener('keydown', event => this.press(event));
     this.add('?', 'Show the keys', () => this.show());
   }
@@ -34,6 +35,7 @@ export class Keys {
     const dialog = h('dialog', { class: 'keys', 'aria-label': 'Keys' }, h('h2', { text: 'Keys' }),
       h('dl', { tabindex: '0' }, this.rows.flatMap(({ key, label, alt }) => [h('dt', {}, h('kbd', { text: (alt ? 'Alt ' : '') + shownKey(key) })), h('dd', { text: label })])),
       h('p', { class: 'hint', text: 'On the map: arrows move the pointer and hold the map, Enter clicks, Shift and arrows move the map, + and − zoom, 0 follows the car. Escape leaves a field.' }),
+      this.note ? h('p', { class: 'hint', text: this.note }) : null,
       h('button', { type: 'button', autofocus: true, onclick: () => dialog.close(), text: 'Close' }));
     dialog.addEventListener('close', () => dialog.remove());
     document.body.append(dialog);

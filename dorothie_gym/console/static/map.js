@@ -14,7 +14,7 @@ export class MapView {
   constructor(canvas, { onclick = null } = {}) {
     Object.assign(this, {
       canvas, onclick, ink: canvas.getContext('2d'), centre: [0, 0], scale: 4, follow: true, names: [], poses: [], offset: null, hover: null,
-      cursor: null, held: false, trail: [], state: {}, layers: [], ratio: 1,
+      cursor: null, held: false, trail: [], state: {}, layers: [], ratio: 1, marks: new Map(), linked: null, links: null, within: 2,
     });
     canvas.tabIndex = 0;
     new ResizeObserver(() => this.fit()).observe(canvas);
@@ -162,6 +162,7 @@ export class MapView {
     const px = 1 / this.scale;
     this.paintTrail(px);
     this.paintPath(px);
+    this.paintStops(px);
     for (const layer of this.layers) layer(ink, px, this);
     this.paintGuesses(px);
     for (const object of this.state.objects ?? []) paintBody(ink, object, px);
@@ -171,6 +172,7 @@ export class MapView {
     if (pose) paintCar(ink, pose, px, this.state.lights);
     if (this.cursor) this.paintCursor();
     this.paintScale();
+    this.links?.place();
   }
 
   paintBase() {
@@ -238,13 +240,27 @@ export class MapView {
     }
   }
 
+  /** Marks pins that belong to errands: row of the landmarks, with text for its head, colour, and whether a stop there is due. */
+  mark(marks) { this.marks = marks; this.links?.rebuild(); }
+
+  paintStops(px) {
+    (this.state.landmarks ?? []).forEach(([, x, y, , sx, sy], k) => {
+      const mark = this.marks.get(k);
+      if (mark ? !mark.open : px > 0.35 && k !== this.linked) return;
+      const { ink } = this, colour = mark?.colour ?? COLOURS.none;
+      ink.globalAlpha = mark ? 1 : 0.55;
+      ink.beginPath(); ink.moveTo(x, y); ink.lineTo(sx, sy); ink.strokeStyle = colour; ink.lineWidth = 1.2 * px; ink.setLineDash([3 * px, 3 * px]); ink.stroke(); ink.setLineDash([]);
+      ink.beginPath(); ink.arc(sx, sy, Math.max(this.within, 4.5 * px), 0, 7);
+      ink.fillStyle = `${colour}4d`; ink.fill(); ink.strokeStyle = '#ffffff'; ink.lineWidth = 3.6 * px; ink.stroke(); ink.strokeStyle = colour; ink.lineWidth = 2 * px; ink.stroke();
+      ink.globalAlpha = 1;
+    });
+  }
+
   paintLandmarks(px) {
-    const tasks = new Map();
-    for (const task of this.state.tasks ?? []) if (!tasks.has(task.landmark) && (task.live || task.status === 'abandoned')) tasks.set(task.landmark, task.status);
-    (this.state.landmarks ?? []).forEach(([name, x, y], k) => {
-      const hidden = this.state.hidden?.[k];
-      const wanted = this.goals?.includes(name);
-      pin(this.ink, x, y, px, COLOURS[tasks.get(k) ?? (wanted ? 'ongoing' : 'none')], hidden ? `${words(name)} (hidden)` : words(name), false, tasks.has(k) || wanted);
+    (this.state.landmarks ?? []).forEach(([, x, y, name], k) => {
+      const mark = this.marks.get(k);
+      if (k === this.linked) { this.ink.beginPath(); this.ink.arc(x, y - 16 * px, 16 * px, 0, 7); this.ink.fillStyle = '#ffd54a'; this.ink.fill(); this.ink.strokeStyle = '#1f2733'; this.ink.lineWidth = 2 * px; this.ink.stroke(); }
+      pin(this.ink, x, y, px, mark?.colour ?? COLOURS.none, this.state.hidden?.[k] ? `${name} (hidden)` : name, false, Boolean(mark), mark?.text);
     });
   }
 
@@ -307,11 +323,14 @@ function paintProp(ink, kind, x, y, heading, px) {
   ink.restore();
 }
 
-export function pin(ink, x, y, px, colour, text, hollow = false, strong = false) {
-  const r = (strong ? 8 : 6.5) * px;
+export function pin(ink, x, y, px, colour, text, hollow = false, strong = false, inside = '') {
+  const r = (inside ? 9 : strong ? 8 : 6.5) * px;
   ink.beginPath(); ink.moveTo(x, y); ink.arc(x, y - 2.1 * r, r, Math.PI * 0.85, Math.PI * 2.15); ink.closePath();
   ink.fillStyle = hollow ? '#ffffff' : colour; ink.fill(); ink.strokeStyle = hollow ? colour : '#ffffff'; ink.lineWidth = 1.6 * px; ink.stroke();
-  ink.beginPath(); ink.arc(x, y - 2.1 * r, 0.36 * r, 0, 7); ink.fillStyle = hollow ? colour : '#ffffff'; ink.fill();
+  if (inside) {
+    ink.font = `700 ${(inside.length > 2 ? 9 : 11) * px}px system-ui, "DejaVu Sans", sans-serif`; ink.textAlign = 'center'; ink.textBaseline = 'middle';
+    ink.fillStyle = '#ffffff'; ink.fillText(inside, x, y - 2.05 * r);
+  } else { ink.beginPath(); ink.arc(x, y - 2.1 * r, 0.36 * r, 0, 7); ink.fillStyle = hollow ? colour : '#ffffff'; ink.fill(); }
   ink.font = `${strong ? 700 : 600} ${12 * px}px system-ui, "DejaVu Sans", sans-serif`; ink.textAlign = 'center'; ink.textBaseline = 'bottom';
   ink.lineWidth = 3.4 * px; ink.strokeStyle = '#ffffffe6'; ink.lineJoin = 'round'; ink.strokeText(text, x, y - 3.4 * r); ink.fillStyle = strong ? colour : '#2e3644'; ink.fillText(text, x, y - 3.4 * r);
 }

@@ -7,6 +7,7 @@ import { ExperimenterPage } from './experimenter.js';
 import { Keys } from './keys.js';
 import { Link } from './link.js';
 import { ParticipantPage } from './participant.js';
+import { rule } from './stops.js';
 
 const TITLES = { participant: 'Participant', co_wizard: 'Co-Wizard', ad_wizard: 'Ad-Wizard', experimenter: 'Experimenter', spectator: 'Spectator' };
 const REASONS = {
@@ -49,6 +50,7 @@ async function greet(link, hello) {
   if (!page || seat !== hello.seat) build(link, hello);
   page.talk.clear();
   page.begin(hello);
+  keys.note = rule(hello);
   document.querySelector('.over')?.remove();
   if (page.map.town?.name !== hello.town) {
     const answer = await fetch(`/towns/${encodeURIComponent(hello.town)}.json`);
@@ -73,7 +75,7 @@ function update(link, { fields, talk, events, refused }, then) {
   page.map.update(now);
   page.update(now, fields);
   page.talk.state(now);
-  if (talk) page.talk.add(talk);
+  if (talk) { page.talk.add(talk); page.hear?.(talk); }
   if (events) page.addEvents?.(events);
   if (refused) for (const reason of refused) notice(words(reason), 'error');
   if ('time' in fields) time.textContent = clock(now.time);

@@ -1,0 +1,30 @@
+// Places that the Co-Wizard was told: those that the passenger has named, as the recogniser understood them.
+
+/**
+ * Returns for each row of the landmarks, or for the name of one that is not on the map, when it was told.
+ * @param heard lines of the talk with `places` and `streets`, in order.
+ * @param landmarks rows of the map.
+ * @returns map to `number` in the order of telling, `mark` for the pin, `sure` (whether one pin alone is meant), `text`, `t`.
+ */
+export function toldPlaces(heard, landmarks) {
+  const told = new Map();
+  let count = 0;
+  for (const { places, streets, text, t } of heard) {
+    for (const name of places) {
+      const pins = pinsOf(name, streets, landmarks, told), keys = pins.length ? pins : [name], sure = keys.length === 1;
+      const number = keys.map(key => told.get(key)).find(before => before && before.sure === sure)?.number ?? ++count;
+      if (sure) for (const [key, { sure: before }] of told) if (!before && landmarks[key]?.[0] === name) told.delete(key);
+      for (const key of keys) told.set(key, { number, mark: sure ? String(number) : `${number}?`, sure, text, t });
+    }
+  }
+  return told;
+}
+
+/** Returns the pins that a name may mean: those on a street that was named, or the one that was told last, or all. */
+function pinsOf(name, streets, landmarks, told) {
+  const pins = landmarks.flatMap(([other], k) => (other === name ? [k] : []));
+  const there = pins.filter(k => streets.some(street => landmarks[k][3].endsWith(`, ${street}`)));
+  if (there.length) return there;
+  const known = pins.filter(k => told.get(k)?.sure).sort((a, b) => told.get(b).t - told.get(a).t);
+  return pins.length > 1 && known.length ? [known[0]] : pins;
+}
