@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from dorothie_gym.console.lane_lookup import LaneLookup
 from dorothie_gym.ontology import LandmarkName, StreetName
-from dorothie_gym.tasks.catalogue import map_label
+from dorothie_gym.tasks.catalogue import catalogue, map_label
 
 
 class Pin(NamedTuple):
@@ -31,8 +31,10 @@ class Pin(NamedTuple):
 
 def pin_rows(
     pins: Sequence[Pin], streets: Sequence[StreetName], places: LaneLookup
-) -> list[tuple[str, float, float, str, float, float]]:
-    """Returns the pins in JSON types: landmark, x, y [m], name on the map, x and y of the stopping place [m].
+) -> list[tuple[str, float, float, str, float, float, int]]:
+    """Returns the pins in JSON types.
+
+    The columns are landmark, x, y [m], name on the map, x and y of the stopping place [m], and index of the street.
 
     Args:
         pins: landmarks that the role knows; nothing else decides the names, so that they give no other one away.
@@ -42,17 +44,15 @@ def pin_rows(
     rows = []
     for pin, name in zip(pins, _names(pins, streets), strict=True):
         x, y = places.position(pin.lane, pin.station)
-        rows.append((pin.name.label, _metres(pin.position[0]), _metres(pin.position[1]), name, _metres(x), _metres(y)))
+        position = (_metres(pin.position[0]), _metres(pin.position[1]))
+        rows.append((pin.name.label, *position, name, _metres(x), _metres(y), pin.street))
     return rows
 
 
 def _names(pins: Sequence[Pin], streets: Sequence[StreetName]) -> list[str]:
-    """Returns the names on the map: of several landmarks of a kind with their street, else with a number as well."""
-    alone = [map_label(pin.name) for pin in pins]
-    kinds = Counter(alone)
+    """Returns the names on the map: of houses and people with their street, and with a number if that is not enough."""
     named = [
-        f"{name}, {_street(pin, streets)}" if kinds[name] > 1 and _street(pin, streets) else name
-        for pin, name in zip(pins, alone, strict=True)
+        f"{map_label(pin.name)}, {street}" if (street := _street(pin, streets)) else map_label(pin.name) for pin in pins
     ]
     return list(_numbered(named))
 
@@ -66,6 +66,9 @@ def _numbered(names: Sequence[str]) -> Iterable[str]:
 
 
 def _street(pin: Pin, streets: Sequence[StreetName]) -> str:
+    """Returns the street of a landmark of which a town may have several; "" for others and unnamed streets."""
+    if not catalogue()[pin.name].repeatable:
+        return ""
     name = streets[pin.street] if 0 <= pin.street < len(streets) else StreetName.UNKNOWN
     return "" if name is StreetName.UNKNOWN else name.label
 

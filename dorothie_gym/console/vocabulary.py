@@ -16,6 +16,7 @@ from dorothie_gym.ontology import (
     WeatherParameter,
     path_to,
 )
+from dorothie_gym.tasks.catalogue import catalogue
 
 
 @lru_cache(maxsize=1)
@@ -30,6 +31,7 @@ def vocabulary() -> dict[str, Any]:
             if slot is not Slot.NULL
         },
         "landmarks": [name.label for name in LandmarkName if name not in special],
+        "several": [name.label for name, kind in catalogue().items() if kind.repeatable],
         "statuses": [status.label for status in GoalStatus if status not in (GoalStatus.UNKNOWN, GoalStatus.QUERIED)],
         "weather": [[each.value, each.low, each.high, each.unit] for each in WeatherParameter],
         "props": [prop.value for prop in PropKind],

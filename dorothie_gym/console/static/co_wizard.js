@@ -156,7 +156,7 @@ export class CoWizardPage {
 
   /** Returns the rows of the notes: what was told first, in the order of telling. */
   rowsOfNotes() {
-    const { vocabulary } = this.link.hello, landmarks = this.state?.landmarks ?? [], told = toldPlaces(this.heard, landmarks);
+    const { vocabulary, streets } = this.link.hello, landmarks = this.state?.landmarks ?? [], told = toldPlaces(this.heard, landmarks, streets, vocabulary.several);
     const known = landmarks.map(([name, , , label], pin) => ({ key: this.keyOf(pin), name, label, pin, told: told.get(pin) }));
     const missing = vocabulary.landmarks.filter(name => !landmarks.some(([other]) => other === name)).map(name => ({ key: name, name, label: words(name), pin: null, told: told.get(name) }));
     return [...known, ...missing].sort((a, b) => (a.told?.number ?? 1e9) - (b.told?.number ?? 1e9));
@@ -169,14 +169,14 @@ export class CoWizardPage {
   }
 
   note({ key, name, label, pin, told }) {
-    const told_ = told ? h('small', { text: `${told.sure ? '' : 'perhaps: '}“${told.text}” ${clock(told.t)}` }) : null;
+    const quote = told ? h('small', { class: 'quote', text: `${told.sure ? '' : 'perhaps: '}“${told.text}” ${clock(told.t)}` }) : null;
     const title = pin === null ? h('span', { text: label }) : h('button', { type: 'button', class: 'where', 'data-id': `pin-${key}`, title: 'Show it on the map' }, told ? h('b', { text: told.mark }) : null, label);
     return h('li', { class: told ? 'told' : '', ...(pin !== null && { 'data-pin': String(pin) }) },
       h('button', { type: 'button', class: 'goal', 'data-id': `goal-${key}`, 'aria-pressed': String(this.goals.includes(key)), title: 'Goal', 'aria-label': `Goal: ${label}`, onclick: () => this.toggleGoal(key) }, icon('flag')),
-      h('div', {}, title, pin === null ? h('small', { text: ' not on the map' }) : null, told_),
+      h('div', {}, title, pin === null ? h('small', { text: ' not on the map' }) : null),
       h('button', { type: 'button', class: 'mark', 'data-id': `mark-${key}`, 'aria-pressed': String(this.marked === name), title: 'Mark where it is', 'aria-label': `Mark the place of ${label}`, onclick: () => { this.marked = name; this.setMode('mark'); this.showNotes(); this.canvas.focus(); } }, icon('pin')),
       h('select', { 'aria-label': `State of ${label}`, 'data-id': `status-${key}`, onchange: event => this.setStatus(key, event.target.value) },
-        h('option', { value: '', text: 'state' }), this.link.hello.vocabulary.statuses.map(status => h('option', { value: status, text: status.toLowerCase(), selected: this.statuses[key] === status }))));
+        h('option', { value: '', text: 'state' }), this.link.hello.vocabulary.statuses.map(status => h('option', { value: status, text: status.toLowerCase(), selected: this.statuses[key] === status }))), quote);
   }
 
   markPins(rows) {
