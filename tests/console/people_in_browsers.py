@@ -79,6 +79,8 @@ class Chauffeur:
         when = [(int(quote.split()[-1].replace(":", "")), place_in(where)) for where, quote in seen["told"]]
         last = max(when)[1]
         if last != self.target:
+            for place in filter(None, (self.target, last)):  # the car slows down before its goal
+                self.page.get_by_role("button", name=f"Goal: {place}", exact=True).click()
             self.target, self.tried = last, {}
 
     def _feel(self, seen: dict[str, Any]) -> None:

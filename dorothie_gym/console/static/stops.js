@@ -3,7 +3,7 @@
 import { h } from './dom.js';
 
 export const NEAR = 60;  // distance from which on a stopping place is shown [m]
-const STANDING = 0.5, REACTION = 0.35;  // speed of a car that stands [km/h]; time from seeing the sign to braking [s]
+const STANDING = 0.5, REACTION = 0.5;  // speed of a car that stands [km/h]; time from seeing the sign to braking [s]
 
 /** Returns the rule by which errands are done. */
 export const rule = hello => `An errand is done when the car stands within ${hello.stop.within} m of its stopping place: the ring on the lane beside its pin.`;
@@ -37,7 +37,7 @@ export class StopSign {
   advice({ stop, ahead, right, distance }, speed, within, braking) {
     const v = speed / 3.6, rest = ahead - v * REACTION - v * v / (2 * braking);
     if (distance <= within && speed < STANDING) return `The car stands at ${stop.name}:`;
-    if (Math.abs(right) < within && ahead > -within && rest < within / 2) return this.drives ? `Stop now for ${stop.name}:` : `Stopping at ${stop.name} now counts:`;
+    if (Math.abs(right) < within && Math.abs(rest) < within) return this.drives ? `Stop now for ${stop.name}:` : `Stopping at ${stop.name} now counts:`;
     return ahead < -within ? `Stopping place of ${stop.name}, behind:` : `Stopping place of ${stop.name}:`;
   }
 }
