@@ -7,7 +7,8 @@ import re
 import time
 from typing import Any
 
-STAND = re.compile(r"stands at (.+):")
+WALKING, CRUISING = 10, 40
+"""Cruise speed near a stopping place, so that there is time to press a key, and elsewhere [km/h]."""
 LOOK = """() => {
   const all = selector => [...document.querySelectorAll(selector)];
   const shown = element => element && !element.hidden && element.getClientRects().length ? element.innerText : '';
@@ -105,10 +106,17 @@ class Chauffeur:
             self.held = now
             return True
         metres = float(sign.split()[-2]) if sign else math.inf
+        close = self.target in sign and "behind" not in sign and metres < 35.0
+        self._cruise(seen, WALKING if close else CRUISING)
         if self.target in sign and "behind" in sign and 4.0 < metres < 40.0 and now - self.turned > 15.0:
             self.page.keyboard.press("u")  # the place is on the other side of the road
             self.turned = now
         return False
+
+    def _cruise(self, seen: dict[str, Any], wanted: int) -> None:
+        cruise = re.search(r"Cruise\s+(\d+) km/h", seen["status"])
+        if cruise is not None and int(cruise[1]) != wanted:
+            self.page.keyboard.press("ArrowDown" if int(cruise[1]) > wanted else "ArrowUp")
 
     def _choose(self, seen: dict[str, Any], pin: tuple[float, float]) -> None:
         near = re.search(r"Junction\s+in (\d+) m", seen["status"])
