@@ -255,7 +255,7 @@ def _without_vocative(words: list[str], lists: WordLists) -> list[str]:
 
 
 def _without_addressee(words: list[str], lists: WordLists) -> list[str]:
-    """Returns the words without a vocative that follows a greeting or thanks, with or without a comma: "hi dear car"."""
+    """Returns the words without a vocative that follows a greeting or thanks, a comma between or not: "hi dear car"."""
     opening = next((n for n in (2, 1) if " ".join(words[:n]) in lists.addressing and len(words) > n), 0)
     if not opening:
         return words
