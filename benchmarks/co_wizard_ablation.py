@@ -1,0 +1,249 @@
+"""Replaces one part of the learned Co-Wizard at a time, and plays the same sessions with what is left.
+
+Each row is a rollout with its own folder in the work folder, and resumes there. The sessions are those of
+`dorothie-gym rollout` with the same towns, number and seed. The weights are not fitted again: a row says what the
+trained network does without a part, not what another training would have made of that.
+"""
+
+import json
+import sys
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from dorothie_gym.baselines.co_wizard.decision import Inputs, Scene
+from dorothie_gym.baselines.co_wizard.features import ordered_exit
+from dorothie_gym.baselines.co_wizard.files import load_network
+from dorothie_gym.baselines.co_wizard.memory import FRESH, SPEEDS, Memory, Update
+from dorothie_gym.baselines.co_wizard.policy import Choice, LearnedCoWizard, LearnedState, Turn
+from dorothie_gym.baselines.co_wizard.remarks import Sources, filled
+from dorothie_gym.baselines.imitation.drawing import drawn
+from dorothie_gym.cli.output import reporting_errors, session_progress
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.maps import Town
+from dorothie_gym.maps.routing import Place
+from dorothie_gym.ontology import PhysicalAction, Role
+from dorothie_gym.policies import ALL_SCRIPTED, Player, find_player, pretrained_folder
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.language_model.co_wizard_prompt import drive_options
+from dorothie_gym.policies.language_model.navigator import Navigator
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.pretrained import is_pretrained
+from dorothie_gym.policies.speech import Remark
+from dorothie_gym.policies.turn_lanes import junction_meant
+from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
+from dorothie_gym.spaces import Motion, ObservationMapping, Physical, SpaceLimits
+
+SHOWN: Final = ("success", "driving_score", "goal_condition_success", "exchanges_per_subgoal", "seconds")
+"""Metrics of the printed table."""
+
+
+class RandomCommands(LearnedCoWizard):
+    """Commands that are drawn evenly among those that the action mask allows, "none" among them."""
+
+    def _act(
+        self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
+    ) -> tuple[Choice, tuple[Remark, ...]]:  # fmt: skip
+        choice, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
+        return replace(choice, command=int(rng.integers(len(inputs.rows)))), remarks
+
+
+class RuledCommands(LearnedCoWizard):
+    """Commands by a rule over the memory that the network has written."""
+
+    def _act(
+        self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
+    ) -> tuple[Choice, tuple[Remark, ...]]:  # fmt: skip
+        choice, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
+        return replace(choice, command=ruled_command(memory, scene.view)), remarks
+
+
+def ruled_command(memory: Memory, view: CoWizardView) -> int:
+    """Returns the index of the first allowed command among: stop, what was asked for, the route, go on, speed, lights.
+
+    Args:
+        memory: working memory after listening.
+        view: observation.
+    """
+    step = memory.navigator.step(memory.town, view, memory.clock.interval, 0.0)
+    due = None if step is None or not step.due else Physical(action=step.action, angle=step.angle)
+    way = ordered_exit(memory, view, junction_meant(memory.town, view.here, view.choice))
+    halts, goes = bool(memory.value("halted")), view.motion is not Motion.STOPPED
+    faster, lights = SPEEDS[memory.value("speed")] - view.cruise, memory.value("lights")
+    prepared = view.manoeuvre is PhysicalAction.J_TURN and way is not None and abs(view.angle - way.angle) < 1.0
+    wanted: list[tuple[bool, Physical]] = [
+        (halts and goes, Physical(action=PhysicalAction.STOP)),
+        (memory.value("manoeuvre") == 1, Physical(action=PhysicalAction.U_TURN)),
+        (memory.value("manoeuvre") == 2, Physical(action=PhysicalAction.LANE_SWITCH, angle=90)),
+        (memory.value("manoeuvre") == 3, Physical(action=PhysicalAction.LANE_SWITCH, angle=-90)),
+        (
+            way is not None and not prepared and not memory.value("skip"),
+            Physical(action=PhysicalAction.J_TURN, angle=0 if way is None else way.angle),
+        ),
+        (due is not None and way is None, due or Physical(action=PhysicalAction.STOP)),
+        (not halts and not goes, Physical(action=PhysicalAction.START)),
+        (abs(faster) > 2.5, Physical(action=PhysicalAction.SPEED_CHANGE, up=faster > 0)),
+        (lights > 0 and view.lights is not (lights == 1), Physical(action=PhysicalAction.LIGHT_CHANGE, up=lights == 1)),
+    ]
+    options = list(drive_options(view, memory.town).values())
+    chosen = [options.index(command) for holds, command in wanted if holds and command in options]
+    return chosen[0] if chosen else options.index(None)
+
+
+class FrozenListening(LearnedCoWizard):
+    """Nothing that is heard changes the memory: it keeps its initial values, and no goal is set."""
+
+    def _listen(self, scene: Scene, inputs: Inputs) -> Update:
+        return Update(values=scene.memory.values, fresh=(False,) * len(FRESH))
+
+
+class WithoutRoute(LearnedCoWizard):
+    """The navigator plans no route to the goal, so that only the turns that are asked for lead there."""
+
+    def initial_state(self, seed: int, town: Town) -> LearnedState:
+        """Returns the state before the first observation."""
+        state = super().initial_state(seed, town)
+        memory = replace(state.attention.memory, navigator=_NoRoutes())
+        return replace(state, attention=replace(state.attention, memory=memory))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _NoRoutes(Navigator):
+    """Navigator that plans nothing."""
+
+    def to(self, town: Town, view: CoWizardView, goal: Place | None) -> Navigator:
+        """Gives the route up."""
+        return super().to(town, view, None)
+
+
+class WithoutAnswers(LearnedCoWizard):
+    """The answers that rules make of the evidence cannot be said; the other forms of the corpus can."""
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        self._needs = [needs | {"nothing has this source"} if "answer" in needs else needs for needs in self._needs]
+
+
+class WithoutRules(LearnedCoWizard):
+    """No rule decides what may be said: the first remark that is drawn is said."""
+
+    def _draw(
+        self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,
+        *, joined: bool = False,
+    ) -> tuple[int, Remark | None]:  # fmt: skip
+        chosen = drawn(shares, rng)
+        remark = filled(self._vocabulary[chosen], available, joined=joined) if chosen else None
+        return (0, None) if remark is None else (chosen, remark)
+
+
+class RandomRemarks(LearnedCoWizard):
+    """The network decides when to speak; what is said is drawn evenly among the remarks that the rules leave."""
+
+    def _draw(
+        self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,
+        *, joined: bool = False,
+    ) -> tuple[int, Remark | None]:  # fmt: skip
+        even = np.where(shares > 0.0, 1.0, 0.0)
+        even[0] = 0.0
+        if even.sum():
+            even *= (1.0 - shares[0]) / even.sum()
+        even[0] = shares[0]
+        return super()._draw(even, scene, memory, available, rng, joined=joined)
+
+
+class Silent(LearnedCoWizard):
+    """Nothing is said."""
+
+    def play(self, observation: ObservationMapping, state: LearnedState, *, silent: bool = False) -> Turn:
+        """Takes a decision; nothing is to be said."""
+        return super().play(observation, state, silent=True)
+
+
+ROWS: Final[dict[str, type[LearnedCoWizard]]] = {
+    "full": LearnedCoWizard,
+    "random-commands": RandomCommands,
+    "ruled-commands": RuledCommands,
+    "frozen-listening": FrozenListening,
+    "words-alone": LearnedCoWizard,
+    "without-route": WithoutRoute,
+    "without-answers": WithoutAnswers,
+    "without-rules": WithoutRules,
+    "random-remarks": RandomRemarks,
+    "silent": Silent,
+}
+"""Players by the name of their row."""
+
+CONFIGS: Final = {"words-alone": EnvConfig(observe_acts=False)}
+"""Settings of the sessions of a row, where they are not the default ones, in which acts are observed beside words."""
+
+
+def make(row: str, path: Path, role: Role, limits: SpaceLimits) -> LearnedCoWizard:
+    """Returns the player of a row with the network of a folder."""
+    import torch
+
+    torch.set_num_threads(1)
+    network, page = load_network(path)
+    return ROWS[row](network, page.vocabulary, limits)
+
+
+def main(
+    work: Annotated[Path, typer.Option(help="folder of the rollouts")] = Path("runs/co-wizard-ablation"),
+    model: Annotated[str, typer.Option(help="name or folder of a learned Co-Wizard")] = "pretrained:co-wizard",
+    rows: Annotated[str, typer.Option(help="rows, separated by commas")] = ",".join(ROWS),
+    towns: Annotated[str, typer.Option(help="towns as of `dorothie-gym rollout`")] = "unseen",
+    sessions: Annotated[int, typer.Option(min=1, help="sessions of a row")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the sessions")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object")] = False,
+) -> None:
+    """Prints success and other closed-loop metrics of each row with their 95 % intervals."""
+    chosen = [row.strip() for row in rows.split(",")]
+    unknown = [row for row in chosen if row not in ROWS]
+    if unknown:
+        raise SystemExit(f"--rows: there is no row {unknown[0]!r}; the rows are {', '.join(ROWS)}")
+    found: dict[str, RolloutResult] = {}
+    with reporting_errors():
+        full = find_player(model, Role.CO_WIZARD)
+        folder = pretrained_folder(model) if is_pretrained(model) else Path(model)
+        for row in chosen:
+            print(f"{row}: {work / row}", file=sys.stderr, flush=True)
+            player = Player(
+                name=f"{model} ({row})", path=folder, loader=partial(make, row), sha256=full.sha256,
+                training=full.training,
+            )  # fmt: skip
+            settings = RolloutSettings(
+                cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, towns=parse_towns(towns), sessions=sessions, seed=seed,
+                config=CONFIGS.get(row, EnvConfig()),
+            )  # fmt: skip
+            with session_progress(quiet=False) as on_session:
+                found[row] = roll_out(settings, work / row, workers=workers, on_session=on_session)
+            print(f"{row}: {_shown(found[row], 'success')}", file=sys.stderr, flush=True)
+    if as_json:
+        print(json.dumps({row: result.table().to_json() for row, result in found.items()}))
+        return
+    table = Table("row", "sessions", *(key.replace("_", " ") for key in SHOWN))
+    for row, result in found.items():
+        table.add_row(row, str(len(result.rows)), *(_shown(result, key) for key in SHOWN))
+    Console().print(table)
+
+
+def _shown(result: RolloutResult, key: str) -> str:
+    """Returns a metric with its interval."""
+    figure = result.figures()[key]
+    scale = 1.0 if key in ("exchanges_per_subgoal", "seconds") else 100.0
+    values = [None if value is None else scale * value for value in (figure.mean, figure.low, figure.high)]
+    if values[0] is None:
+        return "-"
+    mean, low, high = (f"{value:.{0 if key == 'seconds' else 1}f}" for value in values if value is not None)
+    return f"{mean} [{low}, {high}]"
+
+
+if __name__ == "__main__":
+    typer.run(main)
