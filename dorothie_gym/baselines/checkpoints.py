@@ -11,13 +11,19 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 import torch
-from safetensors import SafetensorError, safe_open
 from torch import Tensor, nn
 
-from dorothie_gym.baselines.tensor_files import save_tensors
+from dorothie_gym.baselines.tensor_files import (
+    check_optimiser,
+    check_tensors,
+    read_header,
+    read_tensors,
+    refuse_unknown,
+    save_tensors,
+)
 from dorothie_gym.errors import CheckpointError, InputFileError, ModelFileError, one_line, short_repr
 from dorothie_gym.files import replacing, write_atomically
-from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, parse_json, read_json
+from dorothie_gym.input_files import MAX_MODEL_JSON, checked, parse_json, raising, read_json
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 
 _MODEL: Final = "model."
@@ -55,13 +61,9 @@ def about(path: Path) -> dict[str, Any]:
         CheckpointError: the file is not a checkpoint of this package, or is damaged.
     """
     try:
-        check_file(path, MAX_WEIGHTS)
-        with safe_open(path, framework="pt") as file:
-            written = parse_json((file.metadata() or {})[_ABOUT], path)
-    except (SafetensorError, KeyError, InputFileError) as error:
-        raise CheckpointError(
-            f"{path}: is not a checkpoint of this package, or is damaged ({error}); delete it"
-        ) from None
+        written = parse_json(read_header(path).metadata.get(_ABOUT, ""), path)
+    except InputFileError as error:
+        raise CheckpointError(f"{error}; it is no checkpoint of this package, or damaged, delete it") from None
     if not isinstance(written, dict):
         raise CheckpointError(f"{path}: its metadata is no JSON object; delete it")
     return written
@@ -73,31 +75,32 @@ def restore(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer | Non
     Raises:
         CheckpointError: the file is damaged, or of a model of other sizes.
     """
-    try:
-        check_file(path, MAX_WEIGHTS)
-        with safe_open(path, framework="pt") as file:
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # a handle, not a dict
-    except (SafetensorError, InputFileError) as error:
-        raise CheckpointError(f"{path}: is damaged ({one_line(error)}); delete it") from None
-    if any(value.is_floating_point() and not bool(value.isfinite().all()) for value in tensors.values()):
-        raise CheckpointError(f"{path}: has a weight that is no finite number; delete it")
-    weights = {name.removeprefix(_MODEL): value for name, value in tensors.items() if name.startswith(_MODEL)}
-    try:
-        model.load_state_dict(weights)
-    except RuntimeError as error:
-        message = f"{path}: was written by a model of other sizes ({' '.join(str(error).split())[:200]}); delete it"
-        raise CheckpointError(message) from None
+    with raising(lambda message: CheckpointError(f"{message}; the file is damaged, delete it")):
+        tensors, _ = read_tensors(path)
+    misfit = "the file is damaged or was written by a model of other sizes, delete it"
+    with raising(lambda message: CheckpointError(f"{message}; {misfit}")):
+        refuse_unknown(path, (name for name in tensors if not name.startswith((_MODEL, _OPTIMISER))))
+        weights = _under(_MODEL, tensors)
+        check_tensors(path, weights, model.state_dict(), _MODEL)
+        states = _under(_OPTIMISER, tensors)
+        if optimiser is not None:
+            rows = [parameter for group in optimiser.param_groups for parameter in group["params"]]
+            check_optimiser(path, states, rows, _OPTIMISER, ".")
+    model.load_state_dict(weights)
     if optimiser is not None:
-        _restore_optimiser(optimiser, tensors, path)
+        _restore_optimiser(optimiser, states, path)
+
+
+def _under(prefix: str, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
 
 
 def _restore_optimiser(optimiser: torch.optim.Optimizer, tensors: Mapping[str, Tensor], path: Path) -> None:
     states: dict[int, dict[str, Tensor]] = {}
+    for name, value in tensors.items():
+        row, quantity = name.split(".")
+        states.setdefault(int(row), {})[quantity] = value
     try:
-        for name, value in tensors.items():
-            if name.startswith(_OPTIMISER):
-                row, field = name.removeprefix(_OPTIMISER).split(".")
-                states.setdefault(int(row), {})[field] = value
         optimiser.load_state_dict({"state": states, "param_groups": optimiser.state_dict()["param_groups"]})
     except (ValueError, KeyError, RuntimeError) as error:
         raise CheckpointError(f"{path}: its optimiser is damaged ({one_line(error)}); delete it") from None

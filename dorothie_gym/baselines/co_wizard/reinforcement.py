@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Final
 
 import torch
-from safetensors.torch import load_file
 
 from dorothie_gym.baselines.co_wizard.experience import Experience, play
 from dorothie_gym.baselines.co_wizard.files import ModelPage, load_network, save_network
@@ -28,7 +27,7 @@ from dorothie_gym.baselines.imitation.rounds import (
     practice_plans,
     processor_seconds,
 )
-from dorothie_gym.baselines.tensor_files import save_tensors
+from dorothie_gym.baselines.tensor_files import check_tensors, read_tensors, save_tensors
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import CheckpointError
@@ -146,7 +145,10 @@ def _iterate(
     torch.manual_seed(settings.seed)
     values = ValueNetwork(network.layout.state)
     if (former / _VALUES).is_file():
-        values.load_state_dict(load_file(former / _VALUES))
+        with raising(lambda message: CheckpointError(f"{message}; delete it")):
+            tensors, _ = read_tensors(former / _VALUES)
+            check_tensors(former / _VALUES, tensors, values.state_dict())
+        values.load_state_dict(tensors)
     experience = Experience.read([plan.file for plan in plans], page.vocabulary)
     seed = settings.seed * 1000 + number
     progress = improve(network, values, before, experience, settings.optimisation, seed)

@@ -12,11 +12,11 @@ from typing import Any, ClassVar, Final, Self
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from safetensors import safe_open
-from safetensors.torch import load_file
 
-from dorothie_gym.baselines.tensor_files import save_tensors
+from dorothie_gym.baselines.tensor_files import read_tensors, refuse_unknown, save_tensors, tensor_name
+from dorothie_gym.errors import CheckpointError, InputFileError
 from dorothie_gym.files import replacing
+from dorothie_gym.input_files import checked, parse_json, raising
 
 UNKNOWN: Final = -1
 """Target of what is not learnt from an example."""
@@ -63,16 +63,32 @@ class TensorBatch:
 
     @classmethod
     def read(cls, paths: Sequence[Path], vocabulary: Sequence[str]) -> Self:
-        """Returns the examples of some files, with their remarks numbered by a vocabulary; others are not learnt."""
+        """Returns the examples of some files, with their remarks numbered by a vocabulary; others are not learnt.
+
+        Raises:
+            CheckpointError: a file is damaged.
+        """
         numbers = {form: k for k, form in enumerate(vocabulary)}
         batches = []
         for path in paths:
-            tensors = load_file(path)
-            known = torch.tensor([numbers.get(form, UNKNOWN) for form in forms_of(path)] + [UNKNOWN], dtype=torch.int16)
+            tensors, forms = cls._stored(path)
+            known = torch.tensor([numbers.get(form, UNKNOWN) for form in forms] + [UNKNOWN], dtype=torch.int16)
             for name in cls.REMARKS:
                 tensors[name] = known[tensors[name].long()]  # -1, the last one, stays unknown
             batches.append(cls(**tensors))
         return cls.joined(batches)
+
+    @classmethod
+    def _stored(cls, path: Path) -> tuple[dict[str, torch.Tensor], list[str]]:
+        """Returns the tensors of a file, and the forms of its remarks."""
+        with raising(lambda message: CheckpointError(f"{message}; delete it")):
+            tensors, metadata = read_tensors(path)
+            forms = checked(parse_json(metadata.get(_FORMS, ""), path), list[str], path)
+            names = {one.name for one in fields(cls)}
+            refuse_unknown(path, (name for name in tensors if name not in names))
+            if missing := sorted(names - set(tensors)):
+                raise InputFileError(path, "is missing", tensor_name(missing[0]))
+        return tensors, forms
 
     @classmethod
     def vocabulary_of(cls, paths: Sequence[Path], least: int) -> tuple[str, ...]:
@@ -84,7 +100,7 @@ class TensorBatch:
         """
         counts: Counter[str] = Counter()
         for path in paths:
-            forms, tensors = forms_of(path), load_file(path)
+            tensors, forms = cls._stored(path)
             for name in cls.REMARKS:
                 counts.update(forms[number] for number in tensors[name].flatten().tolist() if number > 0)
         order = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
@@ -104,10 +120,3 @@ def whole(numbers: Sequence[object]) -> torch.Tensor:
 def forms_in(remarks: Iterable[str | None]) -> tuple[str, ...]:
     """Returns the different forms of some remarks, sorted, behind silence."""
     return ("", *sorted({form for form in remarks if form}))
-
-
-def forms_of(path: Path) -> list[str]:
-    """Returns the forms of the remarks in a file."""
-    with safe_open(path, framework="pt") as file:
-        found: list[str] = json.loads(file.metadata()[_FORMS])
-    return found

@@ -9,14 +9,12 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file
 from torch import nn
 
-from dorothie_gym.baselines.tensor_files import save_tensors
+from dorothie_gym.baselines.tensor_files import check_tensors, read_tensors, save_tensors
 from dorothie_gym.errors import InputFileError, ModelFileError, one_line
 from dorothie_gym.files import replacing
-from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, raising, read_json
+from dorothie_gym.input_files import MAX_MODEL_JSON, checked, raising, read_json
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 
 TENSORS: Final = "model.safetensors"
@@ -99,12 +97,11 @@ def load_model(
             check_form(form)
         except (ValueError, LookupError, TypeError, AttributeError, StopIteration, InputFileError) as error:
             raise ModelFileError(f"{card}: vocabulary[{number}] is no remark ({one_line(error)})") from None
-    try:
-        check_file(weights, MAX_WEIGHTS)
-        tensors = load_file(weights)
-        network.load_state_dict(tensors)
-    except (SafetensorError, OSError, InputFileError, RuntimeError) as error:
-        raise ModelFileError(f"{weights}: cannot be read ({one_line(error)})") from None
-    if any(not bool(value.isfinite().all()) for value in tensors.values()):
-        raise ModelFileError(f"{weights}: has a weight that is no finite number")
+    with raising(ModelFileError):
+        try:
+            tensors, _ = read_tensors(weights)
+        except OSError as error:
+            raise ModelFileError(f"{weights}: cannot be read ({error.strerror})") from None
+        check_tensors(weights, tensors, network.state_dict())
+    network.load_state_dict(tensors)
     return network.eval(), page

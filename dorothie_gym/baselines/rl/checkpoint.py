@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import math
@@ -13,8 +14,6 @@ from pathlib import Path
 from typing import Any, Final, TypeAlias, TypeVar
 
 import torch
-from safetensors import SafetensorError
-from safetensors.torch import load_file
 from stable_baselines3.common.vec_env import VecEnv
 
 from dorothie_gym.baselines.rl.environments import make_env_of_model
@@ -30,10 +29,17 @@ from dorothie_gym.baselines.rl.settings import (
     TrainingSettings,
 )
 from dorothie_gym.baselines.rl.vector_env import AnyEnv
-from dorothie_gym.baselines.tensor_files import save_tensors
-from dorothie_gym.errors import InputFileError, ModelFileError, SettingsError, one_line, short_repr
+from dorothie_gym.baselines.tensor_files import (
+    check_optimiser,
+    check_tensors,
+    read_header,
+    read_tensors,
+    refuse_unknown,
+    save_tensors,
+)
+from dorothie_gym.errors import ModelFileError, SettingsError, one_line, short_repr
 from dorothie_gym.files import replacing
-from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, checked, raising, read_json
+from dorothie_gym.input_files import MAX_MODEL_JSON, checked, raising, read_json
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 
 Model: TypeAlias = Any
@@ -184,15 +190,45 @@ def restore(model: Model, folder: Path) -> None:
     """
     page = read_description(folder)
     path = folder / TENSORS
-    try:
-        check_file(path, MAX_WEIGHTS)
-        tensors = load_file(path)
-    except (SafetensorError, OSError, InputFileError) as error:
-        raise ModelFileError(f"{path}: cannot be read ({one_line(error)})") from None
-    if any(value.is_floating_point() and not bool(value.isfinite().all()) for value in tensors.values()):
-        raise ModelFileError(f"{path}: has a weight that is no finite number")
+    with _reading(path):
+        tensors, _ = read_tensors(path)
+        check_parameters(path, model, tensors)
     with refusing_misfits(path):
         set_parameters(model, page, tensors)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Turns errors of reading a file into `ModelFileError`."""
+    with raising(ModelFileError):
+        try:
+            yield
+        except OSError as error:
+            raise ModelFileError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def check_parameters(path: Path, model: Model, tensors: Mapping[str, torch.Tensor], prefix: str = "") -> None:
+    """Checks that tensors of a file are those that `parameters_of` returns for a model.
+
+    Args:
+        path: the file.
+        model: model of the same settings.
+        tensors: tensors by name.
+        prefix: what stands before the names in the file.
+
+    Raises:
+        InputFileError: a tensor is missing, unknown, or has another shape or type; the message names it.
+    """
+    groups = {**model.get_parameters(), "variables": dict(_variables(model))}
+    refuse_unknown(path, (prefix + name for name in tensors if name.split("/", 1)[0] not in groups))
+    for group, state in groups.items():
+        own, place = tensors_under(f"{group}/", tensors), f"{prefix}{group}/"
+        if "param_groups" in state:
+            optimiser = functools.reduce(getattr, group.split("."), model)
+            rows = [parameter for each in optimiser.param_groups for parameter in each["params"]]
+            check_optimiser(path, own, rows, place, "/")
+        else:
+            check_tensors(path, own, state, place)
 
 
 @contextmanager
@@ -250,16 +286,18 @@ def read_settings(page: Page, kind: type[Settings], folder: Path) -> Settings:
 
     Raises:
         ModelFileError: a setting is missing, unknown, of another type or out of range, or asks for a network that is
-            larger than the weights in the folder.
+            larger than the weights in the folder; or these are missing or damaged.
     """
     with raising(ModelFileError):
         settings = checked(page.get("settings"), kind, folder / DESCRIPTION)
     weights = folder / TENSORS
-    wanted = 4 * sum(one * other for one, other in itertools.pairwise(settings.network))
-    if weights.is_file() and wanted > weights.stat().st_size:
+    with _reading(weights):
+        stored = sum(math.prod(each.shape) for each in read_header(weights).tensors.values())
+    wanted = sum(one * other for one, other in itertools.pairwise(settings.network))
+    if wanted > stored:
         raise ModelFileError(
-            f"{folder / DESCRIPTION}: field 'settings.network' is {list(settings.network)}, which asks for more "
-            f"weights than {TENSORS} has"
+            f"{folder / DESCRIPTION}: field 'settings.network' is {list(settings.network)}, which asks for {wanted} "
+            f"weights, and {TENSORS} has {stored}"
         )
     return settings
 

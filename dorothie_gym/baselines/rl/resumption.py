@@ -17,17 +17,22 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from safetensors import SafetensorError, safe_open
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecTransposeImage
 
-from dorothie_gym.baselines.rl.checkpoint import Model, parameters_of, refusing_misfits, set_parameters
+from dorothie_gym.baselines.rl.checkpoint import (
+    Model,
+    check_parameters,
+    parameters_of,
+    refusing_misfits,
+    set_parameters,
+)
 from dorothie_gym.baselines.rl.repeatable_batch import Episode, RepeatableVecEnv
 from dorothie_gym.baselines.rl.settings import Page
-from dorothie_gym.baselines.tensor_files import save_tensors
-from dorothie_gym.errors import InputFileError, ModelFileError, one_line, short_repr
+from dorothie_gym.baselines.tensor_files import read_tensors, save_tensors
+from dorothie_gym.errors import InputFileError, ModelFileError, short_repr
 from dorothie_gym.files import replacing
-from dorothie_gym.input_files import MIB, check_file, parse_json
+from dorothie_gym.input_files import MIB, parse_json, raising
 
 CHECKPOINT: Final = "checkpoint.safetensors"
 """File of a run with its state after the last checkpoint."""
@@ -80,14 +85,14 @@ def read_checkpoint(folder: Path) -> Checkpoint | None:
     """
     path = folder / CHECKPOINT
     try:
-        check_file(path, MAX_CHECKPOINT)
-        with safe_open(path, framework="pt") as file:
-            page = parse_json((file.metadata() or {}).get(_PAGE, ""), path)
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # a handle, not a dict
+        tensors, metadata = read_tensors(path, MAX_CHECKPOINT)
+        page = parse_json(metadata.get(_PAGE, ""), path)
     except FileNotFoundError:
         return None
-    except (SafetensorError, OSError, InputFileError) as error:
-        raise ModelFileError(f"{path}: cannot be read ({one_line(error)}); start the run in another folder") from None
+    except OSError as error:
+        raise ModelFileError(f"{path}: cannot be read ({error.strerror}); start the run in another folder") from None
+    except InputFileError as error:
+        raise ModelFileError(f"{error}; start the run in another folder") from None
     if not isinstance(page, dict) or page.get("format") != CHECKPOINT_FORMAT:
         raise ModelFileError(
             f"{path}: format is not {CHECKPOINT_FORMAT}; the run is of another version of dorothie_gym, start another"
@@ -102,6 +107,15 @@ _COUNTERS: Final = ("_episode_num", "_n_calls", "exploration_rate", "_current_pr
 
 _BUFFER: Final = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 """Arrays of a replay buffer (rows, environments, ...)."""
+
+
+_ARRAYS: Final = frozenset(
+    [
+        "torch", "numpy", "observations", "starts", "returns", "lengths", "past_returns", "past_lengths",
+        "past_successes", "logged", "actions", "buffer",
+    ]
+)  # fmt: skip
+"""Tensors beside those that `parameters_of` returns, or what stands before the slash in their names."""
 
 
 def state_of(model: Model) -> tuple[Page, Tensors]:
@@ -146,6 +160,9 @@ def restore_state(model: Model, checkpoint: Checkpoint) -> None:
     Raises:
         ModelFileError: the checkpoint does not fit the model, or an environment does not repeat its episode exactly.
     """
+    with raising(ModelFileError):
+        own = {name: value for name, value in checkpoint.tensors.items() if name.split("/", 1)[0] not in _ARRAYS}
+        check_parameters(checkpoint.path, model, own)
     with refusing_misfits(checkpoint.path):
         _restore(model, checkpoint.page, checkpoint.tensors)
         episodes = [

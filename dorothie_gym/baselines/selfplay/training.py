@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.baselines.learning_curves import draw_selfplay_curve
 from dorothie_gym.baselines.rl.checkpoint import (
+    check_parameters,
     parameters_of,
     refusing_misfits,
     save_model,
@@ -35,7 +36,9 @@ from dorothie_gym.baselines.selfplay.demonstrations import read_demonstrations
 from dorothie_gym.baselines.selfplay.learner import sample_actions
 from dorothie_gym.baselines.selfplay.multi_agent_rollout import AD_WIZARD, MultiAgentRollout
 from dorothie_gym.baselines.selfplay.vec_env import SelfPlayEnvFactory
-from dorothie_gym.input_files import checked
+from dorothie_gym.baselines.tensor_files import refuse_unknown
+from dorothie_gym.errors import ModelFileError
+from dorothie_gym.input_files import checked, raising
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.recording import Fold
@@ -248,6 +251,12 @@ class SelfPlayTraining(Run[SelfPlayEvaluation]):
     def _resume(self, checkpoint: Checkpoint) -> None:
         """Restores the state of the last checkpoint."""
         page, tensors = checkpoint.page, checkpoint.tensors
+        with raising(ModelFileError):
+            known = {"past", *(learner.name for learner in self.rollout.learners)}
+            refuse_unknown(checkpoint.path, (name for name in tensors if name.split("/", 1)[0] not in known))
+            for learner in self.rollout.learners:
+                own = tensors_under(f"{learner.name}/", tensors)
+                check_parameters(checkpoint.path, learner.model, own, f"{learner.name}/")
         with refusing_misfits(checkpoint.path):
             for learner in self.rollout.learners:
                 own = tensors_under(f"{learner.name}/", tensors)
