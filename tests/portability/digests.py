@@ -26,7 +26,7 @@ from dorothie_gym.policies.pretrained import pretrained_card, pretrained_names
 from dorothie_gym.recording import Corpus
 from dorothie_gym.recording.file_names import AUDIO_FOLDER
 from dorothie_gym.rollout import play_session
-from dorothie_gym.rollout.role_export import role_episodes
+from dorothie_gym.rollout.role_episodes import role_episodes
 from tests.console.people import Table
 from tests.maps.opendrive_text import MAPS
 from tests.portability.curved_map import curved_map
