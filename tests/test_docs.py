@@ -291,10 +291,9 @@ def test_the_diagram_of_the_architecture_has_the_order_of_the_import_contract() 
     layers = next(each["layers"] for each in contract["contracts"] if each["type"] == "layers")
     diagram = (DOCS / "architecture.md").read_text(encoding="utf-8").split("```")[1].splitlines()
     lines = []
-    for layer in layers:
+    packages = layers[: layers.index("dorothie_gym.portable_arrays")]  # those below serve every package: see the text
+    for layer in packages:
         names = [name.strip().removeprefix("dorothie_gym.") for name in layer.split("|")]
-        if not all((DOCS.parent / "dorothie_gym" / name).is_dir() for name in names):
-            continue  # modules of the lowest lines, which the text lists
         found = {
             next((k for k, line in enumerate(diagram) if re.search(rf"(^|\s){name}\s\s", line)), None) for name in names
         }

@@ -145,6 +145,7 @@ def test_an_invitation_is_valid_again_for_people_who_have_agreed_to_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("dorothie_gym.studies.records.ABANDONED_SECONDS", 0.2)
+    monkeypatch.setattr("dorothie_gym.studies.server.CLEANING_PERIOD", 1e9)  # the first server deletes nobody
     data = tmp_path / "data"
     content = {**SOLO, "recruitment": {"admission": "invited"}}
     with ServedStudy(write_study(tmp_path, content), data) as served:
