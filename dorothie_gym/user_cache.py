@@ -245,8 +245,8 @@ def _key(cache: Path) -> bytes:
     path = cache / KEY_FILE
     if not is_private(path):
         raise OSError(f"{path}: is no key of this user; remove it")
-    if path.is_file():
-        key = path.read_bytes()
+    with contextlib.suppress(PermissionError):
+        key = path.read_bytes() if path.is_file() else b""
         if len(key) == _KEY_LENGTH:
             return key
     if path.exists() or path.is_symlink():

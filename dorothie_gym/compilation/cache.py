@@ -147,7 +147,7 @@ class ContentCache(FunctionCache):  # type: ignore[misc]  # numba has no type in
             super().save_overload(sig, data)
             self._delete_others()
         except OSError as error:
-            _warn_once(f"{self._folder} cannot be written ({error.strerror})")
+            _warn_once(f"{self._folder} cannot be written ({error.strerror or error})")
 
     def _is_open(self) -> bool:
         folder = compiled_folder()
