@@ -68,7 +68,7 @@ def environment(cache: Path) -> dict[str, str]:
 
 def run(cache: Path, command: Sequence[str]) -> tuple[str, str]:
     """Runs a command with a cache folder; returns its output and what it says about damage."""
-    ran = subprocess.run(command, env=environment(cache), capture_output=True, text=True, check=False, timeout=400)
+    ran = subprocess.run(command, env=environment(cache), capture_output=True, text=True, check=False, timeout=900)
     assert ran.returncode == 0, ran.stderr[-2000:]
     lines = ran.stderr.splitlines()
     assert all("is damaged (" in line for line in lines), ran.stderr[-2000:]
@@ -135,7 +135,7 @@ def work() -> Iterator[Path]:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1200)
 @pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
 @pytest.mark.parametrize("seed", range(200))
 def test_no_damage_ends_a_command(warm_cache: Path, work: Path, seed: int) -> None:
@@ -149,7 +149,7 @@ def test_no_damage_ends_a_command(warm_cache: Path, work: Path, seed: int) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(900)
+@pytest.mark.timeout(1200)
 @pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
 @pytest.mark.parametrize("seed", range(40))
 def test_no_damage_changes_what_is_kept(filled_cache: Path, work: Path, seed: int) -> None:
