@@ -17,6 +17,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from websockets.exceptions import ConnectionClosed
+
 from dorothie_gym.studies.export import export_study
 from dorothie_gym.studies.stages import Stage
 from tests.studies.content import SOLO, write_study
@@ -32,7 +34,7 @@ CONTENT = {
     "questionnaires": {"before": [{"id": "word", "kind": "text", "text": "A word?"}]},
 }
 
-LOST = OSError, http.client.HTTPException, EOFError, AssertionError
+LOST = OSError, http.client.HTTPException, EOFError, ConnectionClosed, AssertionError
 """Errors of people whose server has died; a refusal is an `AssertionError`, and is looked at by `check`."""
 
 STEPS = Stage.CONSENT, Stage.BEFORE, Stage.INSTRUCTIONS, Stage.LOBBY, Stage.SESSION
