@@ -39,7 +39,8 @@ from dorothie_gym.policies.pretrained import is_pretrained
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
-from dorothie_gym.spaces import Motion, ObservationMapping, Physical, SpaceLimits
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces import ObservationMapping, Physical, SpaceLimits
 
 SHOWN: Final = ("success", "driving_score", "goal_condition_success", "exchanges_per_subgoal", "seconds")
 """Metrics of the printed table."""

@@ -26,8 +26,9 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, describe, load_town, town_names
 from dorothie_gym.ontology import Question, WeatherParameter, paths
 from dorothie_gym.policies import policy_loader
-from dorothie_gym.recording import FRAME_RATE, Task
+from dorothie_gym.recording import Task
 from dorothie_gym.rollout.closed_loop import METRICS, RecoverySeconds
+from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.speech import CabinState, signal_to_noise
 from dorothie_gym.studies.export import COLUMNS

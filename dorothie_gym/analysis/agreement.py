@@ -8,7 +8,7 @@ from dorothie_gym.analysis.diversity import plain, words_of
 from dorothie_gym.analysis.span_agreement import Agreement, LabelledSpan, LabelledUtterance, agreement_of
 from dorothie_gym.analysis.units import Units, is_initiating
 from dorothie_gym.errors import SessionError
-from dorothie_gym.ontology import DialogueMove
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.recording.events import MoveRecord, UtteranceRecord
 from dorothie_gym.recording.session import Session
 

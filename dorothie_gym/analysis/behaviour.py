@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from dorothie_gym.analysis.exception_attribution import Handled, handling
 from dorothie_gym.analysis.intervals import RESAMPLES, bootstrap_weights, percentile_interval
 from dorothie_gym.analysis.units import Units
-from dorothie_gym.ontology import DialogueMove, MoveGroup, Role, Slot
+from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import Slot
 from dorothie_gym.recording.session import Session
 
 MAX_UNDEFINED_SHARE: Final = 0.5

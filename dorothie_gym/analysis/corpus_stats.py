@@ -12,10 +12,12 @@ from typing import Any, Final, NotRequired, TypedDict
 
 from dorothie_gym.analysis.agreement import inconsistencies
 from dorothie_gym.analysis.diversity import has_language_models, plain, repetition, trigram_perplexity, words_of
-from dorothie_gym.analysis.phenomena import PHENOMENA, DialogueView, Phenomenon
+from dorothie_gym.analysis.phenomena.catalogue import PHENOMENA
+from dorothie_gym.analysis.phenomena.dialogue_view import DialogueView, Phenomenon
 from dorothie_gym.analysis.profiles import Profiles, counted
 from dorothie_gym.analysis.units import Units
-from dorothie_gym.ontology import NAVIGATION_ACTIONS, PhysicalAction, Role
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, PhysicalAction
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.recording.corpus import Corpus, Fold
 from dorothie_gym.recording.events import ActionRecord
 from dorothie_gym.recording.session import Session

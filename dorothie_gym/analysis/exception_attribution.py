@@ -35,19 +35,12 @@ import numpy as np
 
 from dorothie_gym.analysis.exception_mentions import mentions
 from dorothie_gym.analysis.units import SaidUnit, Units
-from dorothie_gym.dialogue import Predicate, Proposition
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
-from dorothie_gym.ontology import (
-    ActionValue,
-    ExceptionKind,
-    GoalStatus,
-    LandmarkName,
-    MoveGroup,
-    ObjectClass,
-    Role,
-    Slot,
-    SlotValue,
-)
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.ontology.dialogue_acts import MoveGroup
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, SlotValue
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE

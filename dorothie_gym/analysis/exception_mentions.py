@@ -16,9 +16,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.dialogue import Predicate, Proposition
-from dorothie_gym.ontology import ActionValue, ExceptionKind, ObjectClass, Sensor
-from dorothie_gym.ontology import WeatherParameter as W
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.ontology.slots import ActionValue, ObjectClass
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, Sensor
+from dorothie_gym.ontology.world_exceptions import WeatherParameter as W
 from dorothie_gym.recording.events import Event
 
 _FOG: Final = frozenset({W.FOG_DENSITY, W.FOG_DISTANCE, W.FOG_FALLOFF})

@@ -6,10 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym.dialogue import guess_spans
-from dorothie_gym.ontology import DialogueMove, SlotValue
-from dorothie_gym.recording import Session, UtteranceRecord
-from dorothie_gym.speech import readable, spoken_words
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import SlotValue
+from dorothie_gym.recording.events import UtteranceRecord
+from dorothie_gym.recording.session import Session
+from dorothie_gym.speech.spoken_form import spoken_words
+from dorothie_gym.speech.spoken_understanding import readable
 
 REPAIRED_WITHIN: Final = 30.0
 """Time after an utterance within which its meaning is repaired [s]; the car drives some 250 m meanwhile."""

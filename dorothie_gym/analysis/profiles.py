@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.analysis.exception_attribution import Handled, handling
 from dorothie_gym.analysis.units import SPEAKERS, SaidUnit, Units
-from dorothie_gym.ontology import DialogueMove, MoveGroup, Role, Slot
+from dorothie_gym.ontology.dialogue_acts import DialogueMove, MoveGroup
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import Slot
 from dorothie_gym.rendering.charts import GRID, INK, SHEET, SOFT, empty_figure
 
 if TYPE_CHECKING:

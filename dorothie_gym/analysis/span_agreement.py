@@ -17,7 +17,8 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.ontology import DialogueAct, Slot
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
+from dorothie_gym.ontology.slots import Slot
 
 _SLOTS: Final = (Slot.ACTION, Slot.STREET, Slot.STATUS, Slot.LANDMARK, Slot.OBJECT)
 

@@ -12,9 +12,11 @@ import numpy as np
 
 from dorothie_gym.analysis.lost_meaning import lost_meanings
 from dorothie_gym.analysis.word_errors import WordErrorCounts
-from dorothie_gym.ontology import Role
-from dorothie_gym.recording import Corpus, Session, UtteranceRecord
-from dorothie_gym.speech import spoken_words
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.recording.events import UtteranceRecord
+from dorothie_gym.recording.session import Session
+from dorothie_gym.speech.spoken_form import spoken_words
 
 QUANTILES: Final = (0.1, 0.25, 0.5, 0.75, 0.9)
 """Quantiles of the distributions."""

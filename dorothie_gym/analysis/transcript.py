@@ -8,8 +8,12 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
 
-from dorothie_gym.analysis import PHENOMENA, DialogueView, Handled, Units, handling
-from dorothie_gym.ontology import MentalAction, Role
+from dorothie_gym.analysis.exception_attribution import Handled, handling
+from dorothie_gym.analysis.phenomena.catalogue import PHENOMENA
+from dorothie_gym.analysis.phenomena.dialogue_view import DialogueView
+from dorothie_gym.analysis.units import Units
+from dorothie_gym.ontology.actions import MentalAction
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.recording.events import INFRACTIONS, Event, EventType, UtteranceRecord, action_record
 from dorothie_gym.recording.session import Session
 

@@ -7,21 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dorothie_gym.analysis import (
-    Agreement,
-    Alpha,
+from dorothie_gym.analysis.segmentation_agreement import (
     SegmentationAgreement,
-    agreement_of,
-    alpha_of,
     segmentation_agreement,
     segmentation_alpha,
 )
+from dorothie_gym.analysis.span_agreement import Agreement, Alpha, agreement_of, alpha_of
 from dorothie_gym.annotation.log import ADJUDICATED, RECORDED, annotators_of, log_path, read_annotation
 from dorothie_gym.annotation.marks import Annotation
 from dorothie_gym.annotation.session_labels import recorded_annotation
 from dorothie_gym.annotation.source_text import SourceText
 from dorothie_gym.errors import AnnotationError
-from dorothie_gym.recording import CorpusEntry
+from dorothie_gym.recording.corpus import CorpusEntry
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,13 +14,15 @@ from typing import Final, NoReturn, TypeVar
 
 from lxml import etree
 
-from dorothie_gym.analysis import Handled
+from dorothie_gym.analysis.exception_attribution import Handled
 from dorothie_gym.annotation.elan_writer import LAYERS, SPANS, SUGGESTED, Element
 from dorothie_gym.annotation.marks import Annotation, Change, ExchangeMark, SpanMark, TransactionMark, check_change
 from dorothie_gym.annotation.rows import read_label
 from dorothie_gym.annotation.source_text import SPEAKERS, SourceLine, SourceText, UtteranceId
 from dorothie_gym.errors import AnnotationError, OntologyError, one_line
-from dorothie_gym.ontology import Role, UnitEnd, parse_landmark
+from dorothie_gym.ontology.dialogue_acts import UnitEnd
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.spellings import parse_landmark
 from dorothie_gym.recording.json_io import read_bytes
 
 MAX_ELEMENTS: Final = 500_000

@@ -17,7 +17,8 @@ from dorothie_gym.annotation.marks import Annotation, ExchangeMark, SpanMark, Tr
 from dorothie_gym.annotation.source_text import SPEAKERS, SourceLine, SourceText
 from dorothie_gym.errors import AnnotationError
 from dorothie_gym.files import write_atomically
-from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
 
 Element: TypeAlias = etree._Element
 """XML element; the stubs of lxml name the class with an underscore."""

@@ -12,9 +12,9 @@ from dorothie_gym.annotation.marks import Annotation
 from dorothie_gym.annotation.session_labels import recorded_annotation, relabelled
 from dorothie_gym.annotation.source_text import SourceText
 from dorothie_gym.errors import AnnotationError
-from dorothie_gym.recording import Session, read_session
-from dorothie_gym.recording.corpus import layout_of
-from dorothie_gym.recording.sdn import write_sdn
+from dorothie_gym.recording.corpus import layout_of, read_session
+from dorothie_gym.recording.sdn.writer import write_sdn
+from dorothie_gym.recording.session import Session
 
 
 class Format(enum.StrEnum):

@@ -7,10 +7,13 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from dorothie_gym.analysis import Handled, LabelledSpan, SegmentedSession, UnitSpan
+from dorothie_gym.analysis.exception_attribution import Handled
+from dorothie_gym.analysis.segmentation_agreement import SegmentedSession, UnitSpan
+from dorothie_gym.analysis.span_agreement import LabelledSpan
 from dorothie_gym.annotation.source_text import SourceLine, SourceText, UtteranceId
 from dorothie_gym.errors import AnnotationError
-from dorothie_gym.ontology import DialogueAct, DialogueMove, DialogueUnit, LandmarkName, SlotValue, UnitEnd
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove, DialogueUnit, UnitEnd
+from dorothie_gym.ontology.slots import LandmarkName, SlotValue
 
 MAX_UNIT: Final = 10_000_000
 """Bound of the numbers of exchanges and transactions."""

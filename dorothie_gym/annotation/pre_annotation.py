@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dorothie_gym.analysis import Units
+from dorothie_gym.analysis.units import Units
 from dorothie_gym.annotation.marks import Annotation, Change, SpanMark
 from dorothie_gym.annotation.session_labels import with_labels
 from dorothie_gym.annotation.source_text import SourceLine, SourceText, UtteranceId
-from dorothie_gym.dialogue import guess_act, guess_spans
-from dorothie_gym.ontology import DialogueMove, Role
-from dorothie_gym.recording import Session
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_act, guess_spans
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.recording.header import NATIVE
+from dorothie_gym.recording.session import Session
 
 
 def pre_annotation(session: Session, text: SourceText) -> Annotation:

@@ -8,19 +8,13 @@ from typing import Annotated, Final, TypeAlias
 import msgspec
 from msgspec import Meta, Struct
 
-from dorothie_gym.analysis import Handled
+from dorothie_gym.analysis.exception_attribution import Handled
 from dorothie_gym.annotation.marks import MAX_UNIT, Change, ExchangeMark, SpanMark, TransactionMark
 from dorothie_gym.annotation.source_text import SPEAKERS, UtteranceId
 from dorothie_gym.errors import AnnotationError, OntologyError
-from dorothie_gym.ontology import (
-    DialogueAct,
-    DialogueMove,
-    LandmarkName,
-    UnitEnd,
-    parse_act,
-    parse_landmark,
-    parse_move,
-)
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove, UnitEnd
+from dorothie_gym.ontology.slots import LandmarkName
+from dorothie_gym.ontology.spellings import parse_act, parse_landmark, parse_move
 
 MAX_SPANS: Final = 400
 """Most spans of an utterance: one for each word of the longest one."""

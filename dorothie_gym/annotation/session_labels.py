@@ -7,14 +7,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
-from dorothie_gym.analysis import Handled
+from dorothie_gym.analysis.exception_attribution import Handled
 from dorothie_gym.annotation.marks import Annotation, Change, ExchangeMark, SpanMark, TransactionMark, check_change
 from dorothie_gym.annotation.source_text import SourceLine, SourceText, UtteranceId
 from dorothie_gym.errors import AnnotationError, OntologyError, SessionError, short_repr
-from dorothie_gym.ontology import DialogueAct, UnitEnd, parse_landmark
-from dorothie_gym.recording import Event, Session, UtteranceRecord
-from dorothie_gym.recording.events import EXCHANGE_UNIT, TRANSACTION_UNIT
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, UnitEnd
+from dorothie_gym.ontology.spellings import parse_landmark
+from dorothie_gym.recording.events import EXCHANGE_UNIT, TRANSACTION_UNIT, Event, UtteranceRecord
 from dorothie_gym.recording.header import ANNOTATION_FIELD
+from dorothie_gym.recording.session import Session
 
 _OF_A_SPAN: Final = ("audio", "meaning", "fluent", "sdn_act")
 """Optional fields of a dialogue move that belong to its span; another span does not inherit them."""

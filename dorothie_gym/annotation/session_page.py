@@ -14,11 +14,14 @@ from dorothie_gym.analysis.transcript import description_of
 from dorothie_gym.annotation.source_text import SourceLine, SourceText
 from dorothie_gym.errors import SessionError
 from dorothie_gym.input_files import read_file
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.recording import FRAME_RATE, ActorKind, EventType, Session
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.recording.events import EventType
 from dorothie_gym.recording.sdn.audio import AUDIO_FOLDERS
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.surroundings import ActorKind
+from dorothie_gym.sim.config import FRAME_RATE
 
 if TYPE_CHECKING:
     from dorothie_gym.camera.recorded_pictures import RecordedPictures

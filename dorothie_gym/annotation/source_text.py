@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import NamedTuple, Self
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.ontology import Role
-from dorothie_gym.recording import Session
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.recording.session import Session
 
 SPEAKERS = (Role.PARTICIPANT, Role.CO_WIZARD)
 """Speakers whose utterances are annotated."""

@@ -7,18 +7,17 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
-from dorothie_gym.analysis import Handled
-from dorothie_gym.ontology import (
+from dorothie_gym.analysis.exception_attribution import Handled
+from dorothie_gym.ontology.dialogue_acts import (
     DECISION_TREE,
-    SLOT_VALUES,
     VECTOR_SLOTS,
     DialogueMove,
     DialogueUnit,
-    LandmarkName,
     Node,
     Question,
     path_to,
 )
+from dorothie_gym.ontology.slots import SLOT_VALUES, LandmarkName
 
 MOVE_KEYS: Mapping[DialogueMove, str] = MappingProxyType(
     {

@@ -30,7 +30,7 @@ from dorothie_gym.annotation.rows import change_of, rows_of, to_json
 from dorothie_gym.annotation.session_page import SessionPage
 from dorothie_gym.annotation.source_text import SourceText, UtteranceId
 from dorothie_gym.errors import AnnotationError
-from dorothie_gym.recording import CorpusEntry
+from dorothie_gym.recording.corpus import CorpusEntry
 
 MOST_OPEN: Final = 4
 """Most sessions that are kept in memory."""

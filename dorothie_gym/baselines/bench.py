@@ -14,12 +14,18 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from dorothie_gym.baselines.model_io import TASKS, Examples, Labels, backpropagate
 from dorothie_gym.baselines.reference_impl import Features, PublishedTOTO, Senses, rebuild, train_step
-from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
+from dorothie_gym.baselines.toto.config import TOTOConfig
+from dorothie_gym.baselines.toto.model import TOTO
+from dorothie_gym.baselines.toto.texts import FrozenTexts
+from dorothie_gym.baselines.toto.towns import Towns
 from dorothie_gym.bench.timing import Progress, alternate, cpu_seconds, ignore_progress, machine, rounded
-from dorothie_gym.benchmark.features import Columns, build, points
+from dorothie_gym.benchmark.features.columns import Columns
+from dorothie_gym.benchmark.features.corpus_columns import build
+from dorothie_gym.benchmark.features.point_table import points
 from dorothie_gym.processors import available_processors
-from dorothie_gym.recording import Corpus, Session
+from dorothie_gym.recording.corpus import Corpus
 from dorothie_gym.recording.points import Point, task_points
+from dorothie_gym.recording.session import Session
 
 _POINTS: Final = 512
 """Points of the corpus that are looked at."""

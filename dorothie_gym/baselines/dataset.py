@@ -12,13 +12,19 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, text_encoder, text_table
+from dorothie_gym.baselines.encoders import text_encoder
+from dorothie_gym.baselines.encoders.byte_pairs import BytePairs
+from dorothie_gym.baselines.encoders.encoder import TextEncoder, text_table
 from dorothie_gym.baselines.model_io import TASKS, Examples
 from dorothie_gym.baselines.sound_inputs import Sound, SoundInputs
-from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, Sight, VisibleBoxes, build, points
+from dorothie_gym.benchmark.features.batch import BatchSpec
+from dorothie_gym.benchmark.features.columns import Columns
+from dorothie_gym.benchmark.features.corpus_columns import build
+from dorothie_gym.benchmark.features.point_table import PointTable, points
+from dorothie_gym.benchmark.features.sight import Sight, VisibleBoxes
 from dorothie_gym.errors import CheckpointError, SessionError
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording import Corpus, Fold
+from dorothie_gym.recording.corpus import Corpus, Fold
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 from dorothie_gym.user_cache import cache_folder
 

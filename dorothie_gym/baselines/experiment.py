@@ -19,28 +19,29 @@ from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION, Dataset
 from dorothie_gym.baselines.learning_curves import draw_loss_curves
 from dorothie_gym.baselines.model_io import TASKS, Predicted
 from dorothie_gym.baselines.model_zoo import ROWS, SIZES, ModelEntry, find_row, make_model, needs_pieces
-from dorothie_gym.baselines.toto import TOTO, FrozenTexts
+from dorothie_gym.baselines.toto.model import TOTO
+from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.trainer import BEST_FILE, Epoch, OnEpoch, TrainingSummary, predict, train
-from dorothie_gym.benchmark import (
-    FLOORS,
+from dorothie_gym.benchmark.features.columns import Columns
+from dorothie_gym.benchmark.features.point_table import PointTable
+from dorothie_gym.benchmark.labels import labels_of
+from dorothie_gym.benchmark.prediction_reader import read_predictions
+from dorothie_gym.benchmark.predictions import (
     ActionPredictions,
     ActPredictions,
-    ResultsTable,
+    Predictions,
     TaskPredictions,
-    evaluate_predictions,
-    labels_of,
-    predict_floor,
-    read_predictions,
-    score_task,
     write_predictions,
 )
-from dorothie_gym.benchmark.features import Columns, PointTable
-from dorothie_gym.benchmark.predictions import Predictions
+from dorothie_gym.benchmark.scoring import score_task
 from dorothie_gym.benchmark.shallow_models import SHALLOW
+from dorothie_gym.benchmark.table import ResultsTable, evaluate_predictions
+from dorothie_gym.benchmark.trivial_baselines import FLOORS, predict_floor
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.files import write_atomically
 from dorothie_gym.input_files import MAX_MODEL_JSON, checked, raising, read_json
-from dorothie_gym.recording import Corpus, Task
+from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.recording.visibility import Task
 from dorothie_gym.rollout.processes import run_tasks
 
 PREDICTIONS_FILE: Final = "predictions.parquet"

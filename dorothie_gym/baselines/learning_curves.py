@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.baselines.trainer import Epoch
 from dorothie_gym.files import replacing
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.rendering.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
 from dorothie_gym.rendering.palette import CAR, INK_SOFT, NOTE, PROP, ROAD
 

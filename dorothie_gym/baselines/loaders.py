@@ -8,15 +8,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dorothie_gym.ontology import Role
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.spaces.limits import SpaceLimits
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.acting.policy import BenchmarkCoWizard
     from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
     from dorothie_gym.baselines.participant.policy import LearnedParticipant
     from dorothie_gym.baselines.selfplay.policy import LearnedPolicy
-    from dorothie_gym.policies.navigation import NavigationPolicy
+    from dorothie_gym.policies.navigation.navigation_policy import NavigationPolicy
 
 
 def load_benchmark_model(path: Path, role: Role, limits: SpaceLimits) -> BenchmarkCoWizard:

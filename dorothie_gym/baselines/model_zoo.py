@@ -13,20 +13,12 @@ from torch import Tensor
 from dorothie_gym.baselines.dataset import Dataset, Objects
 from dorothie_gym.baselines.encoders.pretrained import find_transformers, has_minilm, load_pretrained, minilm_folder
 from dorothie_gym.baselines.encoders.sound import FRAMES
-from dorothie_gym.baselines.junction_reader import JunctionReader, reader_config
+from dorothie_gym.baselines.junction_reader.model import JunctionReader, reader_config
 from dorothie_gym.baselines.sound_inputs import Sound
-from dorothie_gym.baselines.toto import (
-    ABLATIONS,
-    TOTO,
-    Channel,
-    FrozenTexts,
-    PretrainedBert,
-    SmallTextEncoder,
-    Texts,
-    TOTOConfig,
-    Towns,
-    TrainedTexts,
-)
+from dorothie_gym.baselines.toto.config import ABLATIONS, Channel, TOTOConfig
+from dorothie_gym.baselines.toto.model import TOTO
+from dorothie_gym.baselines.toto.texts import FrozenTexts, PretrainedBert, SmallTextEncoder, Texts, TrainedTexts
+from dorothie_gym.baselines.toto.towns import Towns
 from dorothie_gym.benchmark.paper_comparison import paper_name
 from dorothie_gym.errors import did_you_mean
 

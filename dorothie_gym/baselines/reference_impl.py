@@ -18,12 +18,14 @@ from torch.nn import functional as F
 
 from dorothie_gym.baselines.model_io import backpropagate
 from dorothie_gym.baselines.toto.layers import GraphAttention
-from dorothie_gym.benchmark.features import TownGraph
+from dorothie_gym.benchmark.features.columns import TownGraph
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES
-from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction, Role
-from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
-from dorothie_gym.recording import Session, Task
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import LABELS, SLOT_SPANS, VECTOR_SLOTS, DialogueMove
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.recording.points import DecisionPoint, InferencePoint, Point, PointView, history_angle
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.visibility import Task
 
 TOKEN_WIDTH: Final = 770
 LANES, ROADS, JUNCTIONS = 486, 259, 34

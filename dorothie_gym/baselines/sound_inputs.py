@@ -14,11 +14,14 @@ from torch import Tensor
 from dorothie_gym.baselines.encoders.encoder import SpeechEncoder
 from dorothie_gym.baselines.encoders.pretrained import HubertEncoder
 from dorothie_gym.baselines.encoders.sound import BANDS, FRAMES, SpeechEmbeddingEncoder, mel_table
-from dorothie_gym.benchmark.features import Columns, PointTable
+from dorothie_gym.benchmark.features.columns import Columns
+from dorothie_gym.benchmark.features.point_table import PointTable
 from dorothie_gym.errors import EncoderError, SessionError
-from dorothie_gym.recording import Corpus, Session, Task
+from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.sound import audio_files
-from dorothie_gym.speech import read_audio
+from dorothie_gym.recording.visibility import Task
+from dorothie_gym.speech.audio import read_audio
 
 Sound: TypeAlias = Literal["log-mel", "speech-embedding", "hubert"]
 """Encoder of sound: log-mel spectra for a convolution that is trained with the model, or frozen vectors."""

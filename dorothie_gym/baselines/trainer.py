@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted, backpropagate
-from dorothie_gym.benchmark.features import BatchSpec
+from dorothie_gym.benchmark.features.batch import BatchSpec
 from dorothie_gym.errors import CheckpointError
 
 BEST_FILE: Final = "best.safetensors"

@@ -24,10 +24,11 @@ from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.maps import Town, load_town
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import make_policy
-from dorothie_gym.rollout import play_session
+from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.policy_loader import make_policy
+from dorothie_gym.rollout.play import play_session
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.weather import Weather

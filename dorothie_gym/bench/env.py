@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Final
 from dorothie_gym.bench.timing import Figures, Progress, Worker, alternate, ignore_progress, machine, rounded
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
-from dorothie_gym.spaces import noop
+from dorothie_gym.spaces.actions import noop
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.highway_reference import StockIntersection

@@ -11,25 +11,22 @@ import numpy as np
 from rapidfuzz.distance import Levenshtein
 
 from dorothie_gym.bench.timing import Figures, Progress, ignore_progress, machine, rounded
-from dorothie_gym.dialogue import Span, Utterance, guess_act
+from dorothie_gym.dialogue.conversation import Span, Utterance
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.maps import load_town
-from dorothie_gym.ontology import Slot, SlotValue
-from dorothie_gym.policies import ALL_SCRIPTED
+from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.ontology.slots import Slot, SlotValue
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED
 from dorothie_gym.rollout.corpus_generation import plan_corpus
 from dorothie_gym.rollout.play import play_session
-from dorothie_gym.speech import (
-    SAMPLE_RATE,
-    Recognition,
-    Samples,
-    find_recognizer,
-    find_synthesizer,
-    pink_noise,
-    say,
-    spoken_words,
-    understand_speech,
-)
+from dorothie_gym.speech.audio import SAMPLE_RATE, Samples
+from dorothie_gym.speech.backends import find_recognizer, find_synthesizer
+from dorothie_gym.speech.cabin_noise import pink_noise
+from dorothie_gym.speech.recognizer import Recognition
+from dorothie_gym.speech.spoken_form import spoken_words
+from dorothie_gym.speech.spoken_understanding import understand_speech
+from dorothie_gym.speech.synthesizer import say
 
 SEED: Final = 31000
 """Seed of the sessions; those of the language model have 21001 (`benchmarks/speech_transcripts.py`)."""

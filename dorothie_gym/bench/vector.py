@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.bench.timing import Figures, Progress, ignore_progress, machine, wall_seconds
 from dorothie_gym.bench.world import SUBSTEPS
-from dorothie_gym.maps import load_town
+from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.sim.batch.worlds import VectorWorld
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.bench.timing import Figures, Progress, alternate, cpu_seconds, ignore_progress, machine, rounded
-from dorothie_gym.maps import load_town
-from dorothie_gym.ontology import PropKind
+from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.batch.worlds import alone, step_batch_of_one
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork

@@ -14,7 +14,8 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.analysis import Handled, Units, handling_of_events
+from dorothie_gym.analysis.exception_attribution import Handled, handling_of_events
+from dorothie_gym.analysis.units import Units
 from dorothie_gym.benchmark.predictions import (
     ActionPredictions,
     ActPredictions,
@@ -24,18 +25,10 @@ from dorothie_gym.benchmark.predictions import (
     joined_acts,
 )
 from dorothie_gym.errors import SessionError
-from dorothie_gym.recording import (
-    Corpus,
-    CorpusEntry,
-    Fold,
-    Session,
-    Task,
-    nfd_points,
-    rfn_points,
-    ufn_points,
-    unpointed_events,
-)
-from dorothie_gym.recording.points import at_tenths
+from dorothie_gym.recording.corpus import Corpus, CorpusEntry, Fold
+from dorothie_gym.recording.points import at_tenths, nfd_points, rfn_points, ufn_points, unpointed_events
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.visibility import Task
 
 Split: TypeAlias = Literal["train", "val", "test", "all"]
 SPLITS: Final[tuple[Split, ...]] = ("train", "val", "test", "all")

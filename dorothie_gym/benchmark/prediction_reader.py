@@ -23,8 +23,9 @@ from dorothie_gym.benchmark.predictions import (
 )
 from dorothie_gym.errors import PredictionError, one_line, short_repr
 from dorothie_gym.input_files import MIB, ParquetLimits, parse_json, raising, read_parquet
-from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
-from dorothie_gym.recording import Task
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
+from dorothie_gym.recording.visibility import Task
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 
 from dorothie_gym.errors import PredictionError
 from dorothie_gym.files import replacing
-from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove, SlotValue
-from dorothie_gym.recording import DecisionPoint, InferencePoint, Task
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
+from dorothie_gym.ontology.slots import SlotValue
+from dorothie_gym.recording.points import DecisionPoint, InferencePoint
+from dorothie_gym.recording.visibility import Task
 
 if TYPE_CHECKING:
     import pyarrow as pa

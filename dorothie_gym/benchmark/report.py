@@ -35,7 +35,7 @@ from dorothie_gym.benchmark.paper_comparison import (
 from dorothie_gym.benchmark.scoring import class_labels
 from dorothie_gym.benchmark.table import ResultsTable
 from dorothie_gym.files import replacing, write_atomically
-from dorothie_gym.recording import Task
+from dorothie_gym.recording.visibility import Task
 from dorothie_gym.rendering.charts import INK, SHEET, SOFT, dress_percent_axes, empty_figure
 
 if TYPE_CHECKING:

@@ -9,14 +9,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.analysis import Handled
+from dorothie_gym.analysis.exception_attribution import Handled
 from dorothie_gym.benchmark.labels import ALL, CorpusLabels, TaskLabels, Unscored
 from dorothie_gym.benchmark.metrics import confusion_matrix, metrics_of
 from dorothie_gym.benchmark.predictions import ActPredictions, Predictions, TaskPredictions
 from dorothie_gym.errors import PredictionError
-from dorothie_gym.ontology import NAVIGATION_ACTIONS, DialogueMove
-from dorothie_gym.recording import Task
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.recording.points import Point
+from dorothie_gym.recording.visibility import Task
 
 NEARBY_POINTS: Final = 3
 """Number of nearby points that a message names."""

@@ -15,12 +15,14 @@ from typing import Any, Final, Generic, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.benchmark.features import CO_WIZARD, PARTICIPANT, Batch, BatchSpec, Columns, PointTable, gather
+from dorothie_gym.benchmark.features.batch import Batch, BatchSpec, gather
+from dorothie_gym.benchmark.features.columns import CO_WIZARD, PARTICIPANT, Columns
+from dorothie_gym.benchmark.features.point_table import PointTable
 from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, Predictions
 from dorothie_gym.errors import SessionError
-from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS
-from dorothie_gym.ontology.actions import ArgumentKind
-from dorothie_gym.recording import Task
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, ArgumentKind
+from dorothie_gym.ontology.dialogue_acts import LABELS
+from dorothie_gym.recording.visibility import Task
 
 Inputs = TypeVar("Inputs")
 """Features of n points."""

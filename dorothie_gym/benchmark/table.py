@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.analysis import Handled
+from dorothie_gym.analysis.exception_attribution import Handled
 from dorothie_gym.analysis.intervals import Estimate
 from dorothie_gym.benchmark.labels import ALL, CorpusLabels, Split, labels_of
 from dorothie_gym.benchmark.metrics import COLUMNS, keys_of, per_class_accuracy
@@ -31,7 +31,8 @@ from dorothie_gym.benchmark.prediction_reader import read_predictions
 from dorothie_gym.benchmark.predictions import TaskPredictions
 from dorothie_gym.benchmark.scoring import RunScore, Scores, class_labels, score_runs
 from dorothie_gym.benchmark.trivial_baselines import FLOORS
-from dorothie_gym.recording import Corpus, Task
+from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.recording.visibility import Task
 
 TABLE_VERSION: Final = 1
 

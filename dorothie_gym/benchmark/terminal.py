@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from dorothie_gym.analysis import Handled
+from dorothie_gym.analysis.exception_attribution import Handled
 from dorothie_gym.analysis.intervals import Estimate
 from dorothie_gym.benchmark.labels import ALL
 from dorothie_gym.benchmark.metrics import (
@@ -38,7 +38,7 @@ from dorothie_gym.benchmark.report import (
 )
 from dorothie_gym.benchmark.scoring import class_labels
 from dorothie_gym.benchmark.table import ResultsTable
-from dorothie_gym.recording import Task
+from dorothie_gym.recording.visibility import Task
 
 WIDE: Final = 110
 """Terminal width from which the tasks stand side by side [characters]."""

@@ -19,8 +19,10 @@ from dorothie_gym.benchmark.predictions import (
     act_labels,
     action_labels,
 )
-from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
-from dorothie_gym.recording import DecisionPoint, InferencePoint, Task
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
+from dorothie_gym.recording.points import DecisionPoint, InferencePoint
+from dorothie_gym.recording.visibility import Task
 
 
 class FloorModel(ABC):

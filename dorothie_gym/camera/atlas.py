@@ -14,7 +14,7 @@ from dorothie_gym.camera import patterns
 from dorothie_gym.camera.lettering import Ink, Picture, lettered
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
-from dorothie_gym.ontology import LandmarkName, StreetName
+from dorothie_gym.ontology.slots import LandmarkName, StreetName
 
 SIGN_SIZE = 256, 64
 """Width and height of panels with words [px]."""

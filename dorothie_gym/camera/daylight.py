@@ -14,7 +14,7 @@ import numpy as np
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import WeatherParameter
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.sim.weather import Weather
 
 _CLEAR_HORIZON, _CLEAR_ZENITH = (196, 212, 226), (84, 136, 204)

@@ -31,7 +31,7 @@ from dorothie_gym.camera.texturing import textures_of
 from dorothie_gym.compilation import direct, fixed
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records, plain
 from dorothie_gym.copying import shared
-from dorothie_gym.ontology import Sensor
+from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.sim.weather import Weather
 
 _ROOM = 4096  # triangles of bodies, at first

@@ -14,7 +14,7 @@ from dorothie_gym.camera.rasterizer import SKY, VisibilityBuffer
 from dorothie_gym.camera.samples import FIRST, ROOM, Samples, X, Y
 from dorothie_gym.compilation import compiled, concurrent, inlined
 from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 
 _SKY_CLASS = int(ObjectClass.SKY.value)
 _GROUND = int(Surface.GROUND)

@@ -8,7 +8,7 @@ from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.camera.visibility import PERCEPTION_CAMERA, is_body_seen
 from dorothie_gym.maps.town import Town
-from dorothie_gym.recording import Session
+from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.surroundings import SceneTable
 
 

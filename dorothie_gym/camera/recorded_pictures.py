@@ -32,11 +32,15 @@ from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.ontology import Sensor, WeatherParameter, parse_landmark, parse_sensor
-from dorothie_gym.recording import FRAME_RATE, LIGHT_STATES, ActorKind, EventType, Session
+from dorothie_gym.ontology.spellings import parse_landmark, parse_sensor
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.recording.actor_tracks import ActorTracks, Moment
+from dorothie_gym.recording.events import EventType
 from dorothie_gym.recording.header import LandmarkRow
 from dorothie_gym.recording.recorded_perception import Switches, light_switches
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.surroundings import LIGHT_STATES, ActorKind
+from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.pedestrians.walking import PACE
@@ -46,7 +50,7 @@ from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import CLARITY
-from dorothie_gym.tasks import Landmark
+from dorothie_gym.tasks.storyboard import Landmark
 
 _KINDS = {ActorKind.VEHICLE: Kind.CAR, ActorKind.CYCLIST: Kind.CYCLIST}
 _NO_BODY = -1

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import concurrent
-from dorothie_gym.ontology import Sensor
+from dorothie_gym.ontology.world_exceptions import Sensor
 
 _SHARE = 0.012  # radius of the blur as a share of the picture's width
 _ROUNDS = 2  # of means; two make the weights fall off linearly

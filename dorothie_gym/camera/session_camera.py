@@ -24,7 +24,7 @@ from dorothie_gym.compilation import concurrent, fixed, inlined
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.traffic_lights import LightColour, LightPhase
-from dorothie_gym.ontology import Sensor, WeatherParameter
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Colour
 from dorothie_gym.sim.state.world_arrays import CAR_KEY

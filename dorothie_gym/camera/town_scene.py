@@ -19,7 +19,7 @@ from dorothie_gym.camera.scenery.lenses import Lenses
 from dorothie_gym.camera.scenery.lots import Lot
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.traffic_lights import LightProgramme
-from dorothie_gym.tasks import Landmark
+from dorothie_gym.tasks.storyboard import Landmark
 
 
 @shared

@@ -14,7 +14,7 @@ from dorothie_gym.cli.output import coefficient, fail, print_json, reporting_err
 if TYPE_CHECKING:
     from dorothie_gym.annotation.corpus_agreement import CorpusAgreement
     from dorothie_gym.annotation.formats import Format
-    from dorothie_gym.recording import Corpus, CorpusEntry
+    from dorothie_gym.recording.corpus import Corpus, CorpusEntry
 
 _FORMATS = ("native", "sdn", "jsonl", "elan")
 
@@ -25,7 +25,7 @@ CorpusOrSession = Annotated[
 
 def load_corpus(path: Path, maps: Path | None) -> Corpus:
     """Returns the sessions of a command; fails if there are none, or no such folder of maps."""
-    from dorothie_gym.recording import Corpus
+    from dorothie_gym.recording.corpus import Corpus
 
     if maps is not None and not maps.is_dir():
         fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
@@ -166,7 +166,7 @@ def agreement(
 ) -> None:
     """Print the agreement of annotators: spans; Cohen's kappa of moves, slots, and borders of units; alpha."""
     with reporting_errors():
-        from dorothie_gym.analysis import has_alpha
+        from dorothie_gym.analysis.span_agreement import has_alpha
         from dorothie_gym.annotation.corpus_agreement import corpus_agreement
 
         found = corpus_agreement(load_corpus(path, maps).entries, annotator or (), with_alpha=has_alpha())

@@ -285,7 +285,7 @@ def train(
         except ImportError as error:
             fail(f"{error.name} is not installed; run: pip install 'dorothie-gym[baselines]'")
         from dorothie_gym.errors import CacheError
-        from dorothie_gym.rollout import default_corpus
+        from dorothie_gym.rollout.corpus_cache import default_corpus
 
         try:
             folder = corpus or default_corpus()

@@ -12,14 +12,14 @@ Completion: TypeAlias = Callable[[str], list[str]]
 
 def complete_town(incomplete: str) -> list[str]:
     """Returns the shipped towns and the map files that begin with a text."""
-    from dorothie_gym.maps import town_names
+    from dorothie_gym.maps.catalogue import town_names
 
     return _names(incomplete, town_names()) + list(_paths(incomplete, (".yaml", ".yml", ".xodr")))
 
 
 def complete_towns(incomplete: str) -> list[str]:
     """Returns the completions of the last name in a list of towns, with the names before it."""
-    from dorothie_gym.maps import town_names
+    from dorothie_gym.maps.catalogue import town_names
 
     before, comma, last = incomplete.rpartition(",")
     return [before + comma + name for name in _names(last, ("seen", "unseen", "all", *town_names()))]
@@ -27,7 +27,7 @@ def complete_towns(incomplete: str) -> list[str]:
 
 def complete_storyboard(incomplete: str) -> list[str]:
     """Returns the shipped storyboards and the JSON files that begin with a text."""
-    from dorothie_gym.tasks import template_names
+    from dorothie_gym.tasks.parsing import template_names
 
     return _names(incomplete, template_names()) + list(_paths(incomplete, (".json",)))
 
@@ -36,7 +36,7 @@ def complete_policy(role: str) -> Completion:
     """Returns the completion of the policies of a role, by name or file."""
 
     def complete(incomplete: str) -> list[str]:
-        from dorothie_gym.ontology import Role
+        from dorothie_gym.ontology.roles import Role
         from dorothie_gym.policies.policy_loader import policy_names
 
         return _names(incomplete, policy_names(Role(role))) + list(_paths(incomplete))

@@ -138,7 +138,7 @@ def _resumed_room(
     from dorothie_gym.console.seating import parse_roles
     from dorothie_gym.console.town_page import town_page
     from dorothie_gym.rollout.replay import ReplaySources, begin_replay
-    from dorothie_gym.tasks import load_template
+    from dorothie_gym.tasks.parsing import load_template
 
     resumed = Resumed.load(folder)
     session = resumed.session

@@ -16,7 +16,8 @@ from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, s
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dorothie_gym.recording import Corpus, CorpusEntry, Session
+    from dorothie_gym.recording.corpus import Corpus, CorpusEntry
+    from dorothie_gym.recording.session import Session
 
 
 class TargetLayout(enum.StrEnum):
@@ -75,7 +76,7 @@ def convert(
     if maps is not None and not maps.is_dir():
         fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
     with reporting_errors():
-        from dorothie_gym.recording import Corpus
+        from dorothie_gym.recording.corpus import Corpus
 
         corpus = Corpus.load(source, maps=maps)
         _check_out(source, out)
@@ -121,7 +122,7 @@ def _write_role(
     fields: list[str], *, as_json: bool,
 ) -> None:  # fmt: skip
     """Writes the view of a role on all sessions; a session that cannot be simulated again fails the command."""
-    from dorothie_gym.ontology import Role
+    from dorothie_gym.ontology.roles import Role
     from dorothie_gym.rollout.replay import ReplaySources
     from dorothie_gym.rollout.role_episodes import role_episodes
 
@@ -169,7 +170,7 @@ def _convert_one(
 ) -> Facts:
     """Converts a session; returns its row for --json."""
     from dorothie_gym.errors import SessionError, TownError
-    from dorothie_gym.recording.sdn import write_sdn
+    from dorothie_gym.recording.sdn.writer import write_sdn
 
     path = entry.path.relative_to(corpus.root)
     row: Facts = {"path": str(path)}

@@ -36,7 +36,7 @@ from dorothie_gym.cli.warm_up import compile_first
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.policies import Player
+    from dorothie_gym.policies.policy_loader import Player
     from dorothie_gym.rollout.closed_loop.cross_play import CrossPlayResult, CrossPlaySettings
 
 USUAL = ["scripted", "silent"]
@@ -92,8 +92,8 @@ def cross_play(
     The result does not depend on the number of workers. An interrupted run is resumed by the same command with --out.
     """
     with reporting_errors():
-        from dorothie_gym.rollout.closed_loop import parse_towns
         from dorothie_gym.rollout.closed_loop.cross_play import RESULT_NAME, CrossPlaySettings
+        from dorothie_gym.rollout.closed_loop.running import parse_towns
 
         if page is not None:
             if page.suffix != ".md":
@@ -137,7 +137,7 @@ def _players(
     drivers: list[str], guides: list[str], ad_wizard: str, asked: LanguageModelOptions
 ) -> tuple[list[Player], list[Player], Player]:  # fmt: skip
     """Returns the players of both roles and of the Ad-Wizard; exits if a name or file is unknown."""
-    from dorothie_gym.ontology import Role
+    from dorothie_gym.ontology.roles import Role
 
     casts = [find_cast(guides[0], name, ad_wizard, asked) for name in drivers]
     first = casts[0]

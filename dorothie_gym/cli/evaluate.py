@@ -13,8 +13,11 @@ from dorothie_gym.cli.options import Maps
 from dorothie_gym.cli.output import Facts, check_file, fail, print_json, reporting_errors, stderr, wide_stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.benchmark import CorpusLabels, ResultsTable, Split, TaskPredictions
-    from dorothie_gym.recording import Corpus, Task
+    from dorothie_gym.benchmark.labels import CorpusLabels, Split
+    from dorothie_gym.benchmark.predictions import TaskPredictions
+    from dorothie_gym.benchmark.table import ResultsTable
+    from dorothie_gym.recording.corpus import Corpus
+    from dorothie_gym.recording.visibility import Task
 
 DETAILED = 2
 """Largest number of models that are shown in detail."""
@@ -55,9 +58,11 @@ def evaluate(
             fail("--save writes the predictions of a trivial baseline; add --model majority or --model random")
         check_file(save)
     with reporting_errors():
-        from dorothie_gym.benchmark import evaluate_predictions, labels_of, read_about
+        from dorothie_gym.benchmark.labels import labels_of
+        from dorothie_gym.benchmark.prediction_reader import read_about
+        from dorothie_gym.benchmark.table import evaluate_predictions
         from dorothie_gym.errors import PredictionError
-        from dorothie_gym.recording import Corpus
+        from dorothie_gym.recording.corpus import Corpus
 
         chosen, part = _tasks(tasks), _split(split)
         if floor is not None:
@@ -83,7 +88,7 @@ def evaluate(
 
 
 def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]:
-    from dorothie_gym.benchmark import read_predictions
+    from dorothie_gym.benchmark.prediction_reader import read_predictions
 
     read = [given for given in read_predictions(*files) if given.task in tasks]
     if files and not read:
@@ -95,8 +100,9 @@ def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]
 def _floor(
     name: str, corpus: Corpus, labels: CorpusLabels, seeds: range, tasks: Sequence[Task], save: Path | None
 ) -> list[TaskPredictions]:
-    from dorothie_gym.benchmark import labels_of, predict_floor, write_predictions
-    from dorothie_gym.benchmark.labels import ALL
+    from dorothie_gym.benchmark.labels import ALL, labels_of
+    from dorothie_gym.benchmark.predictions import write_predictions
+    from dorothie_gym.benchmark.trivial_baselines import predict_floor
     from dorothie_gym.errors import SessionError
 
     try:
@@ -115,7 +121,7 @@ def _floor(
 
 
 def _tasks(text: str) -> tuple[Task, ...]:
-    from dorothie_gym.recording import Task
+    from dorothie_gym.recording.visibility import Task
 
     names = [name.strip().lower() for name in text.split(",")]
     if names == ["all"]:
@@ -127,7 +133,7 @@ def _tasks(text: str) -> tuple[Task, ...]:
 
 
 def _split(text: str) -> Split:
-    from dorothie_gym.benchmark import SPLITS
+    from dorothie_gym.benchmark.labels import SPLITS
 
     for split in SPLITS:
         if split == text:
@@ -136,7 +142,7 @@ def _split(text: str) -> Split:
 
 
 def _check_floor(name: str) -> None:
-    from dorothie_gym.benchmark import make_floor
+    from dorothie_gym.benchmark.trivial_baselines import make_floor
 
     try:
         make_floor(name)
@@ -146,7 +152,7 @@ def _check_floor(name: str) -> None:
 
 def _default_sessions() -> Path:
     from dorothie_gym.errors import CacheError
-    from dorothie_gym.rollout import default_corpus
+    from dorothie_gym.rollout.corpus_cache import default_corpus
 
     try:
         return default_corpus()

@@ -94,7 +94,7 @@ def _write(
     path: Path, out: Path, export: FrameExport, maps: tuple[str | None, Path | None], workers: int, *, quiet: bool
 ) -> list[ExportedSession]:
     from dorothie_gym.errors import ProcessError
-    from dorothie_gym.recording import Corpus
+    from dorothie_gym.recording.corpus import Corpus
     from dorothie_gym.rollout.frame_export import export_frames
     from dorothie_gym.rollout.replay import ReplaySources
 

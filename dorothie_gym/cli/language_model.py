@@ -14,7 +14,7 @@ from dorothie_gym.cli.options import needs
 from dorothie_gym.cli.output import fail
 
 if TYPE_CHECKING:
-    from dorothie_gym.policies.language_model import LanguageModelConfig
+    from dorothie_gym.policies.language_model.config import LanguageModelConfig
 
 _PANEL = "Language models (llm:MODEL)"
 
@@ -85,8 +85,7 @@ class LanguageModelOptions:
 
     def config(self) -> LanguageModelConfig:
         """Returns the settings; the name of the model is a placeholder. Exits if they are incomplete or wrong."""
-        from dorothie_gym.policies.language_model import LanguageModelConfig
-        from dorothie_gym.policies.language_model.config import URL_VARIABLE, SimulatedTime
+        from dorothie_gym.policies.language_model.config import URL_VARIABLE, LanguageModelConfig, SimulatedTime
 
         url = self.url or os.environ.get(URL_VARIABLE, "")
         if not url and not self.replay:

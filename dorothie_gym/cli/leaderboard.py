@@ -159,8 +159,8 @@ def _plan(
     """Returns the rollouts to be played; exits if a name or file is unknown."""
     from dorothie_gym.cli.language_model import AnswerTime, LanguageModelOptions
     from dorothie_gym.cli.options import env_config, find_cast
-    from dorothie_gym.maps import load_town
-    from dorothie_gym.ontology import Role
+    from dorothie_gym.maps.catalogue import load_town
+    from dorothie_gym.ontology.roles import Role
     from dorothie_gym.rollout.closed_loop.leaderboard_rows import LeaderboardPlan, usual_rows
 
     for file in imported:
@@ -182,7 +182,7 @@ def _plan(
 
 def _check_weights(plan: LeaderboardPlan, folder: Path) -> None:
     """Exits if the folder has a row of a planned model with other weights: the page could not have both."""
-    from dorothie_gym.ontology import Role
+    from dorothie_gym.ontology.roles import Role
 
     for name, settings in plan.rollouts().items():
         player = settings.cast[Role.CO_WIZARD]

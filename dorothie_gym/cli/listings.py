@@ -14,10 +14,10 @@ from rich.table import Table
 from dorothie_gym.cli.completion import complete_town
 from dorothie_gym.cli.options import OWN_NAME
 from dorothie_gym.cli.output import Facts, check_picture, fail, print_json, reporting_errors, stderr, stdout
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.ontology.roles import AGENT_ROLES
 
 if TYPE_CHECKING:
-    from dorothie_gym.maps.lint import Fault
+    from dorothie_gym.maps.lint.fault import Fault
 
 FAULTY = 1
 """Exit code for a town that has faults."""
@@ -48,14 +48,14 @@ def towns(
     if picture is not None:
         check_picture(picture)
     with reporting_errors():
-        from dorothie_gym.maps import describe, fold_of, load_town
+        from dorothie_gym.maps.catalogue import describe, fold_of, load_town
         from dorothie_gym.maps.lint import check_town
 
         loaded = load_town(town)
         facts = describe(loaded)
         faults = check_town(loaded) if check else ()
         if picture is not None:
-            from dorothie_gym.rendering import town_picture
+            from dorothie_gym.rendering.map_sheet import town_picture
 
             with stderr().status(f"drawing {loaded.name}, a few seconds"):
                 town_picture(loaded, picture, fold=fold_of(loaded.name))
@@ -76,7 +76,7 @@ def _list_towns(check: bool, picture: Path | None, as_json: bool) -> None:
     if picture is not None:
         fail("--picture draws one town; name it: dorothie-gym towns NAME --picture")
     with reporting_errors():
-        from dorothie_gym.maps import describe, fold_of, load_town, town_names
+        from dorothie_gym.maps.catalogue import describe, fold_of, load_town, town_names
 
         rows = [{**describe(load_town(name)), "fold": fold_of(name)} for name in town_names()]
     print_json(rows) if as_json else _show_towns(rows)
@@ -87,7 +87,7 @@ def storyboards(
 ) -> None:
     """List the shipped storyboards, with their stories as templates."""
     with reporting_errors():
-        from dorothie_gym.tasks import load_template, template_names
+        from dorothie_gym.tasks.parsing import load_template, template_names
 
         templates = [load_template(name) for name in template_names()]
     if as_json:
@@ -164,8 +164,8 @@ def policies(
 
 def _policy_rows() -> list[Facts]:
     """Returns the policies with their roles; shipped models with their cards."""
-    from dorothie_gym.policies import policy_names, pretrained_card, pretrained_names
-    from dorothie_gym.policies.pretrained import pretrained_size
+    from dorothie_gym.policies.policy_loader import policy_names
+    from dorothie_gym.policies.pretrained import pretrained_card, pretrained_names, pretrained_size
 
     roles: dict[str, list[str]] = {}
     for role in AGENT_ROLES:

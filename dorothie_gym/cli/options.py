@@ -16,8 +16,8 @@ from dorothie_gym.render_view import RenderView
 if TYPE_CHECKING:
     from dorothie_gym.cli.language_model import LanguageModelOptions
     from dorothie_gym.engine.config import EnvConfig
-    from dorothie_gym.ontology import Role
-    from dorothie_gym.policies import Player
+    from dorothie_gym.ontology.roles import Role
+    from dorothie_gym.policies.policy_loader import Player
 
 
 def needs(extra: str) -> str:
@@ -175,9 +175,8 @@ def find_cast(
         language_model: options of the policies `llm:MODEL`.
     """
     from dorothie_gym.errors import PolicyLoadError
-    from dorothie_gym.ontology import AGENT_ROLES
-    from dorothie_gym.policies import find_player
-    from dorothie_gym.policies.policy_loader import LANGUAGE_MODEL
+    from dorothie_gym.ontology.roles import AGENT_ROLES
+    from dorothie_gym.policies.policy_loader import LANGUAGE_MODEL, find_player
 
     given = dict(zip(AGENT_ROLES, (participant, co_wizard, ad_wizard), strict=True))
     asks = any(name.startswith(LANGUAGE_MODEL) for name in given.values())
@@ -194,7 +193,7 @@ def find_cast(
 
 def _check_loads(player: Player, role: Role) -> None:
     """Makes a policy once, so that a damaged file or a missing package is reported before the first session."""
-    from dorothie_gym.spaces import SpaceLimits
+    from dorothie_gym.spaces.limits import SpaceLimits
 
     try:
         player.make(role, SpaceLimits())

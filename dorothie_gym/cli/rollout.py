@@ -51,7 +51,8 @@ from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings
+    from dorothie_gym.rollout.closed_loop.results import RolloutResult
+    from dorothie_gym.rollout.closed_loop.running import RolloutSettings
 
 
 def rollout(
@@ -91,7 +92,7 @@ def rollout(
     The table does not depend on the number of workers. After an interruption it prints the command that resumes.
     """
     with reporting_errors():
-        from dorothie_gym.rollout.closed_loop import RolloutSettings, parse_towns
+        from dorothie_gym.rollout.closed_loop.running import RolloutSettings, parse_towns
 
         asked = LanguageModelOptions(
             url=llm_url,
@@ -124,7 +125,7 @@ def rollout(
 
 def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | None, *, quiet: bool) -> RolloutResult:
     from dorothie_gym.errors import ProcessError
-    from dorothie_gym.rollout.closed_loop import roll_out
+    from dorothie_gym.rollout.closed_loop.running import roll_out
 
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out
     try:

@@ -183,7 +183,7 @@ def _check_outputs(plan: _Plan) -> None:
 def _play(plan: _Plan, *, quiet: bool) -> Facts:
     """Plays the session and returns what --json writes."""
     from dorothie_gym.engine.session_engine import SessionEngine
-    from dorothie_gym.rollout import play_session
+    from dorothie_gym.rollout.play import play_session
 
     cast = find_cast(*plan.players, plan.language_model)
     filmed = plan.video is not None and plan.view is not RenderView.MAP

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dorothie_gym.recording import Difference, Session
+    from dorothie_gym.recording.comparison import Difference
+    from dorothie_gym.recording.session import Session
     from dorothie_gym.rendering.playback import Playback
     from dorothie_gym.rollout.replay import ReplayCheck, ReplaySources
 
@@ -80,7 +81,7 @@ def replay(
 
 
 def _check(path: Path, sources: ReplaySources, workers: int | None, *, as_json: bool) -> None:
-    from dorothie_gym.recording import Corpus
+    from dorothie_gym.recording.corpus import Corpus
     from dorothie_gym.rollout.replay import check_replays
 
     checks = []
@@ -116,7 +117,7 @@ def _check_line(check: ReplayCheck) -> str:
 
 
 def _play_back(path: Path, sources: ReplaySources, fps: float, video: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.recording import read_session
+    from dorothie_gym.recording.corpus import read_session
     from dorothie_gym.rendering.playback import Playback
 
     session = read_session(path, maps=sources.maps)
@@ -236,9 +237,10 @@ def film(
 
 def _film(path: Path, sources: ReplaySources, out: Path, view: RenderView, fps: float) -> Facts:
     from dorothie_gym.cli.warm_up import compile_first
-    from dorothie_gym.recording import FRAME_RATE, read_session
+    from dorothie_gym.recording.corpus import read_session
     from dorothie_gym.rendering.playback import Playback
     from dorothie_gym.rendering.session_views import SessionRenderer
+    from dorothie_gym.sim.config import FRAME_RATE
 
     session = read_session(path, maps=sources.maps)
     town, renderer = sources.town_of(session), SessionRenderer(view)
@@ -275,7 +277,7 @@ def _sound_file(session: Session, start: float, seconds: float) -> Iterator[Path
         yield None
         return
     from dorothie_gym.recording.sound import sound_track
-    from dorothie_gym.speech import encode_wav
+    from dorothie_gym.speech.audio import encode_wav
 
     with tempfile.TemporaryDirectory(prefix="dorothie_gym.") as folder:
         file = Path(folder) / "sound.wav"
@@ -295,7 +297,7 @@ def compare(
 
     Sessions of folders are compared with those of the same path. The exit code is 1 if any of them differs.
     """
-    from dorothie_gym.recording import compare_folders
+    from dorothie_gym.recording.comparison import compare_folders
 
     rows: list[tuple[str, Difference | None]] = []
     with reporting_errors():

@@ -10,7 +10,7 @@ from rich.table import Table
 from dorothie_gym.cli.output import Facts, print_json, session_progress, wide_stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.recording import Corpus
+    from dorothie_gym.recording.corpus import Corpus
 
 _SHARES: Final = (
     ("somebody speaks, share of the time", "speech_share"),

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dorothie_gym.baselines.experiment import Experiment
     from dorothie_gym.baselines.model_zoo import ModelEntry
     from dorothie_gym.baselines.trainer import Epoch
-    from dorothie_gym.benchmark import ResultsTable
+    from dorothie_gym.benchmark.table import ResultsTable
 
 RUNS = Path("runs")
 """Default folder of trainings; it contains one folder per corpus."""
@@ -224,7 +224,7 @@ def table(
     with _reporting_errors():
         from dorothie_gym.baselines.experiment import PREDICTIONS, gather_table, table_experiments
         from dorothie_gym.baselines.model_zoo import ROWS, find_row
-        from dorothie_gym.benchmark import write_predictions
+        from dorothie_gym.benchmark.predictions import write_predictions
         from dorothie_gym.benchmark.report import write_report
 
         rows = ROWS if models == "all" else [find_row(name.strip()) for name in models.split(",")]
@@ -321,7 +321,7 @@ def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
     folder = corpus
     if folder is None:
         from dorothie_gym.errors import CacheError
-        from dorothie_gym.rollout import default_corpus
+        from dorothie_gym.rollout.corpus_cache import default_corpus
 
         try:
             folder = default_corpus()

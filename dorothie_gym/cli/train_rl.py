@@ -15,13 +15,12 @@ from dorothie_gym.cli.completion import complete_algorithm, complete_env
 from dorothie_gym.cli.options import AsJson, Ray
 from dorothie_gym.cli.output import FAILED, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.cli.warm_up import compile_first
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.rl import TrainingResult, TrainingSettings
-    from dorothie_gym.baselines.rl.run import OnProgress, OnStage, RunEvaluation
-    from dorothie_gym.baselines.rl.settings import RunSettings, SelfPlaySettings
+    from dorothie_gym.baselines.rl.run import OnProgress, OnStage, RunEvaluation, TrainingResult
+    from dorothie_gym.baselines.rl.settings import RunSettings, SelfPlaySettings, TrainingSettings
     from dorothie_gym.baselines.rl.training import TrainingEvaluation
     from dorothie_gym.baselines.selfplay.training import SelfPlayEvaluation
 
@@ -181,9 +180,9 @@ def _train(
         device: device of the networks; None for the processor.
         as_json: whether to print one JSON object and nothing else.
     """
-    from dorothie_gym.baselines.rl import Training, tuned_settings
     from dorothie_gym.baselines.rl.environments import has_batch
-    from dorothie_gym.baselines.rl.training import best_of
+    from dorothie_gym.baselines.rl.settings import tuned_settings
+    from dorothie_gym.baselines.rl.training import Training, best_of
 
     settings = tuned_settings(algorithm, env, env_settings=given, **changes)
     if changes["workers"] is None and ray is None and not has_batch(settings.env):

@@ -14,7 +14,7 @@ def warm_up(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
     """Compile the simulation for this machine; later commands start at once."""
-    from dorothie_gym.compilation import compiled_folder
+    from dorothie_gym.compilation.cache import compiled_folder
 
     folder = compiled_folder()
     if folder is None:

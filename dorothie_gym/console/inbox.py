@@ -11,13 +11,10 @@ from dorothie_gym.console import messages as m
 from dorothie_gym.console.lane_lookup import LaneLookup
 from dorothie_gym.console.messages import Command, MessageError
 from dorothie_gym.console.speech_input import TypedAct, typed_acts
-from dorothie_gym.ontology import (
-    DialogueMove,
-    ExceptionKind,
-    MentalAction,
-    OntologyError,
-    Role,
-)
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.actions import MentalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import (
     parse_goal_status,
     parse_landmark,
@@ -26,20 +23,19 @@ from dorothie_gym.ontology.spellings import (
     parse_sensor,
     parse_weather_parameter,
 )
-from dorothie_gym.spaces import (
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
+from dorothie_gym.spaces.actions import (
     AdWizardAction,
     CoWizardAction,
     LanePosition,
     Mental,
-    ObservationMapping,
     ParticipantAction,
     Physical,
     RoleAction,
-    SpaceLimits,
     Speech,
-    plain_text,
 )
-from dorothie_gym.spaces.limits import MESSAGE_LENGTH
+from dorothie_gym.spaces.limits import MESSAGE_LENGTH, SpaceLimits, plain_text
+from dorothie_gym.spaces.observations import ObservationMapping
 
 MOST_WAITING: Final = 24
 """Most commands of one kind that wait; more are refused."""

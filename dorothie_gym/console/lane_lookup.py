@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dorothie_gym.maps import Town
-from dorothie_gym.spaces import LanePosition
+from dorothie_gym.maps.town import Town
+from dorothie_gym.spaces.actions import LanePosition
 
 SPACING: Final = 1.0
 """Distance between the sampled places of a lane [m]: places are whole metres."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from dorothie_gym.console.lane_lookup import LaneLookup
-from dorothie_gym.ontology import LandmarkName, StreetName
+from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.tasks.catalogue import catalogue, map_label
 
 

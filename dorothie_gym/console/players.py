@@ -7,11 +7,11 @@ from typing import Any
 
 from dorothie_gym.console.seating import Occupancy, SeatPlan
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.recording import SessionHeader
+from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.rollout.play import with_personas
-from dorothie_gym.spaces import ActionMapping
+from dorothie_gym.spaces.actions import ActionMapping
 
 
 class Players:

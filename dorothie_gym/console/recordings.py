@@ -6,8 +6,8 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from dorothie_gym.ontology import Role
-from dorothie_gym.recording import Event, EventType
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.recording.events import Event, EventType
 
 
 class SpanRecordings:

@@ -8,8 +8,10 @@ from pathlib import Path
 
 from dorothie_gym.console.config import ConsoleConfig
 from dorothie_gym.errors import SessionError
-from dorothie_gym.ontology import Role
-from dorothie_gym.recording import SeatEvent, SeatEventKind, Session, SessionState, read_seat_log, session_state
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.recording.file_names import SessionState
+from dorothie_gym.recording.seat_log import SeatEvent, SeatEventKind, read_seat_log
+from dorothie_gym.recording.session import Session, session_state
 
 SEATS = "seats"
 """Field of a header with the planned players of a session with people, by role."""

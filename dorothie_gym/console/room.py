@@ -27,10 +27,11 @@ from dorothie_gym.console.speech_input import act_json, read_act, read_typed
 from dorothie_gym.console.talk_log import TalkLog
 from dorothie_gym.console.windscreen import Windscreen
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.recording import EndReason, SeatEvent, SeatEventKind
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.recording.events import EndReason
+from dorothie_gym.recording.seat_log import SeatEvent, SeatEventKind
 from dorothie_gym.rollout.replay import recorded_actions
-from dorothie_gym.spaces import ActionMapping
+from dorothie_gym.spaces.actions import ActionMapping
 
 
 class Room:

@@ -8,7 +8,7 @@ from typing import TypeAlias
 from dorothie_gym.console.connection import Connection
 from dorothie_gym.console.messages import Incoming
 from dorothie_gym.console.seat import Seat
-from dorothie_gym.recording import EndReason
+from dorothie_gym.recording.events import EndReason
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,11 @@ from pathlib import Path
 from dorothie_gym.console.recordings import SpanRecordings
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import Role
-from dorothie_gym.recording import SeatEvent, SeatLogWriter, SessionHeader, SessionWriter
-from dorothie_gym.spaces import ActionMapping
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.recording.seat_log import SeatEvent, SeatLogWriter
+from dorothie_gym.recording.writer import SessionWriter
+from dorothie_gym.spaces.actions import ActionMapping
 
 
 class RoomRecord:

@@ -10,7 +10,7 @@ from dorothie_gym.console.connection import CloseCode, Connection
 from dorothie_gym.console.inbox import SeatInbox
 from dorothie_gym.console.seating import Occupancy, SeatPlan
 from dorothie_gym.console.talk_log import TalkLog
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 
 EXPERIMENTER, SPECTATOR = "experimenter", "spectator"
 """Names of the seats without a role."""

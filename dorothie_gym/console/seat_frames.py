@@ -17,8 +17,9 @@ from dorothie_gym.console.views import role_view, static_view
 from dorothie_gym.console.vocabulary import vocabulary
 from dorothie_gym.console.windscreen import Windscreen
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import AGENT_ROLES, ARRIVAL_DISTANCE, Role
-from dorothie_gym.recording import EndReason
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.ontology.slots import ARRIVAL_DISTANCE
+from dorothie_gym.recording.events import EndReason
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
 
 

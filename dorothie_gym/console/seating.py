@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from dorothie_gym.errors import PolicyLoadError, SettingsError, did_you_mean
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy_loader import LANGUAGE_MODEL, SCRIPTED, Player, find_player
 
 

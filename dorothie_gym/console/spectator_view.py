@@ -9,8 +9,8 @@ from dorothie_gym.console.lane_lookup import LaneLookup
 from dorothie_gym.console.pins import Pin, pin_rows
 from dorothie_gym.console.views import KMH, RoleView, weather_shares
 from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.recording import Event, EventType
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.rendering.exception_words import exception_words
 from dorothie_gym.tasks.storyboard import Landmark
 

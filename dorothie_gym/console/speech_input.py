@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dorothie_gym.console.messages import MessageError, Say, TypedSpan
-from dorothie_gym.dialogue import guess_act, guess_spans
-from dorothie_gym.ontology import DialogueAct, DialogueMove, OntologyError, parse_act
-from dorothie_gym.spaces import plain_text
-from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_act, guess_spans
+from dorothie_gym.errors import OntologyError
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.spellings import parse_act
+from dorothie_gym.spaces.limits import UTTERANCE_LENGTH, plain_text
 
 
 class ActSource(enum.StrEnum):

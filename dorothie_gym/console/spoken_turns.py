@@ -19,17 +19,11 @@ from starlette.routing import Route
 
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.seat import Seat
-from dorothie_gym.ontology import Role
-from dorothie_gym.speech import (
-    SAMPLE_RATE,
-    Voice,
-    encode_flac,
-    encode_wav,
-    find_recognizer,
-    find_synthesizer,
-    readable,
-    say,
-)
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.speech.audio import SAMPLE_RATE, encode_flac, encode_wav
+from dorothie_gym.speech.backends import find_recognizer, find_synthesizer
+from dorothie_gym.speech.spoken_understanding import readable
+from dorothie_gym.speech.synthesizer import Voice, say
 
 LONGEST_TURN: Final = 30.0
 """Longest turn that is recognised [s]."""

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from dorothie_gym.console.speech_input import act_json
-from dorothie_gym.dialogue import Utterance
-from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, Role, StreetName
-from dorothie_gym.spaces import ObservationMapping, heard_acts
+from dorothie_gym.dialogue.conversation import Utterance
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import LandmarkName, StreetName
+from dorothie_gym.spaces.observations import ObservationMapping, heard_acts
 
 Entry = dict[str, Any]
 """Line of the talk in JSON types: `t` [s], `who`, `text`; for own utterances also `utterance` (number) and `spans`,

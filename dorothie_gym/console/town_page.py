@@ -9,8 +9,8 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import StreetName
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.ground import town_bounds
 from dorothie_gym.rendering.map_layers import MapLayers

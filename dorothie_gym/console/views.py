@@ -11,29 +11,21 @@ from numpy.typing import NDArray
 
 from dorothie_gym.console.lane_lookup import LaneLookup
 from dorothie_gym.console.pins import Pin, pin_rows
-from dorothie_gym.ontology import (
-    ExceptionKind,
-    GoalStatus,
-    LandmarkName,
-    ObjectClass,
-    PhysicalAction,
-    PropKind,
-    Role,
-    Sensor,
-    StreetName,
-    WeatherParameter,
-)
-from dorothie_gym.spaces import (
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.observations import (
+    MESSAGE_KINDS,
     ExitColumn,
     GuessColumn,
     LandmarkColumn,
-    Motion,
     ObjectColumn,
     ObservationMapping,
     PropColumn,
     SubgoalColumn,
 )
-from dorothie_gym.spaces.observations import MESSAGE_KINDS
 
 RoleView: TypeAlias = dict[str, Any]
 """View of a role in JSON types; the same fields at each decision, so that a browser needs the changed ones only."""

@@ -5,17 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-from dorothie_gym.ontology import (
-    SLOT_VALUES,
-    DialogueMove,
-    GoalStatus,
-    LandmarkName,
-    PropKind,
-    Sensor,
-    Slot,
-    WeatherParameter,
-    path_to,
-)
+from dorothie_gym.ontology.dialogue_acts import DialogueMove, path_to
+from dorothie_gym.ontology.slots import SLOT_VALUES, GoalStatus, LandmarkName, Slot
+from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter
 from dorothie_gym.tasks.catalogue import catalogue
 
 

@@ -23,7 +23,8 @@ from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
 from dorothie_gym.dialogue.recognition_errors import Loudness, measured_errors, proper_words, word_class
 from dorothie_gym.dialogue.talk_files import read_talk_files
-from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z']*")
 _CANDIDATES = 6

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.propositions import Proposition
-from dorothie_gym.ontology import DialogueAct, Role
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
+from dorothie_gym.ontology.roles import Role
 
 WORDS_PER_SECOND = 2.7
 """Speaking rate [words/s]; ordinary speech has 2 to 3 words per second (design, Time)."""

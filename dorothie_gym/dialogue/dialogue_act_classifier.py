@@ -12,16 +12,9 @@ from dorothie_gym.dialogue.directions import word_lists
 from dorothie_gym.dialogue.lexicon import YamlMapping, read_data, strings
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.errors import OntologyError, PhraseFileError
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueAct,
-    DialogueMove,
-    GoalStatus,
-    ObjectClass,
-    Slot,
-    SlotValue,
-    parse_move,
-)
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, ObjectClass, Slot, SlotValue
+from dorothie_gym.ontology.spellings import parse_move
 
 _SENTENCE_END = re.compile(r"(?<=[.?!])(?<!\b(?:Mr|Ms|Dr)\.)(?<!\bMrs\.)\s+")
 _DOMAIN_RULE = "%domain"

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable
 
 from dorothie_gym.dialogue.lexicon import load_lexicon
-from dorothie_gym.ontology import SLOT_VALUES, Slot
+from dorothie_gym.ontology.slots import SLOT_VALUES, Slot
 
 FILLED_PAUSES = ("uh", "um", "er", "erm", "hmm", "hm")
 """Filled pauses."""

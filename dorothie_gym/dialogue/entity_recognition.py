@@ -12,7 +12,7 @@ from rapidfuzz import fuzz, process
 
 from dorothie_gym.dialogue.lexicon import load_lexicon, read_data, split_words, strings
 from dorothie_gym.dialogue.talk_files import read_talk_files
-from dorothie_gym.ontology import Slot, SlotValue
+from dorothie_gym.ontology.slots import Slot, SlotValue
 
 # Spelling to sound, in order: silent letters, letter groups with one sound. A strong simplification of Metaphone
 # (L. Philips, Computer Language 7(12), 1990), sufficient for confusions between English words.

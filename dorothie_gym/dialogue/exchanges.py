@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from dorothie_gym.dialogue.conversation import Utterance
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role, SlotValue
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, SlotValue
 
 ANSWER_TIMEOUT = 10.0
 """Time without an answer after which an exchange is abandoned [s] (dialogue spec, phenomenon 21)."""

@@ -19,18 +19,11 @@ from dorothie_gym.dialogue.phrases import (
 from dorothie_gym.dialogue.propositions import Predicate
 from dorothie_gym.dialogue.talk_files import TalkSection, alternatives_of, parse_talk_files, read_talk_files
 from dorothie_gym.errors import OntologyError, PhraseFileError
-from dorothie_gym.ontology import (
-    SLOT_VALUES,
-    ActionValue,
-    DialogueMove,
-    PropKind,
-    Role,
-    Slot,
-    SlotValue,
-    parse_move,
-    parse_role,
-    parse_slot,
-)
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, Slot, SlotValue
+from dorothie_gym.ontology.spellings import parse_move, parse_role, parse_slot
+from dorothie_gym.ontology.world_exceptions import PropKind
 
 SLOT_FIELDS: Mapping[str, Slot] = {
     "do": Slot.ACTION,

@@ -14,7 +14,8 @@ from typing import Final
 
 from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.propositions import Proposition
-from dorothie_gym.ontology import DialogueAct, DialogueMove, SlotValue, walk
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove, walk
+from dorothie_gym.ontology.slots import SlotValue
 
 
 class CommunicativeFunction(enum.StrEnum):

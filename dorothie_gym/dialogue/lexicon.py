@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from dorothie_gym.errors import PhraseFileError
-from dorothie_gym.ontology import SLOT_VALUES, ActionValue, Slot, SlotValue
+from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, Slot, SlotValue
 
 _FORMS = frozenset({"say", "also", "again", "here", "the", "order", "tail", "hear"})
 _HEARD_FORMS = ("say", "also", "the", "tail", "hear")

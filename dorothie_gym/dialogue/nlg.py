@@ -20,7 +20,9 @@ from dorothie_gym.dialogue.phrases import Register, open_to
 from dorothie_gym.dialogue.realization_context import Wording, WordingContext
 from dorothie_gym.dialogue.slot_realizer import Draw, SlotRealizer, draws_of
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle, default_style
-from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, Slot, SlotValue
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import Slot, SlotValue
 
 MAX_CHARACTERS = 160
 """Longest text [characters]."""

@@ -15,7 +15,7 @@ from dorothie_gym.dialogue.numerals import NUMBER_WORDS, read_cardinals
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import PhraseFileError
-from dorothie_gym.ontology import (
+from dorothie_gym.ontology.slots import (
     SLOT_VALUES,
     ActionValue,
     GoalStatus,
@@ -23,8 +23,8 @@ from dorothie_gym.ontology import (
     ObjectClass,
     SlotValue,
     StreetName,
-    parse_slot,
 )
+from dorothie_gym.ontology.spellings import parse_slot
 
 _Value = TypeVar("_Value")
 

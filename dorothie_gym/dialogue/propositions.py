@@ -18,19 +18,17 @@ from typing import Final, TypeAlias
 from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import did_you_mean
-from dorothie_gym.ontology import (
+from dorothie_gym.ontology.slots import (
     SLOT_VALUES,
     ActionValue,
     GoalStatus,
     LandmarkName,
     ObjectClass,
-    PropKind,
-    Sensor,
     Slot,
     SlotValue,
     StreetName,
-    WeatherParameter,
 )
+from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter
 
 
 class Asked(enum.Enum):

@@ -7,7 +7,8 @@ import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dorothie_gym.ontology import DialogueMove, LandmarkName, SlotValue, StreetName
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import LandmarkName, SlotValue, StreetName
 
 if TYPE_CHECKING:
     from dorothie_gym.dialogue.propositions import Proposition

@@ -18,17 +18,9 @@ from dorothie_gym.dialogue.phrases import Register, manner_of
 from dorothie_gym.dialogue.propositions import Argument, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle
-from dorothie_gym.ontology import (
-    SLOT_VALUES,
-    ActionValue,
-    DialogueAct,
-    GoalStatus,
-    LandmarkName,
-    PropKind,
-    Slot,
-    SlotValue,
-    in_label_order,
-)
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, in_label_order
+from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, GoalStatus, LandmarkName, Slot, SlotValue
+from dorothie_gym.ontology.world_exceptions import PropKind
 
 _Option = TypeVar("_Option")
 

@@ -20,7 +20,8 @@ from dataclasses import dataclass
 
 from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.dialogue.exchanges import Exchange, ExchangeTracker
-from dorothie_gym.ontology import DialogueAct, DialogueMove, GoalStatus, LandmarkName, Slot
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, Slot
 
 _AIMING = frozenset(
     {DialogueMove.INSTRUCT, DialogueMove.CHECK, DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove.REPLY_W}

@@ -13,13 +13,16 @@ from dorothie_gym import portable_math as pm
 from dorothie_gym.copying import shared
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.engine.session_log import Outcome
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import DialogueAct, DialogueMove, LandmarkName, MentalAction, Role, Slot, StreetName
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import MentalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import LandmarkName, Slot, StreetName
 from dorothie_gym.sim.ego.ego_controller import GoalAhead
 from dorothie_gym.sim.sensing.localizer import Localizer
 from dorothie_gym.sim.sensing.perception import RANGE_SCALE
-from dorothie_gym.spaces import Mental
+from dorothie_gym.spaces.actions import Mental
 
 GATE = 13.82
 """Squared Mahalanobis distance that one in a thousand true statements exceeds (chi-square, 2 degrees of freedom)."""

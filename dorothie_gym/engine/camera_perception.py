@@ -22,12 +22,12 @@ from dorothie_gym.engine.observations import write_landmarks
 from dorothie_gym.engine.pictures import OBSERVERS, camera_of
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.sim.sensing.perception import BODY, look_around
 from dorothie_gym.sim.state.sensing_records import EyeRecord, SeenRecord
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import Observation
-from dorothie_gym.tasks import Landmark
+from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.tasks.storyboard import Landmark
 
 if TYPE_CHECKING:
     from dorothie_gym.camera.session_camera import SessionCamera

@@ -12,7 +12,7 @@ from dorothie_gym.compilation.dispatcher import CompiledFunction
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.warm_up import TOWN, Progress, reporting
-from dorothie_gym.ontology import Sensor, WeatherParameter
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.weather import Weather
 

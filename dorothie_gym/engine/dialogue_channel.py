@@ -9,30 +9,27 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from dorothie_gym.dialogue import (
-    Annotator,
-    AsrChannel,
-    Conversation,
-    Loudness,
-    Recogniser,
-    Span,
-    SpeakerStyle,
-    Utterance,
-    draw_style,
-    fluent,
-    guess_spans,
-    word_act,
-)
+from dorothie_gym.dialogue.asr_channel import AsrChannel, Recogniser
+from dorothie_gym.dialogue.conversation import Conversation, Span, Utterance
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
+from dorothie_gym.dialogue.disfluency import fluent
+from dorothie_gym.dialogue.nlg import word_act
+from dorothie_gym.dialogue.recognition_errors import Loudness
+from dorothie_gym.dialogue.speaker_style import SpeakerStyle, draw_style
+from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.ontology import AGENT_ROLES, DialogueAct, GoalStatus, LandmarkName, Role
-from dorothie_gym.spaces import Speech, plain_text
-from dorothie_gym.spaces.limits import UTTERANCE_LENGTH
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
+from dorothie_gym.spaces.actions import Speech
+from dorothie_gym.spaces.limits import UTTERANCE_LENGTH, plain_text
 
 if TYPE_CHECKING:
     from dorothie_gym.engine.spoken_dialogue import SpokenDialogue
-    from dorothie_gym.speech import CabinState, Samples
+    from dorothie_gym.speech.audio import Samples
+    from dorothie_gym.speech.cabin_noise import CabinState
 
 SpanRecord: TypeAlias = dict[str, object]
 """Event data of one span."""
@@ -206,7 +203,7 @@ class DialogueChannel:
 
     @staticmethod
     def _noise(cabin: Callable[[], CabinState]) -> Loudness:
-        from dorothie_gym.speech import signal_to_noise
+        from dorothie_gym.speech.cabin_noise import signal_to_noise
 
         return Loudness.of(signal_to_noise(cabin()))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dorothie_gym.dialogue import Utterance
+from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
 from dorothie_gym.engine.camera_perception import CameraPerception
 from dorothie_gym.engine.config import EnvConfig, RewardTerms
@@ -23,29 +23,33 @@ from dorothie_gym.engine.session_log import EventLog, SessionSummary, SubgoalCou
 from dorothie_gym.engine.session_views import SessionViews
 from dorothie_gym.engine.view_arrays import RoleArrays
 from dorothie_gym.engine.view_steps import EVERYTHING
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES, NAVIGATION_ACTIONS, ExceptionKind, PhysicalAction, Role, WeatherParameter
-from dorothie_gym.recording import EndReason, Event, EventType, SessionHeader
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, PhysicalAction
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, WeatherParameter
+from dorothie_gym.recording.events import EndReason, Event, EventType
+from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEvent
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import (
+from dorothie_gym.spaces.actions import (
     AdWizardAction,
     CoWizardAction,
     Mental,
-    Observation,
     ParticipantAction,
     Physical,
     RoleAction,
-    SpaceLimits,
 )
-from dorothie_gym.tasks import TaskState
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.tasks.state import TaskState
 
 if TYPE_CHECKING:
     from dorothie_gym.camera.first_person_camera import CameraFrame
-    from dorothie_gym.speech import CabinState, Samples
+    from dorothie_gym.speech.audio import Samples
+    from dorothie_gym.speech.cabin_noise import CabinState
 
 _INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
@@ -369,7 +373,7 @@ class LiveSession:
 
     def _cabin(self) -> CabinState:
         """Returns what makes noise in the car."""
-        from dorothie_gym.speech import CabinState
+        from dorothie_gym.speech.cabin_noise import CabinState
 
         weather = self.world.weather.values
         return CabinState(

@@ -9,8 +9,9 @@ from typing import ClassVar, TypeAlias
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.session_views import SessionViews
 from dorothie_gym.engine.view_arrays import Mask
-from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, Role
-from dorothie_gym.tasks import TaskState
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
+from dorothie_gym.tasks.state import TaskState
 
 RoleMask: TypeAlias = dict[str, Mask | tuple[Mask, ...] | None]
 """Mask of a role's action space, by field; None for fields without a mask."""

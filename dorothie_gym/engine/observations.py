@@ -12,17 +12,21 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import direct
 from dorothie_gym.copying import Lookups
-from dorothie_gym.dialogue import Utterance
+from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.engine.session_views import SessionViews
-from dorothie_gym.ontology import AGENT_ROLES, GoalStatus, PropKind, Role, Sensor, encode_slots
+from dorothie_gym.ontology.dialogue_acts import encode_slots
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.ontology.slots import GoalStatus
+from dorothie_gym.ontology.world_exceptions import PropKind, Sensor
 from dorothie_gym.sim.ego.motion_control import motion_of
-from dorothie_gym.spaces import LandmarkColumn, Motion, Observation, SubgoalColumn, plain_text
+from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.spaces.actions import NO_MOVE
-from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH
-from dorothie_gym.spaces.observations import MAX_UTTERANCE, MESSAGE_KINDS
-from dorothie_gym.tasks import Landmark, TaskState
+from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, plain_text
+from dorothie_gym.spaces.observations import MAX_UTTERANCE, MESSAGE_KINDS, LandmarkColumn, Observation, SubgoalColumn
+from dorothie_gym.tasks.state import TaskState
+from dorothie_gym.tasks.storyboard import Landmark
 
 Table = NDArray[np.float64]
 

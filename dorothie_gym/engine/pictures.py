@@ -14,10 +14,10 @@ from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import Observation
+from dorothie_gym.spaces.observations import Observation
 
 if TYPE_CHECKING:
     from dorothie_gym.camera.first_person_camera import CameraFrame

@@ -14,13 +14,18 @@ from numpy.typing import NDArray
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps import LightColour, LightProgramme, Town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.recording import ACTOR_DTYPE, ActorKind, Decision, Event, SessionWriter
+from dorothie_gym.maps.town import Town
+from dorothie_gym.maps.traffic_lights import LightColour, LightProgramme
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.recording.action_log import Decision
+from dorothie_gym.recording.events import Event
+from dorothie_gym.recording.surroundings import ACTOR_DTYPE, ActorKind
+from dorothie_gym.recording.writer import SessionWriter
 from dorothie_gym.sim.bodies import Pedestrian
 from dorothie_gym.sim.state.codes import Kind, Walk
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import ActionDict, ActionMapping, SpaceLimits, action_space, noop
+from dorothie_gym.spaces.actions import ActionDict, ActionMapping, action_space, noop
+from dorothie_gym.spaces.limits import SpaceLimits
 
 _ACTOR_KINDS = np.full(max(Kind) + 1, -1, dtype=np.int64)
 _ACTOR_KINDS[Kind.CAR], _ACTOR_KINDS[Kind.CYCLIST] = ActorKind.VEHICLE, ActorKind.CYCLIST
@@ -220,7 +225,7 @@ class SessionRecorder:
         frames, world = self._engine.last_frames, self._engine.session.world
         self._writer.append(self._engine.last_events if events is None else events, frames)
         if recordings := self._engine.last_recordings:
-            from dorothie_gym.speech import encode_flac  # sessions of text do not load it
+            from dorothie_gym.speech.audio import encode_flac  # sessions of text do not load it
 
             for name, samples in recordings.items():
                 self._writer.add_audio(name, encode_flac(samples))

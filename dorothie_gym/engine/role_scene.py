@@ -10,9 +10,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from dorothie_gym import portable_arrays as pn
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import GoalStatus, LandmarkName, ObjectClass, PhysicalAction, Role, Sensor, StreetName
-from dorothie_gym.ontology import WeatherParameter as Weather
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import Sensor
+from dorothie_gym.ontology.world_exceptions import WeatherParameter as Weather
 from dorothie_gym.rendering.scene import (
     SUBGOAL_STATES,
     Actor,
@@ -24,7 +27,7 @@ from dorothie_gym.rendering.scene import (
     SpokenLine,
     SubgoalState,
 )
-from dorothie_gym.spaces import (
+from dorothie_gym.spaces.observations import (
     GuessColumn,
     LandmarkColumn,
     ObjectColumn,
@@ -34,7 +37,7 @@ from dorothie_gym.spaces import (
     SubgoalColumn,
     heard_acts,
 )
-from dorothie_gym.tasks import map_label, map_labels
+from dorothie_gym.tasks.catalogue import map_label, map_labels
 
 _KINDS: dict[ObjectClass, FigureKind] = {ObjectClass.VEHICLES: "vehicle", ObjectClass.PEDESTRIAN: "pedestrian"}
 _TITLES = {

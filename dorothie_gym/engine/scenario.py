@@ -13,11 +13,12 @@ import numpy as np
 from dorothie_gym.copying import shared
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import did_you_mean, short_repr
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import StreetName
-from dorothie_gym.recording import SessionHeader
-from dorothie_gym.recording.header import SubgoalRow
-from dorothie_gym.tasks import Storyboard, StoryboardTemplate, Subgoal, bind, load_template, template_names
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.slots import StreetName
+from dorothie_gym.recording.header import SessionHeader, SubgoalRow
+from dorothie_gym.tasks.binding import bind
+from dorothie_gym.tasks.parsing import load_template, template_names
+from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
 
 STREET_NAMES = tuple(
     name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY)

@@ -22,13 +22,14 @@ from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.engine.session_engine import SessionEngine, StepOutcome
 from dorothie_gym.engine.view_arrays import RoleArrays, turn_options
 from dorothie_gym.engine.view_steps import EVERYTHING, observe_share
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.sim.batch.world_rows import WorldRows
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.spaces import ActionMapping, RoleAction, SpaceLimits
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.spaces.actions import ActionMapping, RoleAction
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 _observe_share = direct(observe_share)
 

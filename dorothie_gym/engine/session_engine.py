@@ -20,25 +20,21 @@ from dorothie_gym.engine.pictures import OBSERVERS, picture_spaces
 from dorothie_gym.engine.scenario import Scenario, draw_scenario, template_option
 from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.input_files import settings_of
-from dorothie_gym.maps import Town, load_town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.recording import EndReason, Event, SessionHeader
+from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.recording.events import EndReason, Event
+from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.sim.infractions import WorldEvent
 from dorothie_gym.sim.network.network import network_of
-from dorothie_gym.spaces import (
-    ActionDecoder,
-    ActionMapping,
-    RoleAction,
-    SpaceLimits,
-    StepInfo,
-    observation_space,
-)
+from dorothie_gym.spaces.actions import ActionDecoder, ActionMapping, RoleAction, StepInfo
 from dorothie_gym.spaces.fields import dict_space
-from dorothie_gym.spaces.observations import camera_perception_fields
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import camera_perception_fields, observation_space
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 if TYPE_CHECKING:
-    from dorothie_gym.speech import Samples
+    from dorothie_gym.speech.audio import Samples
 
 
 class StepOutcome(NamedTuple):

@@ -9,11 +9,12 @@ from typing import Final, NotRequired, TypeAlias, TypedDict
 from dorothie_gym import portable_math as pm
 from dorothie_gym.engine.dialogue_channel import DialogueChannel
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.ontology import ARRIVAL_DISTANCE, Role
-from dorothie_gym.recording import Event, EventType
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ARRIVAL_DISTANCE
+from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.world import World
-from dorothie_gym.tasks import TaskState
+from dorothie_gym.tasks.state import TaskState
 
 _WORLD_EVENTS = {
     WorldEventKind.HAZARD_STOP: EventType.HAZARD_STOP,

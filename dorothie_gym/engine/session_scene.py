@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dorothie_gym.dialogue import Utterance
+from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.ontology import GoalStatus, Role
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.rendering.exception_words import exception_words
 from dorothie_gym.rendering.scene import (
     SUBGOAL_STATES,

@@ -9,11 +9,11 @@ from dorothie_gym.compilation import direct
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.view_arrays import RoleArrays, turn_options
 from dorothie_gym.engine.view_steps import Wanted, observe_share
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.sim.batch.threads import turns_of
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import Observation
+from dorothie_gym.spaces.observations import Observation
 
 _observe_share = direct(observe_share)
 _FLAGS = dict(zip(AGENT_ROLES, map(int, (Wanted.PARTICIPANT, Wanted.CO_WIZARD, Wanted.AD_WIZARD)), strict=True))

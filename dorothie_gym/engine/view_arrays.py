@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import Lookups, shared
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.spaces import AnySpace, ExitColumn, Observation, SpaceLimits, action_space, observation_space
-from dorothie_gym.spaces.fields import Arrays, FieldBuffer, Shape
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.spaces.actions import action_space
+from dorothie_gym.spaces.fields import AnySpace, Arrays, FieldBuffer, Shape
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ExitColumn, Observation, observation_space
 
 Integers: TypeAlias = NDArray[np.int64]
 Mask: TypeAlias = NDArray[np.int8]

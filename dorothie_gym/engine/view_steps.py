@@ -20,7 +20,7 @@ from dorothie_gym.engine.view_arrays import (
     TurnOptions,
 )
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.sim.batch.threads import take
 from dorothie_gym.sim.batch.worlds import world_of
 from dorothie_gym.sim.config import FRAME_RATE
@@ -32,7 +32,7 @@ from dorothie_gym.sim.network.lane_lookup import closest_lane, wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import Feasible
 from dorothie_gym.sim.state.ego_records import CoursePointRecord
-from dorothie_gym.spaces import ExitColumn
+from dorothie_gym.spaces.observations import ExitColumn
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

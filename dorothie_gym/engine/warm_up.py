@@ -21,9 +21,9 @@ from dorothie_gym.compilation.dispatcher import CompiledFunction
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.interruption import starting_process
-from dorothie_gym.maps import load_town
+from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.routing import router
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.egos import play_share
 from dorothie_gym.sim.batch.threads import turns_of
@@ -39,7 +39,7 @@ from dorothie_gym.sim.state.town_arrays import TownArrays, empty_town
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.town_env import TownEnv
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import noop
+from dorothie_gym.spaces.actions import noop
 
 TOWN: Final = "brookside"
 """Town of the short session that is played; machine code is the same for all towns."""

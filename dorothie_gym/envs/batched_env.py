@@ -15,7 +15,8 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_batch import SessionBatch
 from dorothie_gym.envs.driving_batch import DrivingBatch
 from dorothie_gym.envs.navigation_config import NavigationConfig
-from dorothie_gym.maps import Town, load_town
+from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.maps.town import Town
 from dorothie_gym.processors import available_processors
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym import portable_math as pm
-from dorothie_gym.ontology import ActionValue
+from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.navigation.junction_exits import SECTORS
 
 WIDTH, HEIGHT = 84, 12

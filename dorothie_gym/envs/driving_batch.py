@@ -21,13 +21,15 @@ from dorothie_gym.envs.driving_rows import DrivingFace, DrivingRows, RowHolder
 from dorothie_gym.envs.driving_start import write_scenario
 from dorothie_gym.envs.driving_steps import act_share, guide_share
 from dorothie_gym.envs.interference import Interference, permits_changes
-from dorothie_gym.ontology import LandmarkName, MentalAction, Role
+from dorothie_gym.ontology.actions import MentalAction
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.sim.batch.threads import ThreadPool
 from dorothie_gym.sim.ego.ego_controller import set_goals
 from dorothie_gym.sim.state.world_arrays import lengthened
 from dorothie_gym.sim.world_start import WorldSeeds, start_world
-from dorothie_gym.spaces import LanePosition, Mental
-from dorothie_gym.tasks import TaskState
+from dorothie_gym.spaces.actions import LanePosition, Mental
+from dorothie_gym.tasks.state import TaskState
 
 _WAITS, _NEAR, _LOST, _TOLD = map(int, Event)
 _act_share, _guide_share = direct(act_share), direct(guide_share)

@@ -16,7 +16,8 @@ from dorothie_gym.engine.pictures import FIELDS, picture_spaces
 from dorothie_gym.envs.dashboard import Readings, show_dashboard
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.pedals import CONTINUOUS_FIELDS
-from dorothie_gym.ontology import ActionValue, PhysicalAction
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.navigation.junction_exits import nearest_sector
 from dorothie_gym.policies.navigation.observation_vector import SPEED_UNIT, Vector, layout
 from dorothie_gym.sim.batch.threads import ThreadPool

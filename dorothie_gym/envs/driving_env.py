@@ -20,10 +20,11 @@ from dorothie_gym.envs.driving_view import DrivingView
 from dorothie_gym.envs.episode import TERMS, Ending
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView, metadata_at
-from dorothie_gym.maps import Town, load_town
-from dorothie_gym.ontology import Role
-from dorothie_gym.spaces import StepInfo
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.spaces.actions import StepInfo
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
 Action = TypeVar("Action")

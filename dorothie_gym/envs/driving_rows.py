@@ -20,11 +20,12 @@ from dorothie_gym.envs.driving_start import Blanks, blank_parts, blank_world, co
 from dorothie_gym.envs.episode import EpisodeArrays
 from dorothie_gym.envs.interference import Interference
 from dorothie_gym.envs.navigation_config import NavigationConfig
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.route_arrays import empty_search
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.routing_graph import routing_graph
-from dorothie_gym.ontology import LandmarkName, PhysicalAction
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.navigation.cost_to_go import cost_table
 from dorothie_gym.policies.navigation.driver_view import DriverArrays
 from dorothie_gym.policies.navigation.instructor import exit_sectors, instruction_of
@@ -40,8 +41,9 @@ from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, with_room_of
-from dorothie_gym.spaces import Mental, SpaceLimits
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.spaces.actions import Mental
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 ROOMS: Final = ("vehicles", "pedestrians", "props", "course", "steps", "goals")
 """Arrays of a world whose lengths differ between worlds of a town."""

@@ -16,7 +16,7 @@ from dorothie_gym.envs.episode import EpisodeArrays, episode_arrays
 from dorothie_gym.envs.interference import PlansRecord
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.pedals import CONTINUOUS_FIELDS
-from dorothie_gym.maps import Town
+from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.ad_wizard import AdWizardConfig
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_arrays
@@ -28,7 +28,7 @@ from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown, with_room_of
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world_start import OwnArrays
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.spaces.limits import SpaceLimits
 
 Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
 

@@ -29,7 +29,9 @@ from dorothie_gym.envs.interference import look_for_moment
 from dorothie_gym.envs.pedals import find_path, has_lost_path, instructed_manoeuvre, observe_path
 from dorothie_gym.maps.route_arrays import RouteSearch
 from dorothie_gym.maps.routing_graph import RoutingGraph
-from dorothie_gym.ontology import ARRIVAL_DISTANCE, SPEED_STEP, DialogueMove, PhysicalAction
+from dorothie_gym.ontology.actions import SPEED_STEP, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ARRIVAL_DISTANCE
 from dorothie_gym.policies.navigation.actions import NavigationAction, order_of
 from dorothie_gym.policies.navigation.cost_to_go import cost_from
 from dorothie_gym.policies.navigation.driver_view import DriverArrays

@@ -26,9 +26,9 @@ from dorothie_gym.envs.episode import TERMS, Ending
 from dorothie_gym.envs.navigation_config import NavigationConfig
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.render_view import checked_view
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 from dorothie_gym.vector_infos import Infos, mask_of, masked_infos, seeds_of
 
 LARGEST_SEED: Final = 2**31

@@ -7,7 +7,7 @@ import math
 from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.envs.driving_batch import DrivingBatch
 from dorothie_gym.envs.session_view import SessionView
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.instructor import words_of
 
 

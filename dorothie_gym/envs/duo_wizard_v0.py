@@ -22,19 +22,14 @@ from dorothie_gym.engine.scenario import ResetOptions, Scenario, scenario_option
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES
-from dorothie_gym.recording import Event, SessionHeader
-from dorothie_gym.spaces import (
-    ActionDict,
-    ActionMapping,
-    Observation,
-    SpaceLimits,
-    StepInfo,
-    action_space,
-)
-from dorothie_gym.spaces.limits import UNBOUNDED
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES
+from dorothie_gym.recording.events import Event
+from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space
+from dorothie_gym.spaces.limits import UNBOUNDED, SpaceLimits
+from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 _METADATA: dict[str, object] = {"name": "duo_wizard_v0", **METADATA, "is_parallelizable": True}
 

@@ -24,11 +24,13 @@ from dorothie_gym.engine.session_log import REFUSABLE
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.errors import short_repr
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.render_view import RenderView, checked_view
 from dorothie_gym.sim.infractions import INFRACTION_KINDS
-from dorothie_gym.spaces import ActionMapping, SpaceLimits, action_space, observation_space
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.spaces.actions import ActionMapping, action_space
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import observation_space
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 from dorothie_gym.vector_infos import Infos, mask_of, seeds_of
 
 _AGENTS = {str(role): role for role in AGENT_ROLES}

@@ -11,33 +11,22 @@ from numpy.typing import NDArray
 
 from dorothie_gym.action_values import as_array
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import (
-    LABELS,
-    NAVIGATION_ACTIONS,
-    U_TURN_ANGLE,
-    DialogueMove,
-    PhysicalAction,
-    Role,
-    StreetName,
-    parse_landmark,
-    parse_street,
-)
-from dorothie_gym.recording import (
-    FRAME_RATE,
-    WAY_LENGTH,
-    MoveRecord,
-    ObjectKind,
-    PointView,
-    Session,
-    Task,
-    history_angle,
-    last_perceived,
-)
-from dorothie_gym.spaces import NO_MOVE, ActionMapping, LandmarkColumn, Observation, SpaceLimits
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, U_TURN_ANGLE, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import StreetName
+from dorothie_gym.ontology.spellings import parse_landmark, parse_street
+from dorothie_gym.recording.events import MoveRecord
+from dorothie_gym.recording.points import WAY_LENGTH, PointView, history_angle
+from dorothie_gym.recording.recorded_perception import ObjectKind, last_perceived
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.visibility import Task
+from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.spaces.actions import NO_MOVE, ActionMapping
 from dorothie_gym.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
-from dorothie_gym.spaces.limits import TEXT_CHARACTERS
-from dorothie_gym.spaces.observations import MAX_UTTERANCE
+from dorothie_gym.spaces.limits import TEXT_CHARACTERS, SpaceLimits
+from dorothie_gym.spaces.observations import MAX_UTTERANCE, LandmarkColumn, Observation
 
 HISTORY_LENGTH: Final = 16
 """Number of latest moves and physical actions in an observation."""

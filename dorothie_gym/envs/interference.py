@@ -18,9 +18,9 @@ from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.records import Flag, Float, Int32, Int64, RecordArray, UInt64
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.engine.view_steps import write_lanes
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing_graph import RoutingLane
-from dorothie_gym.ontology import Role
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import (
     KINDS,
     MOST_TRICKS,
@@ -37,9 +37,10 @@ from dorothie_gym.policies.task_exceptions import plays_every_exception
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.path_search import point_before
 from dorothie_gym.sim.randomness import POOL, draw_share, seed_stream
-from dorothie_gym.spaces import ActionDecoder, Observation, RoleAction, SpaceLimits, plain_text
-from dorothie_gym.spaces.limits import STORY_LENGTH
-from dorothie_gym.tasks import TaskState
+from dorothie_gym.spaces.actions import ActionDecoder, RoleAction
+from dorothie_gym.spaces.limits import STORY_LENGTH, SpaceLimits, plain_text
+from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.tasks.state import TaskState
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

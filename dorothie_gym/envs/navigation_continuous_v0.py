@@ -18,11 +18,11 @@ from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeig
 from dorothie_gym.envs.pedals import CONTINUOUS_FIELD_SPECS, CONTINUOUS_FIELDS
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps import Town
+from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.spaces import StepInfo
+from dorothie_gym.spaces.actions import StepInfo
 from dorothie_gym.spaces.fields import FieldSpec, signal
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 __all__ = [
     "ACCELERATION_SPECS", "CONTINUOUS_FIELDS", "CONTINUOUS_FIELD_SPECS", "CONTROLS", "CONTROL_SPECS",

@@ -15,7 +15,7 @@ from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.navigation_continuous_v0 import control_space, controls_of, path_space
 from dorothie_gym.render_view import RenderView
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 
 class NavigationContinuousVectorEnv(DrivingVectorEnv):

@@ -15,12 +15,12 @@ from dorothie_gym.envs.driving_cameras import DriverObservation, driver_space
 from dorothie_gym.envs.driving_env import DrivingEnv
 from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.session_view import metadata_at
-from dorothie_gym.maps import Town
+from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, navigation_space
-from dorothie_gym.spaces import StepInfo
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.spaces.actions import StepInfo
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 
 class NavigationEnv(DrivingEnv[np.int64]):

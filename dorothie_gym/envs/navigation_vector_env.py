@@ -23,7 +23,7 @@ from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import navigation_space
 from dorothie_gym.render_view import RenderView
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 from dorothie_gym.vector_infos import Infos, masked_infos
 
 

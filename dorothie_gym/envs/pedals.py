@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.ontology import ActionValue, WeatherParameter
+from dorothie_gym.ontology.slots import ActionValue
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.navigation.actions import LEFT, RIGHT
 from dorothie_gym.policies.navigation.driver_view import DriverArrays, DriverView, HeardRecord
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays

@@ -24,20 +24,22 @@ from dorothie_gym.envs.history_space import (
     history_space,
 )
 from dorothie_gym.input_files import settings_of
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import LABELS
-from dorothie_gym.recording import (
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import LABELS
+from dorothie_gym.recording.points import (
     ANGLE_TOLERANCE,
     DecisionPoint,
     InferencePoint,
     Point,
     PointView,
-    Session,
-    Task,
     angle_error,
     final_view,
 )
-from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, SpaceLimits, StepInfo
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.visibility import Task
+from dorothie_gym.spaces.actions import ActionDict, ActionMapping, StepInfo
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import Observation
 
 Label: TypeAlias = dict[str, int | NDArray[np.int8]]
 """Correct prediction of a point, in the action space of the task."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
-from dorothie_gym.recording import Task
+from dorothie_gym.recording.visibility import Task
 
 
 class RfNEnv(TeacherForcedEnv):

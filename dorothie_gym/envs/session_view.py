@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.render_view import RenderView, checked_view
-from dorothie_gym.spaces import Observation
+from dorothie_gym.spaces.observations import Observation
 
 if TYPE_CHECKING:
     from dorothie_gym.camera.session_camera import SessionCamera

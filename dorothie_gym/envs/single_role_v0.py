@@ -16,12 +16,13 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_option
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import make_policy
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, StepInfo, action_space, noop
-from dorothie_gym.tasks import StoryboardTemplate
+from dorothie_gym.policies.policy_loader import make_policy
+from dorothie_gym.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space, noop
+from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
 

@@ -24,20 +24,14 @@ from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.scenario import ResetOptions, check_options
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording import (
-    Corpus,
-    CorpusEntry,
-    DecisionPoint,
-    Fold,
-    InferencePoint,
-    Point,
-    Session,
-    Task,
-    task_points,
-)
-from dorothie_gym.spaces import ActionMapping, SpaceLimits, StepInfo
+from dorothie_gym.maps.town import Town
+from dorothie_gym.recording.corpus import Corpus, CorpusEntry, Fold
+from dorothie_gym.recording.points import DecisionPoint, InferencePoint, Point, task_points
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.visibility import Task
+from dorothie_gym.spaces.actions import ActionMapping, StepInfo
+from dorothie_gym.spaces.limits import SpaceLimits
 
 DEFAULT: Final = "default"
 """Name of the corpus that is generated once and kept in the user's cache folder."""

@@ -104,11 +104,11 @@ def _read(path: Path, _modified: int, _size: int) -> Town:
 def _compile(path: Path) -> Town:
     # imported on demand: lxml and scipy are slow to import
     if path.suffix.lower() == ".xodr":
-        from dorothie_gym.maps.opendrive import read_opendrive
+        from dorothie_gym.maps.opendrive.compile import read_opendrive
 
         town = read_opendrive(path)
     else:
-        from dorothie_gym.maps.yaml import read_yaml_town
+        from dorothie_gym.maps.yaml.compile import read_yaml_town
 
         town = read_yaml_town(path)
     check_extent(town, str(path))

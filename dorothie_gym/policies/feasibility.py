@@ -9,8 +9,9 @@ too little room.
 
 from __future__ import annotations
 
-from dorothie_gym.maps import LinkType, Town
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
+from dorothie_gym.maps.model import LinkType
+from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.route_legs import SWITCH_ROOM
 from dorothie_gym.policies.route_progress import U_TURN_SPEED_SQUARED
 from dorothie_gym.sim.ego.feasibility import u_turn_braking

@@ -10,15 +10,19 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.dialogue import CommunicativeFunction, ParsedText, Predicate, Proposition, Wording
-from dorothie_gym.ontology import ObjectClass, Sensor
-from dorothie_gym.ontology import WeatherParameter as W
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.world_exceptions import Sensor
+from dorothie_gym.ontology.world_exceptions import WeatherParameter as W
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.observation_parser import SeenObject, scalar, weather
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.sight import DENSE, FAR_SIGHT, Limit
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.spaces import ObservationMapping
+from dorothie_gym.spaces.observations import ObservationMapping
 
 
 def _turned(azimuth: float) -> float:

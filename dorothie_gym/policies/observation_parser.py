@@ -12,21 +12,21 @@ from numpy.typing import ArrayLike
 
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.records import Rows
-from dorothie_gym.dialogue import ParsedText, guess_spans, understand
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import (
-    DialogueAct,
-    DialogueMove,
-    GoalStatus,
-    LandmarkName,
-    ObjectClass,
-    PropKind,
-    Role,
-    StreetName,
-    WeatherParameter,
-)
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
+from dorothie_gym.dialogue.nlu import ParsedText, understand
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
-from dorothie_gym.spaces import LandmarkColumn, ObjectColumn, ObservationMapping, SubgoalColumn, heard_acts
+from dorothie_gym.spaces.observations import (
+    LandmarkColumn,
+    ObjectColumn,
+    ObservationMapping,
+    SubgoalColumn,
+    heard_acts,
+)
 
 PARAMETERS = tuple(WeatherParameter)
 

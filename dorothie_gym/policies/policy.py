@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, Protocol, TypeA
 
 import numpy as np
 
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.spaces import ActionDict, ObservationMapping, SpaceLimits
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.spaces.actions import ActionDict
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 if TYPE_CHECKING:
     from dataclasses import replace as replace

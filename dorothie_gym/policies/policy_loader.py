@@ -13,16 +13,17 @@ from typing import Final, TypeAlias
 
 from dorothie_gym.errors import MAX_SHOWN, InputFileError, PolicyLoadError, did_you_mean, short_repr
 from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
-from dorothie_gym.policies.co_wizard import ScriptedCoWizard
-from dorothie_gym.policies.language_model import LanguageModelConfig, LanguageModelPolicy
-from dorothie_gym.policies.participant import ScriptedParticipant
+from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard
+from dorothie_gym.policies.language_model.config import LanguageModelConfig
+from dorothie_gym.policies.language_model.policy import LanguageModelPolicy
+from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy
 from dorothie_gym.policies.pretrained import check_fits, is_pretrained, names_for, pretrained_folder
 from dorothie_gym.policies.trivial import LaneFollowPolicy, RandomPolicy, SilentPolicy
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.spaces.limits import SpaceLimits
 
 POLICY_NAMES = ("scripted", "silent", "random")
 """Names that `make_policy` accepts for every role."""

@@ -12,7 +12,7 @@ from typing import Final
 
 from dorothie_gym.errors import PolicyLoadError
 from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 
 PREFIX: Final = "pretrained:"
 """First part of the names of shipped models."""
@@ -127,7 +127,7 @@ def pretrained_size(name: str) -> int:
 def check_fits(name: str) -> None:
     """Raises `PolicyLoadError` if a shipped driver was trained with other observations than this version makes."""
     # imported here: the list of names is needed without the simulation
-    from dorothie_gym.policies.navigation import FIELDS
+    from dorothie_gym.policies.navigation.observation_vector import FIELDS
 
     trained = pretrained_card(name).observation
     if trained is None or list(trained.items()) == list(FIELDS.items()):

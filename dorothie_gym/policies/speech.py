@@ -12,23 +12,20 @@ from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
-from dorothie_gym.dialogue import (
-    CommunicativeFunction,
-    Intention,
-    Predicate,
-    Proposition,
-    SpeakerStyle,
-    Wording,
-    WordingContext,
-    word_acts,
-)
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import DialogueAct, DialogueMove, Role, SlotValue
+from dorothie_gym.dialogue.intentions import CommunicativeFunction, Intention
+from dorothie_gym.dialogue.nlg import word_acts
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording, WordingContext
+from dorothie_gym.dialogue.speaker_style import SpeakerStyle
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import SlotValue
 from dorothie_gym.policies.delivery import Delivery
 from dorothie_gym.policies.mood import Happening, Mood
 from dorothie_gym.policies.persona import Persona
 from dorothie_gym.policies.policy import DECISION_INTERVAL, DecisionClock, replace
-from dorothie_gym.spaces import Speech
+from dorothie_gym.spaces.actions import Speech
 
 LONGEST_BREATH = 3
 """Largest number of acts that are worded together."""

@@ -7,12 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 
 from dorothie_gym import portable_math as pm
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import ExceptionKind
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal, read_landmarks, read_subgoals
-from dorothie_gym.spaces import AdWizardAction, ObservationMapping
+from dorothie_gym.spaces.actions import AdWizardAction
 from dorothie_gym.spaces.limits import MESSAGE_LENGTH
-from dorothie_gym.tasks import is_shipped_story
+from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.tasks.parsing import is_shipped_story
 from dorothie_gym.tasks.storyboard import BECAUSE
 
 PRESSING_DISTANCE = 150.0

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import LaneEntry, Place
+from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, RouteJunction, RouteProgress, lanes_beside
 from dorothie_gym.policies.route_tables import default_successor, is_choice

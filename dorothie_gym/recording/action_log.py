@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.recording.file_names import ACTIONS_FILE, MAX_EVENTS, MAX_FRAME
 from dorothie_gym.recording.json_io import Fields, canonical, from_line, read_lines, to_line
 

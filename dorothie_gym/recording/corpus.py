@@ -13,13 +13,16 @@ from typing import Final, Self, TypedDict
 
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.files import write_atomically
-from dorothie_gym.ontology import ExceptionKind, parse_exception
+from dorothie_gym.ontology.spellings import parse_exception
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.recording.events import Event, EventType, decode_event
 from dorothie_gym.recording.export import export_tables
 from dorothie_gym.recording.file_names import EVENTS_FILE, HEADER_FILE
 from dorothie_gym.recording.header import parse_version
 from dorothie_gym.recording.json_io import decode_text, read_bytes, read_object, to_page
-from dorothie_gym.recording.sdn import SignVote, detect_layout, read_sdn, settle_sign
+from dorothie_gym.recording.sdn.files import detect_layout
+from dorothie_gym.recording.sdn.reader import read_sdn, settle_sign
+from dorothie_gym.recording.sdn.turn_angles import SignVote
 from dorothie_gym.recording.session import Session, read_session_file
 
 # --- Folds -----------------------------------------------------------------------------------------------------------

@@ -7,9 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from dorothie_gym.dialogue import Proposition, read_meaning
+from dorothie_gym.dialogue.propositions import Proposition, read_meaning
 from dorothie_gym.errors import OntologyError, SessionError, short_repr
-from dorothie_gym.ontology import DialogueAct, ObjectClass, PhysicalAction, Role, parse_act, parse_physical_action
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.spellings import parse_act, parse_physical_action
 from dorothie_gym.recording.file_names import MAX_FRAME
 from dorothie_gym.recording.json_io import Fields, canonical, canonical_object, from_line, to_line
 from dorothie_gym.sim.config import FRAME_RATE

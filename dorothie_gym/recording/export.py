@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.files import replacing
-from dorothie_gym.ontology import VECTOR_SLOTS, Role
+from dorothie_gym.ontology.dialogue_acts import VECTOR_SLOTS
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.recording.points import PointView, history_angle, nfd_points
 from dorothie_gym.recording.session import Session
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Final, NotRequired, TypedDict
 
 from dorothie_gym import __version__
-from dorothie_gym.errors import SessionError, short_repr
+from dorothie_gym.errors import OntologyError, SessionError, short_repr
 from dorothie_gym.files import JsonValue
-from dorothie_gym.ontology import OntologyError, parse_landmark, parse_street
+from dorothie_gym.ontology.spellings import parse_landmark, parse_street
 from dorothie_gym.recording.json_io import Fields, canonical, canonical_object
 from dorothie_gym.recording.trajectory import NO_LANE
 

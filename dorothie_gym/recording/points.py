@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.copying import shared
-from dorothie_gym.ontology import NAVIGATION_ACTIONS, U_TURN_ANGLE, ArgumentKind, DialogueAct, PhysicalAction, Role
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, U_TURN_ANGLE, ArgumentKind, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.recording.events import ActionRecord, Event, EventType, MoveRecord, UtteranceRecord
 from dorothie_gym.recording.header import LandmarkRow
 from dorothie_gym.recording.session import Session

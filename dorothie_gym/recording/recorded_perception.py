@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from dorothie_gym import portable_arrays as pn
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import PhysicalAction, WeatherParameter
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.surroundings import SceneTable, Surroundings
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT

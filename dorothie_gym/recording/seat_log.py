@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.recording.file_names import MAX_EVENTS, MAX_FRAME, SEATS_FILE
 from dorothie_gym.recording.json_io import Fields, canonical_object, from_line, read_lines, to_line
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dorothie_gym.copying import shared
 from dorothie_gym.errors import SessionError
 from dorothie_gym.files import new_folder, write_atomically
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.recording.action_log import Decision, encode_decision, read_decisions
 from dorothie_gym.recording.events import (
     INFRACTIONS,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, TypedDict
 
 import numpy as np
 
-from dorothie_gym.ontology import ArgumentKind
+from dorothie_gym.ontology.actions import ArgumentKind
 from dorothie_gym.recording.events import EventType, MoveRecord
 from dorothie_gym.recording.header import NATIVE, is_newer
 

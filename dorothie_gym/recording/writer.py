@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from dorothie_gym.errors import OutputFolderError, SessionError
 from dorothie_gym.files import PART, make_folder, sync, write_atomically
-from dorothie_gym.maps import LightColour
-from dorothie_gym.ontology import Role, WeatherParameter
+from dorothie_gym.maps.traffic_lights import LightColour
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.recording.action_log import Decision, encode_decision
 from dorothie_gym.recording.events import Event, encode_event
 from dorothie_gym.recording.file_names import (

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym import portable_arrays as pn
-from dorothie_gym.ontology import WeatherParameter
-from dorothie_gym.rendering import MapPainter, palette
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
+from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.figures import (
     PIN_LENGTH,
     Canvas,
@@ -28,7 +28,7 @@ from dorothie_gym.rendering.figures import (
 )
 from dorothie_gym.rendering.scene import Pin, Scene
 from dorothie_gym.rendering.text import font
-from dorothie_gym.rendering.town_map import draw_scale_bar
+from dorothie_gym.rendering.town_map import MapPainter, draw_scale_bar
 
 if TYPE_CHECKING:
     import pygame

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from dorothie_gym.ontology import parse_landmark
-from dorothie_gym.tasks import map_label
+from dorothie_gym.ontology.spellings import parse_landmark
+from dorothie_gym.tasks.catalogue import map_label
 
 
 def exception_words(data: Mapping[str, Any]) -> str:

@@ -8,14 +8,21 @@ from typing import Final
 
 import numpy as np
 
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import DialogueAct, PhysicalAction, Role, parse_landmark
-from dorothie_gym.recording import FRAME_RATE, ActorKind, EventType, Session
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.spellings import parse_landmark
 from dorothie_gym.recording.actor_tracks import ActorTracks
+from dorothie_gym.recording.events import EventType
 from dorothie_gym.recording.header import LandmarkRow
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.surroundings import ActorKind
 from dorothie_gym.rendering.exception_words import exception_words
 from dorothie_gym.rendering.scene import Actor, CarView, ExceptionMark, FigureKind, Pin, Scene, SpokenLine, SubgoalState
-from dorothie_gym.tasks import map_labels, with_reason
+from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.tasks.catalogue import map_labels
+from dorothie_gym.tasks.storyboard import with_reason
 
 _KINDS: Final[dict[int, FigureKind]] = {
     int(ActorKind.VEHICLE): "vehicle",

@@ -10,8 +10,9 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import GoalStatus, Role
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import GoalStatus
 
 FigureKind: TypeAlias = Literal["vehicle", "cyclist", "pedestrian", "prop"]
 SubgoalState: TypeAlias = Literal["none", "pending", "ongoing", "complete", "abandoned"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.palette import Colour
 from dorothie_gym.rendering.panel import Pen

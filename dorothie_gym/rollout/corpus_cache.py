@@ -17,7 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from dorothie_gym._version import __version__
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import CacheError
-from dorothie_gym.recording import FORMAT_VERSION
+from dorothie_gym.recording.header import FORMAT_VERSION
 from dorothie_gym.rollout.corpus_generation import generate_corpus
 from dorothie_gym.user_cache import CACHE_VARIABLE, cache_folder, is_private, is_sealed, remove, report_damage, seal
 

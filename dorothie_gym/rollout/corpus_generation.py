@@ -10,10 +10,11 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
-from dorothie_gym.policies import ALL_SCRIPTED
-from dorothie_gym.recording import FOLDS, PAPER_FOLDS, Fold, SessionState, manifest_row, session_state, write_manifest
-from dorothie_gym.recording.corpus import ManifestRow
+from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED
+from dorothie_gym.recording.corpus import FOLDS, PAPER_FOLDS, Fold, ManifestRow, manifest_row, write_manifest
+from dorothie_gym.recording.file_names import SessionState
+from dorothie_gym.recording.session import session_state
 from dorothie_gym.rollout.runner import PlayedSession, SessionJob, run_sessions
 
 PAPER_SESSIONS: Final = sum(PAPER_FOLDS.values())

@@ -15,7 +15,7 @@ from dorothie_gym._version import __version__
 from dorothie_gym.errors import SessionError, short_repr
 from dorothie_gym.files import PART, noticing_deletion, write_atomically
 from dorothie_gym.input_files import MAX_SMALL_JSON, raising, read_json
-from dorothie_gym.recording import FORMAT_VERSION
+from dorothie_gym.recording.header import FORMAT_VERSION
 
 if sys.platform != "win32":
     import fcntl

@@ -25,11 +25,14 @@ from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.copying import shared
 from dorothie_gym.errors import SessionError
 from dorothie_gym.files import PART, write_atomically
-from dorothie_gym.ontology import LandmarkName, ObjectClass, parse_landmark
-from dorothie_gym.recording import FRAME_RATE, Corpus, CorpusEntry, Session
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
+from dorothie_gym.ontology.spellings import parse_landmark
+from dorothie_gym.recording.corpus import Corpus, CorpusEntry
 from dorothie_gym.recording.sdn.writer import first_frame_of
+from dorothie_gym.recording.session import Session
 from dorothie_gym.rollout.processes import run_tasks
 from dorothie_gym.rollout.replay import ReplaySources
+from dorothie_gym.sim.config import FRAME_RATE
 
 Page: TypeAlias = dict[str, Any]
 """Object of JSON."""

@@ -18,9 +18,11 @@ import pyarrow.parquet as pq
 from dorothie_gym._version import __version__
 from dorothie_gym.errors import SessionError
 from dorothie_gym.files import new_folder, write_atomically
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.rollout.role_episodes import RoleEpisode, distinct_ids
-from dorothie_gym.spaces import SpaceLimits, action_fields, observation_fields
+from dorothie_gym.spaces.actions import action_fields
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import observation_fields
 
 _PARQUET: Final = "data/train-00000-of-00001.parquet"
 """File of the decisions in a folder for Hugging Face, where `datasets.load_dataset` finds it."""

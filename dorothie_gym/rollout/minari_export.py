@@ -24,11 +24,12 @@ from gymnasium.envs.registration import EnvSpec, WrapperSpec
 from dorothie_gym._version import __version__
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps import town_names
-from dorothie_gym.ontology import Role
+from dorothie_gym.maps.catalogue import town_names
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.rollout.hugging_face_export import dataset_card
 from dorothie_gym.rollout.role_episodes import RoleEpisode
-from dorothie_gym.spaces import AnySpace, noop
+from dorothie_gym.spaces.actions import noop
+from dorothie_gym.spaces.fields import AnySpace
 from dorothie_gym.spaces.flat import FlatActions, FlatObservations
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from dorothie_gym.errors import ProcessError
-from dorothie_gym.recording import SessionState, session_state
+from dorothie_gym.recording.file_names import SessionState
+from dorothie_gym.recording.session import session_state
 from dorothie_gym.rollout.folder import PARTS_FOLDER, PlannedSession
 
 Plan = TypeVar("Plan", bound=PlannedSession)

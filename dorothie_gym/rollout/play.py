@@ -12,11 +12,12 @@ from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.files import noticing_deletion, write_atomically
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.recording import SessionHeader, SessionWriter
+from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.recording.json_io import to_page
-from dorothie_gym.spaces import ActionMapping
+from dorothie_gym.recording.writer import SessionWriter
+from dorothie_gym.spaces.actions import ActionMapping
 
 PERSONAS: Final = "personas"
 """Field of a header with the personas of the scripted speakers, by role; see `dorothie_gym.policies.persona`."""

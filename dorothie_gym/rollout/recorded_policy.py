@@ -6,12 +6,14 @@ from collections.abc import Mapping
 
 from dorothie_gym.engine.recorder import expand, idle_actions
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import Policy
-from dorothie_gym.recording import Session
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.policy import Policy
+from dorothie_gym.recording.session import Session
 from dorothie_gym.rollout.play import PERSONAS
-from dorothie_gym.spaces import ActionDict, ObservationMapping, SpaceLimits
+from dorothie_gym.spaces.actions import ActionDict
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 
 class RecordedPolicy(Policy[int]):

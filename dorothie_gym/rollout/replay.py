@@ -18,24 +18,22 @@ from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError, StoryboardError, TownError
 from dorothie_gym.input_files import checked, raising
-from dorothie_gym.maps import Town, load_town
-from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.ontology import Role
-from dorothie_gym.recording import (
-    CorpusEntry,
-    Difference,
-    EndReason,
-    EventType,
-    Session,
-    SessionHeader,
-    SessionWriter,
-    first_difference,
-)
+from dorothie_gym.maps.catalogue import find_town, load_town
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.recording.comparison import Difference, first_difference
+from dorothie_gym.recording.corpus import CorpusEntry
+from dorothie_gym.recording.events import EndReason, EventType
+from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.writer import SessionWriter
 from dorothie_gym.rollout.play import PERSONAS, pitches_of
 from dorothie_gym.rollout.processes import run_tasks
-from dorothie_gym.spaces import ActionDict, Observation
+from dorothie_gym.spaces.actions import ActionDict
+from dorothie_gym.spaces.observations import Observation
 from dorothie_gym.speech.synthesizer import HIGHEST_PITCH, LOWEST_PITCH
-from dorothie_gym.tasks import StoryboardTemplate, load_template, template_names
+from dorothie_gym.tasks.parsing import load_template, template_names
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 Observations: TypeAlias = Mapping[str, Observation]
 """Observation of each agent."""

@@ -17,10 +17,12 @@ from dorothie_gym.copying import digest_of
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.masks import RoleMask
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import Role
-from dorothie_gym.recording import CorpusEntry
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.recording.corpus import CorpusEntry
 from dorothie_gym.rollout.replay import ReplaySources, begin_replay, recorded_actions
-from dorothie_gym.spaces import ActionDict, Observation, SpaceLimits, action_space
+from dorothie_gym.spaces.actions import ActionDict, action_space
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import Observation
 
 _ID_LENGTH: Final = 16
 """Hexadecimal digits of an id."""

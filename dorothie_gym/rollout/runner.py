@@ -20,11 +20,12 @@ from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import InputFileError, OutputFolderError, SessionError
 from dorothie_gym.files import write_atomically
 from dorothie_gym.input_files import MAX_SMALL_JSON, checked, read_json
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import Player
-from dorothie_gym.recording import Session, SessionState, session_state
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.policy_loader import Player
+from dorothie_gym.recording.file_names import SessionState
 from dorothie_gym.recording.json_io import to_page
+from dorothie_gym.recording.session import Session, session_state
 from dorothie_gym.rollout.folder import PARTS_FOLDER, PlannedSession, locked_folder
 from dorothie_gym.rollout.on_ray import run_on_ray
 from dorothie_gym.rollout.play import play_session

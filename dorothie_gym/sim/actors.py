@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from dorothie_gym.copying import Lookups
-from dorothie_gym.ontology import PropKind
+from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.bodies import Bodies, Pedestrian, Prop, TrafficVehicle
 from dorothie_gym.sim.population import (
     SPEEDS,

@@ -22,7 +22,7 @@ from highway_env.vehicle.objects import Obstacle, RoadObject
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.records import record_dtype
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import PropKind
+from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.network.lane import PolylineLane
 from dorothie_gym.sim.network.network import LaneIndex, Route
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.codes import EventCode

@@ -13,7 +13,7 @@ from dorothie_gym.compilation.records import RecordArray, empty_records, plain
 from dorothie_gym.maps.lane_neighbours import rightmost
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology import PropKind
+from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import closest_walk, place_beside
 from dorothie_gym.sim.pedestrians.pacing import KERB, WALKING_SPEED

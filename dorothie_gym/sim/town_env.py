@@ -30,7 +30,7 @@ from dorothie_gym.action_values import real_numbers, whole_number
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps import load_town
+from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.network.network import LARGEST_COORDINATE, TownNetwork
 from dorothie_gym.sim.population import free_places, populate

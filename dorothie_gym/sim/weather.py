@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from dorothie_gym import portable_math as pm
-from dorothie_gym.ontology import WeatherParameter
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.sim.sensing.visibility import (
     CLOUDBURST,
     HEAD_LIGHTS,

@@ -14,7 +14,8 @@ from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups, Restorable
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.batch.threads import turns_of
 from dorothie_gym.sim.batch.worlds import alone, step_share

@@ -15,23 +15,12 @@ import numpy as np
 from gymnasium import spaces
 
 from dorothie_gym.copying import shared
-from dorothie_gym.dialogue import Proposition, encode_meaning, find_meaning
-from dorothie_gym.ontology import (
-    LABELS,
-    DialogueAct,
-    DialogueMove,
-    ExceptionKind,
-    GoalStatus,
-    LandmarkName,
-    MentalAction,
-    PhysicalAction,
-    PropKind,
-    Role,
-    Sensor,
-    WeatherParameter,
-    decode_slots,
-    encode_slots,
-)
+from dorothie_gym.dialogue.propositions import Proposition, encode_meaning, find_meaning
+from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueAct, DialogueMove, decode_slots, encode_slots
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.spaces.action_reader import ActionFieldTable, ActionReader
 from dorothie_gym.spaces.fields import FieldSpec, choice, choices, dict_space, flags, text
 from dorothie_gym.spaces.limits import (

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from dorothie_gym.copying import shared
-from dorothie_gym.maps import Town
+from dorothie_gym.maps.town import Town
 from dorothie_gym.tasks.storyboard import MESSAGE_LENGTH as MESSAGE_LENGTH
 
 TEXT_CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " \n"

@@ -15,25 +15,17 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.ontology import (
-    LABELS,
-    DialogueAct,
-    DialogueMove,
-    LandmarkName,
-    ObjectClass,
-    PhysicalAction,
-    Role,
-    Sensor,
-    StreetName,
-    WeatherParameter,
-    decode_slots,
-)
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueAct, DialogueMove, decode_slots
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.spaces.actions import NO_MOVE
 from dorothie_gym.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
 from dorothie_gym.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, UTTERANCE_LENGTH, SpaceLimits
-from dorothie_gym.tasks import TaskMessages
+from dorothie_gym.tasks.storyboard import TaskMessages
 
 Observation: TypeAlias = dict[str, Any]
 """Observation dict of one role: values by field name, as specified by `observation_fields`."""

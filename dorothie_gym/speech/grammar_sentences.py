@@ -14,21 +14,17 @@ from typing import Final
 
 import numpy as np
 
-from dorothie_gym.dialogue import Direction, Wording, WordingContext, draw_style, load_lexicon, word_act
 from dorothie_gym.dialogue.grammar import load_grammar
+from dorothie_gym.dialogue.lexicon import load_lexicon
+from dorothie_gym.dialogue.nlg import word_act
+from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
+from dorothie_gym.dialogue.speaker_style import draw_style
 from dorothie_gym.errors import SpeechError
-from dorothie_gym.ontology import (
-    SLOT_VALUES,
-    DialogueAct,
-    DialogueMove,
-    LandmarkName,
-    Role,
-    Slot,
-    SlotValue,
-    StreetName,
-)
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import SLOT_VALUES, LandmarkName, Slot, SlotValue, StreetName
 from dorothie_gym.speech.spoken_form import spoken_words
-from dorothie_gym.tasks import load_template, template_names
+from dorothie_gym.tasks.parsing import load_template, template_names
 
 TRANSCRIPTS_FILE: Final = "transcripts.txt.gz"
 """Utterances of sessions, one per line, spans separated by " | "; written by `benchmarks/speech_transcripts.py`."""

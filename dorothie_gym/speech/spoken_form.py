@@ -7,10 +7,11 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from dorothie_gym.dialogue import INAUDIBLE, load_lexicon
+from dorothie_gym.dialogue.conversation import INAUDIBLE
+from dorothie_gym.dialogue.lexicon import load_lexicon
 from dorothie_gym.dialogue.numerals import cardinal, read_ordinal
 from dorothie_gym.dialogue.numerals import ordinal as ordinal_word
-from dorothie_gym.ontology import Slot
+from dorothie_gym.ontology.slots import Slot
 
 _TOKEN: Final = re.compile(r"[A-Za-z][A-Za-z']*|\d+(?:st|nd|rd|th)\b|\d+|[.,?!;:\u2026]")
 _MARKS: Final = {"!": ".", ";": ",", ":": ",", "\u2026": "."}

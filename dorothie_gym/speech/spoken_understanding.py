@@ -9,8 +9,10 @@ from itertools import groupby
 from typing import Final
 
 from dorothie_gym.copying import shared
-from dorothie_gym.dialogue import INAUDIBLE, guess_act
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, SlotValue
+from dorothie_gym.dialogue.conversation import INAUDIBLE
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, SlotValue
 from dorothie_gym.speech.language import punctuation_model
 from dorothie_gym.speech.recognizer import Recognition, RecognizedWord
 from dorothie_gym.speech.spoken_form import written_form

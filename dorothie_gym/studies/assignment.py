@@ -13,7 +13,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.studies.study import Method, Scenario, Study
 
 _T = TypeVar("_T")

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 from dorothie_gym.files import replacing, write_atomically
-from dorothie_gym.recording import Session, SessionState, session_state
+from dorothie_gym.recording.file_names import SessionState
+from dorothie_gym.recording.session import Session, session_state
 from dorothie_gym.recording.sound import audio_files
 from dorothie_gym.studies.folder import check_folder
 from dorothie_gym.studies.record_types import SESSIONS_FOLDER, STUDY_FILE

@@ -13,8 +13,9 @@ from dorothie_gym.console.config import AfterAbsence
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.seat import RoomState
 from dorothie_gym.console.server import Console
-from dorothie_gym.ontology import Role
-from dorothie_gym.recording import EndReason, SessionState
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.recording.events import EndReason
+from dorothie_gym.recording.file_names import SessionState
 from dorothie_gym.studies.erasure import remove_attempts
 from dorothie_gym.studies.record_types import SessionRow
 from dorothie_gym.studies.records import StudyRecords

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from dorothie_gym.recording import EndReason
+from dorothie_gym.recording.events import EndReason
 from dorothie_gym.studies.assignment import Assigner
 from dorothie_gym.studies.erasure import erase_from_data, finish_erasures
 from dorothie_gym.studies.items import Answer, check_answers

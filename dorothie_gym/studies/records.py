@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Final
 
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.studies.assignment import Slot
 from dorothie_gym.studies.database import Database
 from dorothie_gym.studies.items import Answer

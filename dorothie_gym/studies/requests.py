@@ -8,7 +8,7 @@ import msgspec
 from msgspec import Meta, Struct
 from starlette.requests import ClientDisconnect, Request
 
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.studies.items import MAX_TEXT
 from dorothie_gym.studies.stages import Stage
 

@@ -13,14 +13,15 @@ from dorothie_gym.console.room import Room
 from dorothie_gym.console.seating import plan_seat
 from dorothie_gym.console.town_page import town_page
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.maps import load_town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.recording import Session, SessionState, session_state
+from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.recording.file_names import SessionState
+from dorothie_gym.recording.session import Session, session_state
 from dorothie_gym.rollout.replay import begin_replay
 from dorothie_gym.studies.record_types import SESSIONS_FOLDER, SessionRow
 from dorothie_gym.studies.study import HUMAN, Scenario, Study
 from dorothie_gym.studies.study_file import sources
-from dorothie_gym.tasks import load_template
+from dorothie_gym.tasks.parsing import load_template
 
 logger = logging.getLogger(__name__)
 

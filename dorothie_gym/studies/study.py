@@ -9,7 +9,7 @@ from typing import Annotated, TypeAlias
 from msgspec import Meta, Struct, field
 
 from dorothie_gym.console.config import AfterAbsence, WhileAway
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.studies.items import Identifier, Item, Label
 
 Prose: TypeAlias = Annotated[str, Meta(min_length=1, max_length=20_000)]

@@ -14,11 +14,11 @@ import yaml
 from dorothie_gym.console.seating import Occupancy, plan_seat
 from dorothie_gym.errors import DorothieGymError, InputFileError, PolicyLoadError, one_line, short_repr
 from dorothie_gym.input_files import read_text
-from dorothie_gym.maps import load_town
+from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.studies.expectations import explain
 from dorothie_gym.studies.items import Choice, Number
 from dorothie_gym.studies.study import HUMAN, Method, Scenario, Study
-from dorothie_gym.tasks import load_template
+from dorothie_gym.tasks.parsing import load_template
 
 MAX_STUDY: Final = 1_000_000
 """Largest study file [bytes]."""

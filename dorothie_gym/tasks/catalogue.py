@@ -11,7 +11,8 @@ from importlib import resources
 import yaml
 
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology import LandmarkName, Slot, parse_slot_value
+from dorothie_gym.ontology.slots import LandmarkName, Slot
+from dorothie_gym.ontology.spellings import parse_slot_value
 
 DATA_FILE = "data/landmarks.yaml"
 _NOT_A_PLACE = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)

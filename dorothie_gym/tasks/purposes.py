@@ -14,7 +14,7 @@ from importlib import resources
 
 import yaml
 
-from dorothie_gym.ontology import LandmarkName, StreetName
+from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.tasks.catalogue import catalogue
 from dorothie_gym.tasks.storyboard import Channel
 

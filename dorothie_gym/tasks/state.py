@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dorothie_gym.errors import StoryboardError
-from dorothie_gym.ontology import GoalStatus
+from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.tasks.storyboard import Storyboard, with_reason
 
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass, fields
 from typing import Protocol
 
 from dorothie_gym.copying import shared
-from dorothie_gym.ontology import ExceptionKind, LandmarkName
+from dorothie_gym.ontology.slots import LandmarkName
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 
 MESSAGE_LENGTH = 240
 """Greatest length of a message of the Ad-Wizard [characters]."""

@@ -11,7 +11,6 @@ def test_my_policy() -> None:
 ```
 """
 
-from dorothie_gym.testing.checks import check_policy, check_session, check_town
-from dorothie_gym.testing.leaks import check_observations_do_not_leak
+import lazy_loader
 
-__all__ = ["check_observations_do_not_leak", "check_policy", "check_session", "check_town"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

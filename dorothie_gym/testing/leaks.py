@@ -16,10 +16,10 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.pictures import FIELDS, OBSERVERS, camera_of
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
-from dorothie_gym.spaces import noop
-from dorothie_gym.tasks import TaskMessages
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.spaces.actions import noop
+from dorothie_gym.tasks.storyboard import TaskMessages
 from dorothie_gym.testing.playing import (
     ByAgent,
     Decision,

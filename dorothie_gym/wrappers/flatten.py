@@ -13,7 +13,8 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from dorothie_gym.action_values import whole_numbers
-from dorothie_gym.spaces import AnySpace, StepInfo
+from dorothie_gym.spaces.actions import StepInfo
+from dorothie_gym.spaces.fields import AnySpace
 from dorothie_gym.spaces.flat import Flat, FlatActions, FlatMask, FlatObservations, Unflattened
 
 AnyEnv: TypeAlias = gym.Env[Any, Any]

@@ -13,8 +13,11 @@ from pettingzoo.utils import BaseParallelWrapper
 
 from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.recording import Event, SessionHeader, SessionWriter
-from dorothie_gym.spaces import ActionDict, Observation, StepInfo
+from dorothie_gym.recording.events import Event
+from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.recording.writer import SessionWriter
+from dorothie_gym.spaces.actions import ActionDict, StepInfo
+from dorothie_gym.spaces.observations import Observation
 
 ResetResult: TypeAlias = tuple[dict[str, Observation], dict[str, StepInfo]]
 StepResult: TypeAlias = tuple[

@@ -14,13 +14,18 @@ from dorothie_gym.engine.recorder import LightStates, actors_around
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError, StateError
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import make_policy
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
-from dorothie_gym.recording import Event, Point, SceneTable, Session, Surroundings, Task, task_points, trajectory_of
-from dorothie_gym.recording.surroundings import Rows, light_rows, weather_rows
-from dorothie_gym.spaces import SpaceLimits, StepInfo
+from dorothie_gym.policies.policy_loader import make_policy
+from dorothie_gym.recording.events import Event
+from dorothie_gym.recording.points import Point, task_points
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.surroundings import Rows, SceneTable, Surroundings, light_rows, weather_rows
+from dorothie_gym.recording.trajectory import trajectory_of
+from dorothie_gym.recording.visibility import Task
+from dorothie_gym.spaces.actions import StepInfo
+from dorothie_gym.spaces.limits import SpaceLimits
 
 MAX_SILENT_SESSIONS = 20
 """Largest number of consecutive sessions without a point of the task before an error is raised."""

@@ -19,7 +19,8 @@ from dorothie_gym.ontology import (
     SlotValue,
     StreetName,
 )
-from dorothie_gym.recording import FRAME_RATE, Event, EventType, Session
+from dorothie_gym.recording import Event, EventType, Session
+from dorothie_gym.sim.config import FRAME_RATE
 from tests.recording.builders import physical, session
 
 M, A, OBJ, S = DialogueMove, ActionValue, ObjectClass, GoalStatus

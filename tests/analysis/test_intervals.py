@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dorothie_gym.benchmark import Estimate
+from dorothie_gym.analysis.intervals import Estimate
 
 
 def test_half_width_by_hand() -> None:

@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from dorothie_gym.benchmark import COLUMNS, Estimate, ModelVerdict, above, findings, paper_figures
+from dorothie_gym.analysis.intervals import Estimate
+from dorothie_gym.benchmark import COLUMNS, ModelVerdict, above, findings, paper_figures
 from dorothie_gym.benchmark.paper_comparison import (
     FULL,
     NO_HISTORY,

@@ -7,7 +7,8 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import ObjectClass, Role
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.spaces import ExitColumn, Motion, ObjectColumn, noop
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces import ExitColumn, ObjectColumn, noop
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,8 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies import ScriptedCoWizard
 from dorothie_gym.policies.co_wizard.state import Wish
-from dorothie_gym.spaces import NO_MOVE, CoWizardAction, Motion, ParticipantAction, Speech, noop
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces import NO_MOVE, CoWizardAction, ParticipantAction, Speech, noop
 
 
 class Talk:

@@ -18,7 +18,7 @@ from dorothie_gym.policies.participant.hints import hint, is_in_mind
 from dorothie_gym.policies.participant.messages import message_remark
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.speech import remark
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 from tests.policies.said import with_words
 from tests.policies.test_co_wizard import Talk
 from tests.policies.test_reasons import DRIVING, on_the_way, view_of

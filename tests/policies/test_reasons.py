@@ -10,7 +10,7 @@ from dorothie_gym.policies.co_wizard.answers import answer_open
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest
 from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 from tests.policies.test_co_wizard import Talk
 
 M = DialogueMove

@@ -11,7 +11,8 @@ from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role
 from dorothie_gym.policies import LaneFollowPolicy, make_policy
 from dorothie_gym.rollout import play_session
-from dorothie_gym.spaces import ExitColumn, Motion, SpaceLimits, decode_action
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces import ExitColumn, SpaceLimits, decode_action
 
 
 def decide(motion: Motion, *angles: float) -> Any:

@@ -10,15 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.ontology import DialogueAct, PhysicalAction, Role
-from dorothie_gym.recording import (
-    FRAME_RATE,
-    Event,
-    EventType,
-    Session,
-    SessionHeader,
-    SessionWriter,
-    trajectory_of,
-)
+from dorothie_gym.recording import Event, EventType, Session, SessionHeader, SessionWriter, trajectory_of
+from dorothie_gym.sim.config import FRAME_RATE
 
 
 def header(**changes: Any) -> SessionHeader:

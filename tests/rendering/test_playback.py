@@ -13,8 +13,9 @@ from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import make_policy
 from dorothie_gym.recording import Session, read_session
+from dorothie_gym.rendering.playback import Playback
 from dorothie_gym.rendering.scene import Scene
-from dorothie_gym.rollout import Playback, play_session
+from dorothie_gym.rollout import play_session
 from tests.recording.sdn.builders import release
 
 TOWN = load_town("brookside")

@@ -14,8 +14,9 @@ from dorothie_gym.analysis.talk.truth import agrees, is_right_cause, is_true
 from dorothie_gym.dialogue import ASKED, Direction, Predicate, Proposition
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import ActionValue, GoalStatus, LandmarkName, ObjectClass, PhysicalAction, Role, StreetName
-from dorothie_gym.recording import FRAME_RATE, ActionRecord, EventType
+from dorothie_gym.recording import ActionRecord, EventType
 from dorothie_gym.recording.header import LandmarkRow
+from dorothie_gym.sim.config import FRAME_RATE
 from tests.analysis.builders import M, car, drive, human
 from tests.benchmark.features.played import play
 

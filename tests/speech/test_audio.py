@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from dorothie_gym.speech import AudioError, checked_samples, encode_flac, encode_wav, read_audio, resample
+from dorothie_gym.errors import AudioError
+from dorothie_gym.speech import checked_samples, encode_flac, encode_wav, read_audio, resample
 from dorothie_gym.speech.audio import trimmed
 
 

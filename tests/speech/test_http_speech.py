@@ -10,7 +10,8 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import numpy as np
 import pytest
 
-from dorothie_gym.speech import HttpRecognizer, HttpSynthesizer, SpeechError, find_recognizer, find_synthesizer, say
+from dorothie_gym.errors import SpeechError
+from dorothie_gym.speech import HttpRecognizer, HttpSynthesizer, find_recognizer, find_synthesizer, say
 
 
 class Handler(BaseHTTPRequestHandler):

@@ -14,14 +14,13 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import is_partly_inaudible
+from dorothie_gym.dialogue.conversation import INAUDIBLE
+from dorothie_gym.errors import AudioError, SpeechError
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, StreetName
 from dorothie_gym.speech import (
-    INAUDIBLE,
-    AudioError,
     Hypothesis,
     Recognition,
     RecognizedWord,
-    SpeechError,
     Voice,
     audible,
     find_recognizer,

@@ -7,7 +7,7 @@ from typing import Final
 
 from dorothie_gym.analysis.phenomena import changes, questions, routes
 from dorothie_gym.analysis.phenomena.dialogue_view import DialogueView, Phenomenon, Query, both_speak
-from dorothie_gym.ontology import ExceptionKind
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 
 _TALK = "both sides speak"
 

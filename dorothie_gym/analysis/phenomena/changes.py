@@ -10,16 +10,10 @@ from types import MappingProxyType
 from dorothie_gym.analysis.exception_attribution import OBSTACLES
 from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, DialogueView, Occurrence, Turn, labels
 from dorothie_gym.analysis.phenomena.routes import asks_where_next
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueMove,
-    ExceptionKind,
-    GoalStatus,
-    MentalAction,
-    PhysicalAction,
-    Slot,
-    WeatherParameter,
-)
+from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, WeatherParameter
 from dorothie_gym.recording.events import Event, EventType
 
 M = DialogueMove

@@ -12,21 +12,19 @@ from typing import TypeAlias
 
 from dorothie_gym.analysis.exception_attribution import time_met
 from dorothie_gym.analysis.units import Units, goals_of
-from dorothie_gym.ontology import (
+from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import (
     ActionValue,
-    DialogueAct,
-    DialogueMove,
-    ExceptionKind,
     GoalStatus,
     LandmarkName,
-    MentalAction,
     ObjectClass,
-    PhysicalAction,
-    Role,
     Slot,
     SlotValue,
     StreetName,
 )
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.recording.events import Event, EventType, UtteranceRecord
 from dorothie_gym.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE

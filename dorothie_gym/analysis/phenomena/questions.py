@@ -10,7 +10,9 @@ from dorothie_gym.analysis.diversity import plain, words_of
 from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, DialogueView, Occurrence, Turn
 from dorothie_gym.analysis.phenomena.routes import asks_why
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT, EXPECTATIONS
-from dorothie_gym.ontology import DialogueMove, PhysicalAction, Slot, SlotValue
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import Slot, SlotValue
 from dorothie_gym.recording.events import EventType
 
 M = DialogueMove

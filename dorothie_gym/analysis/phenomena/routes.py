@@ -6,7 +6,9 @@ import re
 from collections.abc import Iterator
 
 from dorothie_gym.analysis.phenomena.dialogue_view import CAR, HUMAN, DialogueView, Occurrence, Turn, asks_for, named
-from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, PhysicalAction, Slot
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, Slot
 
 M = DialogueMove
 

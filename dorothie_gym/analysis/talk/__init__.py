@@ -1,5 +1,5 @@
 """Checks of what is said: truth, reasons, arrival times, answers, exceptions and loops."""
 
-from dorothie_gym.analysis.talk.checks import TalkChecks, talk_checks_of
+import lazy_loader
 
-__all__ = ["TalkChecks", "talk_checks_of"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

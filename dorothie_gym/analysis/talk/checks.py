@@ -15,11 +15,14 @@ from dorothie_gym.analysis.talk.perceivable import perceived_at
 from dorothie_gym.analysis.talk.session_world import SessionWorld
 from dorothie_gym.analysis.talk.truth import agrees, is_true
 from dorothie_gym.analysis.units import Units
-from dorothie_gym.dialogue import ASKED, Predicate, Proposition
-from dorothie_gym.maps import Town
+from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.ontology import DialogueMove, LandmarkName, Slot
-from dorothie_gym.recording import Corpus, EventType, MoveRecord, Session
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import LandmarkName, Slot
+from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.recording.events import EventType, MoveRecord
+from dorothie_gym.recording.session import Session
 from dorothie_gym.tasks.purposes import find_items, read_people
 
 TALKED_ABOUT_WITHIN: Final = 45.0

@@ -9,9 +9,15 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.dialogue import Direction, Predicate, understand
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Role, Slot
-from dorothie_gym.recording import FRAME_RATE, MoveRecord, Session
+from dorothie_gym.dialogue.nlu import understand
+from dorothie_gym.dialogue.propositions import Predicate
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
+from dorothie_gym.recording.events import MoveRecord
+from dorothie_gym.recording.session import Session
+from dorothie_gym.sim.config import FRAME_RATE
 
 SAME_ORDERS: Final = 3
 """Number of equal orders that make a loop."""

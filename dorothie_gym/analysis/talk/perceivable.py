@@ -21,7 +21,8 @@ import numpy as np
 
 from dorothie_gym.analysis.exception_attribution import MEETING_DISTANCE, kind_of, place_of, time_met
 from dorothie_gym.analysis.talk.session_world import ACTORS, SessionWorld
-from dorothie_gym.ontology import ExceptionKind, ObjectClass, Sensor, WeatherParameter
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, Sensor, WeatherParameter
 from dorothie_gym.recording.events import Event
 from dorothie_gym.sim.world import FAULT_SECONDS
 

@@ -9,10 +9,14 @@ from types import MappingProxyType
 from typing import Final
 
 from dorothie_gym.analysis.talk.session_world import SessionWorld
-from dorothie_gym.dialogue import Direction, Predicate, Proposition
-from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName, PhysicalAction, Role
-from dorothie_gym.recording import FRAME_RATE
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName
 from dorothie_gym.recording.events import EventType
+from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.tasks.purposes import in_first_person
 
 CARRIED_OUT_WITHIN: Final = 60.0

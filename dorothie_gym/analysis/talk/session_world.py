@@ -12,23 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place, router
+from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueMove,
-    GoalStatus,
-    LandmarkName,
-    ObjectClass,
-    PhysicalAction,
-    Role,
-    Sensor,
-    WeatherParameter,
-)
-from dorothie_gym.recording import FRAME_RATE, Event, EventType, Session
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
+from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.header import LandmarkRow
+from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.surroundings import ActorKind
+from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import CLARITY, FAULT_SECONDS
 

@@ -8,18 +8,13 @@ from typing import Final
 
 from dorothie_gym.analysis.talk import plans
 from dorothie_gym.analysis.talk.session_world import ACTORS, SessionWorld
-from dorothie_gym.dialogue import Direction, Predicate, Proposition
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.whereabouts import is_near_corner, is_on_right, signals_near
-from dorothie_gym.ontology import (
-    ActionValue,
-    LandmarkName,
-    ObjectClass,
-    Role,
-    Sensor,
-    StreetName,
-    WeatherParameter,
-)
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.recording.header import LandmarkRow
 from dorothie_gym.tasks.landmark_designs import features_of
 

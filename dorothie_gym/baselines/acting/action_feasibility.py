@@ -6,15 +6,16 @@ from dataclasses import dataclass
 from typing import Final
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.dialogue import Direction
-from dorothie_gym.maps import Exit, Town
-from dorothie_gym.maps.model import LinkType
-from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.maps.model import Exit, LinkType
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
 from dorothie_gym.policies.route_legs import SAME_WAY
 from dorothie_gym.policies.route_progress import Choice, direction_of, lanes_beside
-from dorothie_gym.spaces import Motion, Physical
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import Physical
 
 AT_END: Final = 6.0
 """Distance to a junction below which a standing car has no room to drive up to it [m]."""

@@ -15,16 +15,20 @@ import torch
 from dorothie_gym.baselines.acting.history import History
 from dorothie_gym.baselines.checkpoints import ModelCard, restore, sha256_of
 from dorothie_gym.baselines.dataset import Dataset
-from dorothie_gym.baselines.encoders import BytePairs, TextEncoder, Vectors, text_encoder
+from dorothie_gym.baselines.encoders import text_encoder
+from dorothie_gym.baselines.encoders.byte_pairs import BytePairs
+from dorothie_gym.baselines.encoders.encoder import TextEncoder, Vectors
 from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
 from dorothie_gym.baselines.model_zoo import build_model, retell, stored_row
-from dorothie_gym.baselines.toto import TOTO, TOTOConfig
-from dorothie_gym.benchmark.features import Columns, PointTable, points
+from dorothie_gym.baselines.toto.config import TOTOConfig
+from dorothie_gym.baselines.toto.model import TOTO
+from dorothie_gym.benchmark.features.columns import Columns
+from dorothie_gym.benchmark.features.point_table import PointTable, points
 from dorothie_gym.benchmark.features.session_columns import town_graph
 from dorothie_gym.errors import CheckpointError, DorothieGymError, ModelFileError, one_line
 from dorothie_gym.input_files import MAX_WEIGHTS, check_file, raising
-from dorothie_gym.maps import Town
-from dorothie_gym.recording import Task
+from dorothie_gym.maps.town import Town
+from dorothie_gym.recording.visibility import Task
 
 _TOWNS: Final = 4
 """Largest number of towns that a model is kept ready for."""

@@ -16,33 +16,26 @@ from dorothie_gym.baselines.acting.decision_trigger import TriggerState
 from dorothie_gym.baselines.acting.history import History, HistoryTracker
 from dorothie_gym.baselines.acting.inference import BenchmarkModel, TownModel
 from dorothie_gym.baselines.model_io import Predicted
-from dorothie_gym.dialogue import Span, Wording, draw_style, guess_act, guess_spans
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import (
-    LABELS,
-    NAVIGATION_ACTIONS,
-    ActionValue,
-    DialogueAct,
-    DialogueMove,
-    PhysicalAction,
-    Role,
-)
+from dorothie_gym.dialogue.conversation import Span
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_act, guess_spans
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.dialogue.speaker_style import draw_style
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import IN_VIEW
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.route_progress import default_lane_distance
 from dorothie_gym.policies.speech import SpeechState, remark
-from dorothie_gym.recording import Task
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
-from dorothie_gym.spaces import (
-    ActionDict,
-    CoWizardAction,
-    Motion,
-    ObservationMapping,
-    Physical,
-    SpaceLimits,
-    heard_acts,
-)
+from dorothie_gym.recording.visibility import Task
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import ActionDict, CoWizardAction, Physical
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping, heard_acts
 
 _DIRECTION_VALUES: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 """Slot values whose wording contains a direction."""

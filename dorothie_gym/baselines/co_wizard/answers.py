@@ -15,8 +15,10 @@ from dorothie_gym.baselines.co_wizard.beliefs import evidence, seconds_to_goal
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import Memory, seconds_since
 from dorothie_gym.baselines.co_wizard.reasons import why_standing, why_turning_round
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition
-from dorothie_gym.ontology import ActionValue, DialogueMove, ObjectClass, Slot, SlotValue, StreetName
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, ObjectClass, Slot, SlotValue, StreetName
 from dorothie_gym.policies.co_wizard.answers import arrival
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import Remark, intend, repeated

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from typing import Final
 
 from dorothie_gym.baselines.co_wizard.memory import Memory
-from dorothie_gym.dialogue import Predicate, Proposition
-from dorothie_gym.ontology import ObjectClass, Sensor, StreetName
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.ontology.slots import ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.policies.co_wizard.judgement import (
     DETOUR_TIME,
     is_localised,
@@ -22,7 +23,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.sight import camera_fault
 from dorothie_gym.policies.travel_time import travel_time
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 
 LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.18
 """Variances of the position: the car does not know where it is; the position is not measured [m^2]."""

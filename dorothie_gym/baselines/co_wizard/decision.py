@@ -24,15 +24,18 @@ from dorothie_gym.baselines.co_wizard.features import (
 from dorothie_gym.baselines.co_wizard.hearing import KEPT, UTTERANCE_SIZE, Utterance, utterance_vector, word_rows
 from dorothie_gym.baselines.co_wizard.memory import Memory, Update
 from dorothie_gym.baselines.co_wizard.remarks import topic_of
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import ActionValue, DialogueMove, Role, Slot
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import drive_options
 from dorothie_gym.policies.language_model.navigator import RouteStep
 from dorothie_gym.policies.observation_parser import heard_utterance
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.spaces import Mental, ObservationMapping, Physical
+from dorothie_gym.spaces.actions import Mental, Physical
+from dorothie_gym.spaces.observations import ObservationMapping
 
 Vector = NDArray[np.float32]
 

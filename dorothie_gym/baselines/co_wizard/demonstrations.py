@@ -23,16 +23,20 @@ from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard, Turn
 from dorothie_gym.baselines.co_wizard.remarks import sources
 from dorothie_gym.baselines.co_wizard.teacher import CALM, Lesson, Teacher
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import DialogueMove, Role
-from dorothie_gym.policies import ScriptedAdWizard, ScriptedParticipant
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
+from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed, replace
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.recording import Session
 from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.recording.session import Session
 from dorothie_gym.rollout.replay import begin_replay, recorded_actions
-from dorothie_gym.spaces import CoWizardAction, ObservationMapping, Physical, SpaceLimits
+from dorothie_gym.spaces.actions import CoWizardAction, Physical
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 CO_WIZARD: Final = Role.CO_WIZARD
 

@@ -13,8 +13,8 @@ from dorothie_gym.baselines.co_wizard.demonstrations import TRAINED, observed
 from dorothie_gym.baselines.co_wizard.policy import Choice, LearnedCoWizard
 from dorothie_gym.baselines.imitation.batches import TensorBatch, reals, whole
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import ScriptedParticipant
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 
 

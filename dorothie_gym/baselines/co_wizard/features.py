@@ -16,9 +16,12 @@ from dorothie_gym.baselines.co_wizard.memory import (
     Memory,
     seconds_since,
 )
-from dorothie_gym.dialogue import Direction, Predicate
+from dorothie_gym.dialogue.propositions import Predicate
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.model import Exit
-from dorothie_gym.ontology import DialogueMove, GoalStatus, ObjectClass, PhysicalAction
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import GoalStatus, ObjectClass
 from dorothie_gym.policies.co_wizard.judgement import is_red_ahead
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
@@ -33,7 +36,8 @@ from dorothie_gym.policies.route_progress import (
 )
 from dorothie_gym.policies.sight import Limit, camera_fault, limit_of, sight, suitable_speed
 from dorothie_gym.policies.turn_lanes import junction_meant
-from dorothie_gym.spaces import Motion, Physical
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import Physical
 
 HAZARDS: Final = (
     ObjectClass.TRAFFIC_LIGHT, ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC,

@@ -12,19 +12,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.dialogue import Direction, Predicate, Proposition, understand
-from dorothie_gym.ontology import (
-    LABEL_INDEX,
-    LABELS,
-    ActionValue,
-    DialogueAct,
-    DialogueMove,
-    GoalStatus,
-    LandmarkName,
-    ObjectClass,
-    Slot,
-    StreetName,
-)
+from dorothie_gym.dialogue.nlu import understand
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.ontology.dialogue_acts import LABEL_INDEX, LABELS, DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies.observation_parser import HeardUtterance
 
 WORD_BUCKETS: Final = 4096

@@ -15,10 +15,12 @@ from types import MappingProxyType
 from typing import Final
 
 from dorothie_gym.baselines.co_wizard.reasons import reason_to_stand
-from dorothie_gym.dialogue import Direction, Proposition
-from dorothie_gym.maps import Town
+from dorothie_gym.dialogue.propositions import Proposition
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import GoalStatus, LandmarkName, MentalAction, PhysicalAction, StreetName
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, USUAL_SPEED
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
@@ -28,7 +30,7 @@ from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.policies.route_progress import default_lane_distance, default_lane_place
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.turn_lanes import junction_meant
-from dorothie_gym.spaces import LanePosition, Mental
+from dorothie_gym.spaces.actions import LanePosition, Mental
 
 ORDERS: Final = (None, Direction.LEFT, Direction.RIGHT, Direction.STRAIGHT, Direction.BACK, "street")
 """Turn that was asked for: none, a direction, or only a street."""

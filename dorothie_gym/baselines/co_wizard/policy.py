@@ -26,14 +26,18 @@ from dorothie_gym.baselines.co_wizard.network import SIZES, CoWizardNetwork
 from dorothie_gym.baselines.co_wizard.remarks import Sources, filled, sources, sources_of, topic_of
 from dorothie_gym.baselines.imitation.batches import UNKNOWN
 from dorothie_gym.baselines.imitation.drawing import drawn
-from dorothie_gym.dialogue import WordingContext, draw_style
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import LandmarkName, Role, StreetName
+from dorothie_gym.dialogue.realization_context import WordingContext
+from dorothie_gym.dialogue.speaker_style import draw_style
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import Remark, SpeechState
-from dorothie_gym.spaces import ActionDict, CoWizardAction, ObservationMapping, SpaceLimits
+from dorothie_gym.spaces.actions import ActionDict, CoWizardAction
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 TEMPERATURE: Final = 0.7
 """Temperature at which remarks are drawn."""

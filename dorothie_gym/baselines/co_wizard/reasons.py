@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition
-from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.answers import RECENT_STOP, explanation
 from dorothie_gym.policies.co_wizard.judgement import DETOUR_TIME, OBEYED_WITHIN, is_red_ahead
 from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.co_wizard.memory import Memory

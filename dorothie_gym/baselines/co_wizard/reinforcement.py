@@ -33,11 +33,10 @@ from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.files import replacing, write_atomically
 from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import find_player
-from dorothie_gym.policies.policy_loader import DESCRIPTION
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.policy_loader import DESCRIPTION, find_player
 from dorothie_gym.rollout.folder import locked_folder
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.spaces.limits import SpaceLimits
 
 SETTINGS_FILE: Final = "reinforcement.json"
 PROGRESS_FILE: Final = "progress.json"

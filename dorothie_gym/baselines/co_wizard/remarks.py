@@ -16,20 +16,12 @@ from dorothie_gym.baselines.co_wizard.answers import answer_to, is_answer, said_
 from dorothie_gym.baselines.co_wizard.beliefs import seconds_to_goal
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import Memory
-from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.input_files import parse_json
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueAct,
-    DialogueMove,
-    GoalStatus,
-    LandmarkName,
-    ObjectClass,
-    PropKind,
-    Sensor,
-    StreetName,
-    WeatherParameter,
-)
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import replace

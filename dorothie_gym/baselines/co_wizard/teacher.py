@@ -11,18 +11,20 @@ from dataclasses import dataclass
 
 from dorothie_gym.baselines.co_wizard.answers import QUESTIONS
 from dorothie_gym.baselines.co_wizard.memory import FRESH, ORDERS, STATUSES, VARIABLES, GoalEvent, Update, speed_index
-from dorothie_gym.dialogue import Direction, Predicate
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import GoalStatus, LandmarkName, StreetName
-from dorothie_gym.policies.co_wizard import ScriptedCoWizard
+from dorothie_gym.dialogue.propositions import Predicate
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import drive, end_red_light_rest, rest
-from dorothie_gym.policies.co_wizard.policy import attend, respond
+from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, attend, respond
 from dorothie_gym.policies.co_wizard.state import CoWizardState, DialogueState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState
-from dorothie_gym.spaces import CoWizardAction, ObservationMapping, Physical, SpaceLimits
+from dorothie_gym.spaces.actions import CoWizardAction, Physical
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 CALM = CoWizardStyle(
     echoes=0.3, checks=0.1, announces=0.0, silent=0.4, asks=0.6, proposes=0.0, mishears=0.0, careful=1.0, notices=0.9

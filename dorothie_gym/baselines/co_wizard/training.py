@@ -38,7 +38,7 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording import Corpus
+from dorothie_gym.recording.corpus import Corpus
 
 _PRACTICE: Final = 29
 """Branch of the seed of the sessions of the practice."""

@@ -1,6 +1,5 @@
 """Junction Reader, a model of this package."""
 
-from dorothie_gym.baselines.junction_reader.features import ExitTable, exit_table, mentions
-from dorothie_gym.baselines.junction_reader.model import JunctionReader, reader_config
+import lazy_loader
 
-__all__ = ["ExitTable", "JunctionReader", "exit_table", "mentions", "reader_config"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -16,9 +16,10 @@ from torch.nn import functional as F
 
 from dorothie_gym.baselines.encoders.byte_pairs import words
 from dorothie_gym.baselines.model_io import Inputs
-from dorothie_gym.benchmark.features import TownGraph
+from dorothie_gym.benchmark.features.columns import TownGraph
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, LENGTH, EdgeType
-from dorothie_gym.ontology import LABELS, DialogueMove, PhysicalAction
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
 
 _PARTS: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z]+")
 

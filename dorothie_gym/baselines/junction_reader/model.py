@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from dorothie_gym.baselines.encoders import PAD
+from dorothie_gym.baselines.encoders.byte_pairs import PAD
 from dorothie_gym.baselines.junction_reader.features import (
     EXITS,
     LANE_END,
@@ -40,8 +40,9 @@ from dorothie_gym.baselines.toto.losses import angle_error
 from dorothie_gym.baselines.toto.model import TOTO, Tokens
 from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.toto.towns import POSITION_UNIT, Towns
-from dorothie_gym.benchmark.features import CO_WIZARD, PARTICIPANT, Columns
-from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, DialogueMove
+from dorothie_gym.benchmark.features.columns import CO_WIZARD, PARTICIPANT, Columns
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
 
 WORD_BY_WORD: Final = 3
 """Number of utterances that are encoded piece by piece: the current one and the two before it."""

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from dorothie_gym.baselines.co_wizard.hearing import KEPT, Utterance, utterance_vector, word_rows
 from dorothie_gym.baselines.participant.features import ERRAND_SIZE, MAX_ERRANDS, errand_vectors, state_vector
 from dorothie_gym.baselines.participant.memory import Memory, voice_of
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.observation_parser import heard_utterance
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.spaces import ObservationMapping
+from dorothie_gym.spaces.observations import ObservationMapping
 
 Vector = NDArray[np.float32]
 

@@ -20,13 +20,15 @@ from dorothie_gym.baselines.participant.policy import LearnedParticipant, finish
 from dorothie_gym.baselines.participant.remarks import sources
 from dorothie_gym.baselines.participant.teacher import Lesson, Teacher
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
+from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed, replace
-from dorothie_gym.recording import Session
+from dorothie_gym.recording.session import Session
 from dorothie_gym.rollout.replay import begin_replay, recorded_actions
-from dorothie_gym.spaces import ActionDict, ObservationMapping, ParticipantAction
+from dorothie_gym.spaces.actions import ActionDict, ParticipantAction
+from dorothie_gym.spaces.observations import ObservationMapping
 
 PARTICIPANT: Final = Role.PARTICIPANT
 

@@ -9,11 +9,13 @@ from typing import Final
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.participant.memory import Event, Memory
 from dorothie_gym.baselines.participant.records import is_last_stretch, next_step
-from dorothie_gym.dialogue import Direction, Predicate, Proposition
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import router
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.maps.whereabouts import is_on_right
-from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import SeenSubgoal, is_dark, is_foggy, is_rainy, street_of
 from dorothie_gym.policies.participant.arriving import about_to_arrive, room_to_stop
 from dorothie_gym.policies.participant.goals import purpose_of_target

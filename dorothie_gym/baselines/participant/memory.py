@@ -14,16 +14,11 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.baselines.participant.records import is_last_stretch, note_remark, topic_of
-from dorothie_gym.dialogue import draw_style
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import (
-    DialogueMove,
-    GoalStatus,
-    LandmarkName,
-    ObjectClass,
-    Role,
-    Slot,
-)
+from dorothie_gym.dialogue.speaker_style import draw_style
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, Slot
 from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.arriving import prepare_stop
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle

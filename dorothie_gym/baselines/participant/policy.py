@@ -32,12 +32,14 @@ from dorothie_gym.baselines.participant.remarks import (
     sources_of,
     stop_remark,
 )
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.participant.reactions import scene_of
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.spaces import ActionDict, ObservationMapping, ParticipantAction, SpaceLimits, Speech
+from dorothie_gym.spaces.actions import ActionDict, ParticipantAction, Speech
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 TEMPERATURE = 0.5
 """Temperature at which remarks are drawn."""

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym.dialogue import Direction, Predicate
+from dorothie_gym.dialogue.propositions import Predicate
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import LaneEntry
-from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, Slot
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot
 from dorothie_gym.policies.participant.arriving import about_to_arrive
 from dorothie_gym.policies.participant.guidance import note_step
 from dorothie_gym.policies.participant.state import ParticipantState, StepKey

@@ -15,10 +15,13 @@ from dorothie_gym.baselines.co_wizard import remarks as forms
 from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.participant.memory import Event, Memory
 from dorothie_gym.baselines.participant.records import RouteStep, is_last_stretch, next_step
-from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Proposition, Wording
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.input_files import parse_json
 from dorothie_gym.maps.whereabouts import corner_of
-from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.hints import famous_nearby

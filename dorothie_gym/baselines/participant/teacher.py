@@ -10,13 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dorothie_gym.baselines.participant.memory import KEEP_TARGET, Choice, Memory
-from dorothie_gym.maps import Town
-from dorothie_gym.policies import ScriptedParticipant
+from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.participant.config import ParticipantStyle
+from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.spaces import ActionDict, ObservationMapping, SpaceLimits
+from dorothie_gym.spaces.actions import ActionDict
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,9 +18,9 @@ from dorothie_gym.baselines.rl.environments import EnvFactory, each_town, has_ba
 from dorothie_gym.baselines.rl.settings import NAVIGATION, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import MakeEnv
 from dorothie_gym.errors import SettingsError
-from dorothie_gym.policies.navigation import NavigationPolicy
+from dorothie_gym.policies.navigation.navigation_policy import NavigationPolicy
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.spaces.limits import SpaceLimits
 
 FIRST_SEED: Final = 1_000_000
 """Seed of the first episode of an evaluation; training uses smaller seeds."""

@@ -11,7 +11,7 @@ from typing import Any, Final, Self, TypeAlias
 import yaml
 
 from dorothie_gym.errors import SettingsError, did_you_mean, short_repr
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 
 Arguments: TypeAlias = Mapping[str, Any]
 """Keyword arguments of an environment or an algorithm, of any type; both check them."""

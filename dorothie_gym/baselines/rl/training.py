@@ -31,7 +31,7 @@ from dorothie_gym.baselines.rl.run import (
 from dorothie_gym.baselines.rl.settings import FINAL_ENTROPY, Page, TrainingSettings
 from dorothie_gym.input_files import checked
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
-from dorothie_gym.recording import Fold
+from dorothie_gym.recording.corpus import Fold
 
 LOGGED_STEPS: Final = 1024
 """Approximate number of steps between TensorBoard records of on-policy algorithms."""

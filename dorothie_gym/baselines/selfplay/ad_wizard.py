@@ -10,11 +10,13 @@ from typing import ClassVar
 import numpy as np
 
 from dorothie_gym.baselines.selfplay.role_interface import LastUtterance, Mask, RoleInterface, last_utterance
-from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.policies.ad_wizard import AdWizardConfig
 from dorothie_gym.policies.observation_parser import SeenSubgoal, place_on_path, read_subgoals, scalar
 from dorothie_gym.policies.task_exceptions import task_message
-from dorothie_gym.spaces import ActionMapping, AdWizardAction, LanePosition, ObservationMapping, PropColumn
+from dorothie_gym.spaces.actions import ActionMapping, AdWizardAction, LanePosition
+from dorothie_gym.spaces.observations import ObservationMapping, PropColumn
 
 ROADBLOCK_DISTANCE, SPAWN_DISTANCE = 60.0, 100.0
 """Distances ahead of the car of a roadblock, and of spawned actors [m]."""

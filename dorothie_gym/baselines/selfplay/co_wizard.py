@@ -13,17 +13,12 @@ import numpy as np
 from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.baselines.selfplay.role_interface import LastUtterance, Mask, RoleInterface, last_utterance
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueAct,
-    DialogueMove,
-    LandmarkName,
-    MentalAction,
-    PhysicalAction,
-    Role,
-)
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName
 from dorothie_gym.policies.navigation.actions import (
     ACTIONS,
     EstimatedActionMask,
@@ -37,16 +32,9 @@ from dorothie_gym.policies.navigation.junction_exits import JunctionExits, neare
 from dorothie_gym.policies.navigation.observation_vector import FIELDS, HeardInstruction, NavigationEncoder
 from dorothie_gym.policies.observation_parser import read_landmarks, scalar
 from dorothie_gym.policies.route_progress import CANONICAL
-from dorothie_gym.spaces import (
-    ActionMapping,
-    CoWizardAction,
-    ExitColumn,
-    Mental,
-    ObservationMapping,
-    Physical,
-    SpaceLimits,
-    Speech,
-)
+from dorothie_gym.spaces.actions import ActionMapping, CoWizardAction, Mental, Physical, Speech
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ExitColumn, ObservationMapping
 
 
 class ExtraAction(enum.IntEnum):

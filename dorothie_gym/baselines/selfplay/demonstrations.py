@@ -10,13 +10,14 @@ from dorothie_gym.baselines.rl.run import OnStage, ignore_stage
 from dorothie_gym.baselines.selfplay.env import make_interface
 from dorothie_gym.baselines.selfplay.role_interface import Mask
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.policies.observation_parser import scalar
-from dorothie_gym.recording import Session
-from dorothie_gym.rollout import watch_session
-from dorothie_gym.spaces import ActionDecoder, AdWizardAction, RoleAction, SpaceLimits
+from dorothie_gym.recording.session import Session
+from dorothie_gym.rollout.replay import watch_session
+from dorothie_gym.spaces.actions import ActionDecoder, AdWizardAction, RoleAction
+from dorothie_gym.spaces.limits import SpaceLimits
 
 RoleDecision: TypeAlias = tuple[Vector, Mask, int]
 """Input vector, mask and number of the action of a decision."""

@@ -24,15 +24,17 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv, Stacked
 from dorothie_gym.envs.navigation_config import TRAFFIC
 from dorothie_gym.errors import SettingsError, StoryboardError
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import find_player, make_policy
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.policies.policy import AnyPolicy, policy_seed
+from dorothie_gym.policies.policy_loader import find_player, make_policy
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.ego.planner import LocalPlanner
-from dorothie_gym.spaces import ActionDict, ActionMapping, Observation, SpaceLimits, StepInfo
+from dorothie_gym.spaces.actions import ActionDict, ActionMapping, StepInfo
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import Observation
 
 _PARTICIPANT = AGENT_ROLES.index(Role.PARTICIPANT)
 

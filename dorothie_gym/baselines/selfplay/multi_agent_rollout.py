@@ -17,7 +17,7 @@ from dorothie_gym.baselines.rl.vector_env import make_vector_env
 from dorothie_gym.baselines.selfplay.env import RoleLayout, SelfPlayEnv
 from dorothie_gym.baselines.selfplay.learner import Learner, make_network, sample_actions
 from dorothie_gym.baselines.selfplay.vec_env import SelfPlayEnvFactory
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 
 AD_WIZARD: Final = AGENT_ROLES.index(Role.AD_WIZARD)
 TEAM: Final = (Role.CO_WIZARD, Role.PARTICIPANT)

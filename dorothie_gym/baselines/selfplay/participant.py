@@ -16,13 +16,18 @@ from dorothie_gym.baselines.selfplay.role_interface import (
     last_utterance,
     one_hot,
 )
-from dorothie_gym.dialogue import Direction, load_lexicon, understand
+from dorothie_gym.dialogue.lexicon import load_lexicon
+from dorothie_gym.dialogue.nlu import understand
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import LaneEntry, Place
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, Role
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName
 from dorothie_gym.policies.navigation.observation_vector import CLOSE_UNIT, DISTANCE_UNIT, TOWN_UNIT
 from dorothie_gym.policies.observation_parser import read_landmarks, read_subgoals, scalar
 from dorothie_gym.policies.route_progress import RouteProgress
-from dorothie_gym.spaces import ActionMapping, ObservationMapping, ParticipantAction, Speech
+from dorothie_gym.spaces.actions import ActionMapping, ParticipantAction, Speech
+from dorothie_gym.spaces.observations import ObservationMapping
 
 _DIRECTIONS = tuple(Direction)
 _ENTRIES = (LaneEntry.CHANGE_LEFT, LaneEntry.CHANGE_RIGHT, LaneEntry.U_TURN)

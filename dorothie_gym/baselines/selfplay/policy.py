@@ -14,11 +14,13 @@ from dorothie_gym.baselines.selfplay.env import RoleLayout, make_interface, pad_
 from dorothie_gym.baselines.selfplay.learner import make_network, sample_actions
 from dorothie_gym.baselines.selfplay.role_interface import AnyRoleInterface
 from dorothie_gym.errors import ModelFileError, one_line
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import Policy
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.policy_loader import DESCRIPTION
-from dorothie_gym.spaces import ActionDict, ObservationMapping, SpaceLimits
+from dorothie_gym.spaces.actions import ActionDict
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)

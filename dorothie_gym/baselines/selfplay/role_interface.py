@@ -13,20 +13,17 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.dialogue import Direction
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import LABELS, DialogueAct, DialogueMove, LandmarkName, Role
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.policies.observation_parser import heard_utterance, scalar
-from dorothie_gym.spaces import (
-    ActionMapping,
-    Observation,
-    ObservationMapping,
-    RoleAction,
-    SpaceLimits,
-    observation_space,
-)
+from dorothie_gym.spaces.actions import ActionMapping, RoleAction
 from dorothie_gym.spaces.flat import FlatObservations
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import Observation, ObservationMapping, observation_space
 
 Mask: TypeAlias = NDArray[np.bool_]
 Memory = TypeVar("Memory")

@@ -39,9 +39,9 @@ from dorothie_gym.baselines.selfplay.vec_env import SelfPlayEnvFactory
 from dorothie_gym.baselines.tensor_files import refuse_unknown
 from dorothie_gym.errors import ModelFileError
 from dorothie_gym.input_files import checked, raising
-from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.recording import Fold
+from dorothie_gym.recording.corpus import Fold
 
 OPPONENTS: Final = ("scripted", "learned")
 """Ad-Wizards of the team's evaluations."""

@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices,
 
 from dorothie_gym.baselines.rl.settings import Arguments
 from dorothie_gym.baselines.selfplay.env import SelfPlayEnv, SelfPlaySessions
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 
 
 class SelfPlayVecEnv(VecEnv):

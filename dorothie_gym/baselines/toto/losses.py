@@ -11,8 +11,7 @@ from torch.nn import functional as F
 
 from dorothie_gym.baselines.model_io import NFD, RFN, Labels, Outputs
 from dorothie_gym.baselines.toto.config import LossWeights, TOTOConfig
-from dorothie_gym.ontology import VECTOR_SLOTS
-from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
+from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS, VECTOR_SLOTS
 
 _ROOT_OFFSET: Final = 1e-6
 """Summand under a root, so that its slope stays finite at 0."""

@@ -21,8 +21,8 @@ from dorothie_gym.baselines.toto.texts import Texts
 from dorothie_gym.baselines.toto.towns import ANGLE_UNIT, POSITION_UNIT, Towns
 from dorothie_gym.baselines.trainer import Model
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, LANE_ID, LENGTH
-from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction
-from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
+from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import LABELS, SLOT_SPANS, VECTOR_SLOTS, DialogueMove
 
 Tokens: TypeAlias = tuple[Tensor, Tensor, Tensor]
 """Tokens (B, n, d), their mask (B, n), their times (B, n) [s]."""

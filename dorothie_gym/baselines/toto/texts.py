@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from dorothie_gym.baselines.encoders import PAD
+from dorothie_gym.baselines.encoders.byte_pairs import PAD
 from dorothie_gym.baselines.toto.layers import Block
 
 _SMALLEST_SPREAD: Final = 1e-6

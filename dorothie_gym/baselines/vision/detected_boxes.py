@@ -33,10 +33,10 @@ from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.files import replacing
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.recording import ActorKind, Session
-from dorothie_gym.recording.surroundings import ACTOR_DTYPE, Rows, SceneTable
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.surroundings import ACTOR_DTYPE, ActorKind, Rows, SceneTable
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
 
 CYCLIST_WIDTH: Final = 1.0

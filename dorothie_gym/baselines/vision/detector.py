@@ -20,7 +20,7 @@ from dorothie_gym.baselines.vision.frames import CLASSES
 from dorothie_gym.baselines.vision.libraries import matcher_of, transformers
 from dorothie_gym.baselines.vision.segformer import FARTHEST, NEAREST
 from dorothie_gym.baselines.vision.solids import SOLID, solid_loss, solids_from
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 
 KINDS: Final = (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)
 """Kinds of objects that are detected; the last stands for all props."""

@@ -25,7 +25,7 @@ from dorothie_gym.baselines.vision.training import Learner, OnStep, train_learne
 from dorothie_gym.errors import CheckpointError, SessionError, one_line
 from dorothie_gym.files import write_atomically
 from dorothie_gym.input_files import checked, raising
-from dorothie_gym.recording import Corpus
+from dorothie_gym.recording.corpus import Corpus
 
 Model = Literal["segformer", "detr"]
 Size = Literal["small", "paper"]

@@ -29,12 +29,16 @@ from dorothie_gym.camera.solid_boxes import SolidBoxes
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.files import PART
 from dorothie_gym.input_files import MIB
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.cache import pack, package_sources
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.ontology import Sensor, parse_sensor
-from dorothie_gym.recording import FRAME_RATE, Corpus, CorpusEntry, EventType, Session
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.spellings import parse_sensor
+from dorothie_gym.ontology.world_exceptions import Sensor
+from dorothie_gym.recording.corpus import Corpus, CorpusEntry
+from dorothie_gym.recording.events import EventType
+from dorothie_gym.recording.session import Session
 from dorothie_gym.rollout.processes import run_tasks
+from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.user_cache import (
     cache_folder,
     discard,

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.baselines.vision.frames import CLASSES
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 
 Array = NDArray[np.float64]
 

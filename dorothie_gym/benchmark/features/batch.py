@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dorothie_gym.benchmark.features.columns import NO_TEXT, Columns, Flags, Ints, Reals
 from dorothie_gym.benchmark.features.point_table import PointTable
-from dorothie_gym.recording import Task
 from dorothie_gym.recording.trajectory import TENTHS
+from dorothie_gym.recording.visibility import Task
 
 ScalarT = TypeVar("ScalarT", bound=np.generic)
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from dorothie_gym.benchmark.features.columns import GROUPS, NO_TEXT, Columns, TownGraph
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES
-from dorothie_gym.ontology import LABELS, DialogueMove, PhysicalAction
-from dorothie_gym.recording import OBJECT_VALUES, ObjectKind
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
+from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, ObjectKind
 
 _KINDS: Final[Mapping[str, str]] = MappingProxyType(
     {"Ints": "iu", "Reals": "f", "Flags": "b", "NDArray[np.int64]": "i"}

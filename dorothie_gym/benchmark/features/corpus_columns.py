@@ -30,11 +30,12 @@ from dorothie_gym.benchmark.features.sight import Sight, seen_by
 from dorothie_gym.errors import FeatureStoreError, SessionError, TownError, one_line
 from dorothie_gym.files import PART
 from dorothie_gym.input_files import ARRAY_ERRORS, MIB, checked, parse_json, raising, read_file, read_text
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.cache import compiler_digest
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording import FOLDS, Corpus, CorpusEntry, Fold, Session
+from dorothie_gym.maps.town import Town
+from dorothie_gym.recording.corpus import FOLDS, Corpus, CorpusEntry, Fold
 from dorothie_gym.recording.file_names import ACTIONS_FILE
+from dorothie_gym.recording.session import Session
 from dorothie_gym.user_cache import (
     cache_folder,
     discard,

@@ -30,20 +30,13 @@ from dorothie_gym.benchmark.features.session_columns import (
     poses,
     utterance_columns,
 )
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.recording import (
-    TRAJECTORY_DTYPE,
-    ActionRecord,
-    SceneTable,
-    SessionHeader,
-    Surroundings,
-    Trajectory,
-    UtteranceRecord,
-)
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.recording.events import ActionRecord, UtteranceRecord
+from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.recording.recorded_perception import perceived
-from dorothie_gym.recording.surroundings import Rows
-from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
+from dorothie_gym.recording.surroundings import Rows, SceneTable, Surroundings
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, TRAJECTORY_DTYPE, Trajectory
 
 _FULL_TURN: Final = 2.0 * math.pi
 

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from dorothie_gym.benchmark.features.columns import CO_WIZARD, PARTICIPANT, Columns, Flags, Ints, Reals
 from dorothie_gym.benchmark.labels import NO_ANGLE, Unscored
-from dorothie_gym.ontology import LABELS
-from dorothie_gym.recording import Fold, Task
-from dorothie_gym.recording.corpus import check_fold
-from dorothie_gym.recording.visibility import Moments, RowRange, earlier_spans, visible_rows
+from dorothie_gym.ontology.dialogue_acts import LABELS
+from dorothie_gym.recording.corpus import Fold, check_fold
+from dorothie_gym.recording.visibility import Moments, RowRange, Task, earlier_spans, visible_rows
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

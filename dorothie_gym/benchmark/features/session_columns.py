@@ -13,25 +13,25 @@ from numpy.typing import NDArray
 from dorothie_gym.analysis.exception_attribution import Handled, handling_of_events
 from dorothie_gym.analysis.units import Units
 from dorothie_gym.benchmark.features.columns import NO_TEXT, TownGraph
-from dorothie_gym.maps import NO_JUNCTION, Town
 from dorothie_gym.maps.lane_graph import FEATURES
-from dorothie_gym.ontology import LABELS, GoalStatus
-from dorothie_gym.recording import (
-    NO_LANE,
-    ActionRecord,
-    EventType,
-    Session,
-    SessionHeader,
-    Trajectory,
-    UtteranceRecord,
+from dorothie_gym.maps.model import NO_JUNCTION
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import LABELS
+from dorothie_gym.ontology.slots import GoalStatus
+from dorothie_gym.recording.events import ActionRecord, EventType, UtteranceRecord
+from dorothie_gym.recording.header import SessionHeader
+from dorothie_gym.recording.points import (
+    SPEAKERS,
+    SessionHistory,
+    at_tenths,
     history_angle,
     is_decision,
     label_angle,
     unpointed_events,
 )
-from dorothie_gym.recording.points import SPEAKERS, SessionHistory, at_tenths
 from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, light_switches, perceived
-from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, TENTHS
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH, NO_LANE, TENTHS, Trajectory
 
 HEADING_STEP: Final = 1e-3
 """Headings are rounded to this [degrees], so that they do not depend on the unit in a file."""

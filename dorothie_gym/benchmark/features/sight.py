@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps import Town
-from dorothie_gym.recording import Session
+from dorothie_gym.maps.town import Town
+from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.surroundings import SceneTable
 
 

@@ -31,7 +31,7 @@ from dorothie_gym.camera.ground.surface import (
 from dorothie_gym.camera.mesh import MeshBuilder
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.rendering.levels import LevelStretch
 
 COVER = 3.2

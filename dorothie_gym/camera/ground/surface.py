@@ -17,7 +17,7 @@ from dorothie_gym.camera.ground.partition import Area
 from dorothie_gym.camera.ground.regions import GRID
 from dorothie_gym.camera.mesh import MeshBuilder, Surface
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 
 PORTAL_HEIGHT = 4.35
 """Height of tunnels [m]."""

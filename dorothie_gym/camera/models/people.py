@@ -12,7 +12,7 @@ from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.models.solids import ModelBuilder, Palette, Rgb, Slot, dressed
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 
 PHASES = 8
 """Phases of a walking cycle of two steps."""

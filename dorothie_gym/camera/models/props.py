@@ -11,7 +11,7 @@ from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.models.solids import ModelBuilder, Palette, Slot, dressed
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.ontology.world_exceptions import PropKind
 
 _PALETTE: Palette = {

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from dorothie_gym import portable_arrays as pn
 from dorothie_gym.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 
 Rgb: TypeAlias = tuple[int, int, int]
 Point: TypeAlias = Sequence[float] | Array

@@ -14,7 +14,7 @@ from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh, Surface
 from dorothie_gym.camera.models.solids import ModelBuilder, Palette, Rgb, Slot, dressed
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
 
 _FRONT, _SIDE = CAR_LENGTH / 2.0, CAR_WIDTH / 2.0

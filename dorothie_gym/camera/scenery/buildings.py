@@ -20,7 +20,7 @@ from dorothie_gym.camera.scenery.clearance import Clearance, free_of, rectangles
 from dorothie_gym.camera.scenery.placing import Heights, feet_on
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.rendering.borders import BorderKind
 from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.medians import held

@@ -16,7 +16,7 @@ from dorothie_gym.camera.models.solids import ModelBuilder, Rgb, Slot, dressed
 from dorothie_gym.camera.scenery.lots import Lot
 from dorothie_gym.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import LandmarkName, ObjectClass
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.rendering.shapes import disc
 from dorothie_gym.tasks.landmark_designs import COAT, HOUSE, MIDDLE_STRIPE, STORES, StoreDesign, Top
 from dorothie_gym.tasks.storyboard import Landmark

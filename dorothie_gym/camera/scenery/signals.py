@@ -17,7 +17,7 @@ from dorothie_gym.camera.scenery.lenses import LENS_OFF, Lenses
 from dorothie_gym.camera.scenery.placing import Heights, stamped
 from dorothie_gym.maps.model import NO_STREET, Array, Lane, SignalKind
 from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.rendering.map_layers import MapLayers, Post
 from dorothie_gym.rendering.shapes import disc
 from dorothie_gym.sim.state.codes import Colour

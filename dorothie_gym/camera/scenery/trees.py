@@ -13,7 +13,7 @@ from dorothie_gym.camera.atlas import Texture
 from dorothie_gym.camera.mesh import Mesh, MeshBuilder, Surface, joined
 from dorothie_gym.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.maps.model import Array
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.rendering import palette
 from dorothie_gym.rendering.map_layers import MapLayers
 from dorothie_gym.rendering.shapes import disc, ribbon

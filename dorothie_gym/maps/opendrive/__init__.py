@@ -1,5 +1,5 @@
 """Towns from OpenDRIVE files (ASAM OpenDRIVE 1.4, as CARLA's towns)."""
 
-from dorothie_gym.maps.opendrive.compile import read_opendrive
+import lazy_loader
 
-__all__ = ["read_opendrive"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

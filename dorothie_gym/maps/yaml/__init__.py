@@ -1,5 +1,5 @@
 """YAML town language: `schema` reads a plan, `layout` computes its centre lines, `compile` builds the town."""
 
-from dorothie_gym.maps.yaml.compile import read_yaml_town
+import lazy_loader
 
-__all__ = ["read_yaml_town"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,16 +7,12 @@ import re
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, Wording
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueAct,
-    LandmarkName,
-    ObjectClass,
-    Slot,
-    StreetName,
-)
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
@@ -36,7 +32,7 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import direction_of
 from dorothie_gym.policies.sight import camera_fault, limit_of, sight
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 
 _ABOUT_THE_GOAL = frozenset(
     {Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY, Predicate.ARRIVED, Predicate.KNOWS}

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dorothie_gym.dialogue import Proposition
+from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import GoalStatus, LandmarkName, MentalAction
+from dorothie_gym.ontology.actions import MentalAction
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.spaces import LanePosition, Mental
+from dorothie_gym.spaces.actions import LanePosition, Mental
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,8 @@ from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.ontology import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, LandmarkName, ObjectClass, PhysicalAction
+from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, PhysicalAction
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, slowing_distance, u_turn_start
@@ -27,7 +28,8 @@ from dorothie_gym.policies.route_progress import (
     streets_named,
 )
 from dorothie_gym.policies.turn_lanes import junction_meant
-from dorothie_gym.spaces import Motion, Physical
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import Physical
 
 CRUISE_TOLERANCE = 2.6
 """Difference between actual and target cruise speed that is not corrected [km/h]; half a speed step of 5 km/h."""

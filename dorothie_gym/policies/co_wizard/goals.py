@@ -6,17 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Predicate, Proposition, Wording
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.routing import Place, router
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueMove,
-    GoalStatus,
-    LandmarkName,
-    MentalAction,
-    StreetName,
-)
+from dorothie_gym.ontology.actions import MentalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.state import CoWizardState
@@ -25,7 +21,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
 from dorothie_gym.policies.route_progress import RouteProgress, default_lane_place, streets_named
 from dorothie_gym.policies.speech import intend
-from dorothie_gym.spaces import LanePosition, Mental
+from dorothie_gym.spaces.actions import LanePosition, Mental
 
 _COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
 """Names that several places bear."""

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording, WordingContext
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction, Wording, WordingContext
 from dorothie_gym.maps.model import LinkType
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueMove,
-    GoalStatus,
-    LandmarkName,
-    ObjectClass,
-    PhysicalAction,
-    Sensor,
-    StreetName,
-    WeatherParameter,
-)
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
@@ -30,7 +24,8 @@ from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, 
 from dorothie_gym.policies.route_progress import Choice, direction_of
 from dorothie_gym.policies.sight import Limit, camera_fault, limit_of, sight, suitable_speed
 from dorothie_gym.policies.speech import Remark, intend
-from dorothie_gym.spaces import Motion, Physical
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import Physical
 
 _HANDLED = frozenset(
     {WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION, WeatherParameter.SUN_ALTITUDE_ANGLE}

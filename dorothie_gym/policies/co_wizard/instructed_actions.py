@@ -7,15 +7,19 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition
-from dorothie_gym.ontology import SPEED_STEP, ActionValue, DialogueAct, StreetName
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.ontology.actions import SPEED_STEP
+from dorothie_gym.ontology.dialogue_acts import DialogueAct
+from dorothie_gym.ontology.slots import ActionValue, StreetName
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.goals import approach_stop
 from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP, CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.route_progress import default_lane_place
 from dorothie_gym.policies.turn_lanes import junction_meant
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 
 STRAIGHT_ON_DISTANCE = 60.0
 """Distance to a junction within which "go on" means straight across it [m]."""

@@ -7,17 +7,19 @@ from collections.abc import Callable
 from typing import Final
 
 from dorothie_gym import portable_math as pm
-from dorothie_gym.dialogue import Predicate, Proposition
-from dorothie_gym.maps import Town
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass, PhysicalAction, Sensor, StreetName
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.sight import FAR_SIGHT, camera_fault, sight
 from dorothie_gym.policies.travel_time import travel_time
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 
 NAMED_ACTIONS: Final = {
     PhysicalAction.J_TURN: ActionValue.J_TURN,

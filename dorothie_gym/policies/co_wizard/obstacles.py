@@ -7,8 +7,10 @@ import math
 import numpy as np
 
 from dorothie_gym import portable_arrays as pn
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
-from dorothie_gym.ontology import ActionValue, ObjectClass
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.slots import ActionValue, ObjectClass
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.goals import plan_route
 from dorothie_gym.policies.co_wizard.state import CoWizardState
@@ -16,7 +18,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenObject, place_on_lanes
 from dorothie_gym.policies.route_progress import first_new_street, lanes_ahead
 from dorothie_gym.policies.speech import intend
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 
 _JUST_TOLD = 8.0
 """Time for which an obstacle that the participant has reported needs no report of the car [s]."""

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dorothie_gym.dialogue import draw_style
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import ObjectClass, Role
+from dorothie_gym.dialogue.speaker_style import draw_style
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, junction_ahead, rest
 from dorothie_gym.policies.co_wizard.goals import note_plan, recognise_goal, search_on
@@ -22,7 +23,10 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import SpeechState
-from dorothie_gym.spaces import ActionDict, CoWizardAction, Mental, Motion, ObservationMapping, Physical, SpaceLimits
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import ActionDict, CoWizardAction, Mental, Physical
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 
 class ScriptedCoWizard(Policy[CoWizardState]):

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, is_partly_inaudible
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Slot
+from dorothie_gym.dialogue.conversation import is_partly_inaudible
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, Slot
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.goals import doubt
 from dorothie_gym.policies.co_wizard.state import CoWizardState

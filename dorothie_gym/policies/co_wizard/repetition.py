@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
-from dorothie_gym.ontology import ActionValue
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView

@@ -11,15 +11,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from dorothie_gym.dialogue import Direction, Predicate, Proposition
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import (
-    ActionValue,
-    LandmarkName,
-    ObjectClass,
-    Sensor,
-    StreetName,
-)
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.policies.co_wizard.beliefs import BeliefState
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
 from dorothie_gym.policies.noticing import Noticed

@@ -6,9 +6,12 @@ import re
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
-from dorothie_gym.ontology import DialogueMove, GoalStatus, LandmarkName, Slot
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.nlu import understand
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, Slot
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.observation_parser import HeardUtterance

@@ -7,19 +7,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import ParsedText, Predicate, Proposition, Wording
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueAct,
-    DialogueMove,
-    GoalStatus,
-    LandmarkName,
-    ObjectClass,
-    Role,
-    Slot,
-    StreetName,
-)
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark, sign_of_hearing
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no

@@ -8,18 +8,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import (
-    ObjectClass,
-    PhysicalAction,
-)
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, read_landmarks, read_objects, scalar
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, next_choice
 from dorothie_gym.policies.route_tables import is_choice
-from dorothie_gym.spaces import ExitColumn, Motion, ObservationMapping
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.observations import ExitColumn, ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,15 +5,6 @@ its mask, and turns the answer into actions (docs/language-models.md). The packa
 the first policy is made.
 """
 
-from dorothie_gym.policies.language_model.config import LanguageModelConfig, SimulatedTime
-from dorothie_gym.policies.language_model.faults import Fault
-from dorothie_gym.policies.language_model.policy import LanguageModelPolicy
-from dorothie_gym.policies.language_model.usage import ModelUsage
+import lazy_loader
 
-__all__ = [
-    "Fault",
-    "LanguageModelConfig",
-    "LanguageModelPolicy",
-    "ModelUsage",
-    "SimulatedTime",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from dorothie_gym import portable_math as pm
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import ExceptionKind, PropKind, Role, Sensor, WeatherParameter
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, WordsField
 from dorothie_gym.policies.language_model.role_interface import (
     NONE,
@@ -25,7 +26,8 @@ from dorothie_gym.policies.language_model.role_interface import (
 )
 from dorothie_gym.policies.observation_parser import place_on_path, read_subgoals, scalar, weather
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.spaces import ActionDict, AdWizardAction, LanePosition, ObservationMapping, PropColumn
+from dorothie_gym.spaces.actions import ActionDict, AdWizardAction, LanePosition
+from dorothie_gym.spaces.observations import ObservationMapping, PropColumn
 
 AGAIN = ("60", "20", "30", "90", "120")
 """Times after which the model can ask to be asked again [s]."""

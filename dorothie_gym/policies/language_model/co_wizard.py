@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import GoalStatus, LandmarkName, MentalAction, ObjectClass, PhysicalAction, Role
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import MentalAction, PhysicalAction
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
 from dorothie_gym.policies.language_model.co_wizard_prompt import (
@@ -30,7 +32,9 @@ from dorothie_gym.policies.language_model.role_interface import (
     with_talk,
 )
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.spaces import ActionDict, CoWizardAction, LanePosition, Mental, Motion, ObservationMapping, Physical
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import ActionDict, CoWizardAction, LanePosition, Mental, Physical
+from dorothie_gym.spaces.observations import ObservationMapping
 
 REPEAT_AFTER = 3.0
 """Time after which a step that is still due is pointed out once more [s]."""

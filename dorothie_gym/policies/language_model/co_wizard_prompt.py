@@ -6,10 +6,11 @@ import math
 from collections.abc import Collection, Sequence
 
 from dorothie_gym import portable_math as pm
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import GoalStatus, LandmarkName, ObjectClass, PhysicalAction, StreetName
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, distinct
 from dorothie_gym.policies.language_model.navigator import Navigator, RouteStep
@@ -29,7 +30,9 @@ from dorothie_gym.policies.language_model.role_interface import (
 )
 from dorothie_gym.policies.route_progress import default_lane_place, direction_of, streets_named
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
-from dorothie_gym.spaces import ExitColumn, Motion, Physical
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import Physical
+from dorothie_gym.spaces.observations import ExitColumn
 
 AHEAD = (5, 10, 20, 30, 50, 80)
 """Distances ahead at which a place can be marked [m]."""

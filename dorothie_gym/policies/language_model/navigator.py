@@ -9,10 +9,11 @@ import math
 from dataclasses import dataclass
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import LaneEntry, Place
-from dorothie_gym.ontology import ObjectClass, PhysicalAction
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.policy import replace
@@ -25,7 +26,7 @@ from dorothie_gym.policies.route_progress import (
     lanes_beside,
     stopping_distance,
 )
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 
 TURN_LEAD = 85.0
 """Distance to a junction from which on its turn is due [m]; as the scripted Co-Wizard commands it."""

@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import Role
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.language_model.ad_wizard import AdWizardInterface
 from dorothie_gym.policies.language_model.cassette import Reply
 from dorothie_gym.policies.language_model.co_wizard import CoWizardInterface
@@ -23,7 +23,9 @@ from dorothie_gym.policies.language_model.role_interface import Memory, RoleInte
 from dorothie_gym.policies.language_model.usage import ModelUsage
 from dorothie_gym.policies.observation_parser import scalar
 from dorothie_gym.policies.policy import Policy, replace
-from dorothie_gym.spaces import ActionDict, ObservationMapping, SpaceLimits
+from dorothie_gym.spaces.actions import ActionDict
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 _LOG = logging.getLogger(__name__)
 

@@ -10,9 +10,10 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import ClassVar, Final, Generic, TypeVar
 
-from dorothie_gym.dialogue import guess_spans
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import LandmarkName, Role, StreetName
+from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField, WordsField
 from dorothie_gym.policies.observation_parser import (
     SeenLandmark,
@@ -24,7 +25,9 @@ from dorothie_gym.policies.observation_parser import (
     street_of,
 )
 from dorothie_gym.policies.policy import DecisionClock, replace
-from dorothie_gym.spaces import ActionDict, ObservationMapping, SpaceLimits, Speech
+from dorothie_gym.spaces.actions import ActionDict, Speech
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 KEEP: Final = "keep"
 """Label of leaving a goal, a status or a plan as it is."""

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.maps import Town
-from dorothie_gym.ontology import PhysicalAction
-from dorothie_gym.policies.co_wizard import ScriptedCoWizard, attend, respond
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.policies.co_wizard.driving import distance_ahead
+from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, attend, respond
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.navigation.actions import LEFT, NavigationAction, prepares
@@ -25,7 +25,9 @@ from dorothie_gym.policies.navigation.navigation_policy import (
 )
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.policies.route_progress import lanes_beside
-from dorothie_gym.spaces import CoWizardAction, Motion, ObservationMapping, Physical
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import CoWizardAction, Physical
+from dorothie_gym.spaces.observations import ObservationMapping
 
 STOP_FOR_GOAL = 30.0
 """Distance to the destination within which a stop is attributed to it [m]."""

@@ -14,7 +14,7 @@ from dorothie_gym.maps.polyline import closest_on_segment
 from dorothie_gym.maps.route_arrays import RouteSearch
 from dorothie_gym.maps.route_search import find_route
 from dorothie_gym.maps.routing_graph import CHANGE_LEFT, NONE, U_TURN, RoutingGraph
-from dorothie_gym.ontology import ActionValue
+from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.guidance_config import GuidanceConfig
 from dorothie_gym.policies.navigation.instructor_arrays import LEGS_LEFT, InstructorArrays, StepKind
 from dorothie_gym.policies.navigation.junction_exits import nearest_sector

@@ -9,11 +9,16 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.maps import LinkType, Town
+from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, PhysicalAction, Role, StreetName
-from dorothie_gym.policies.co_wizard import CoWizardStyle, ScriptedCoWizard, attend, respond
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, StreetName
+from dorothie_gym.policies.co_wizard.config import CoWizardStyle
 from dorothie_gym.policies.co_wizard.driving import CRUISE_TOLERANCE, distance_ahead, wanted_exit
+from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard, attend, respond
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.guidance_config import NUDGE_DISTANCE, GuidanceConfig
@@ -30,7 +35,10 @@ from dorothie_gym.policies.navigation.observation_vector import (
 )
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import stopping_distance
-from dorothie_gym.spaces import ActionDict, Motion, ObservationMapping, Physical, SpaceLimits
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces.actions import ActionDict, Physical
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 ARRIVED_WITHIN = 3.0
 """Distance to its destination within which a standing car is taken to have arrived [m]; wider than the instructor's

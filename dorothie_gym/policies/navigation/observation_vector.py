@@ -14,18 +14,14 @@ from numpy.typing import NDArray
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray, plain
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.routing_graph import RoutingLane
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueMove,
-    LandmarkName,
-    ObjectClass,
-    PhysicalAction,
-    WeatherParameter,
-)
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.navigation.actions import write_mask
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo, cost_from
 from dorothie_gym.policies.navigation.driver_view import (
@@ -46,9 +42,10 @@ from dorothie_gym.sim.ego.limits import MAX_CRUISE
 from dorothie_gym.sim.ego.manoeuvres import find_oncoming
 from dorothie_gym.sim.network.centre_lines import position_on, project_on
 from dorothie_gym.sim.network.network import network_of
+from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.spaces import Motion, ObservationMapping
 from dorothie_gym.spaces.fields import share, signal, sizes
+from dorothie_gym.spaces.observations import ObservationMapping
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -1,5 +1,5 @@
 """Scripted participant: knows the tasks and all places, and gets the tasks done by dialogue."""
 
-from dorothie_gym.policies.participant.policy import ScriptedParticipant
+import lazy_loader
 
-__all__ = ["ScriptedParticipant"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,17 +6,15 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import (
-    CommunicativeFunction,
-    Direction,
-    Predicate,
-    Proposition,
-    SpeakerStyle,
-    Wording,
-    word_act,
-)
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.nlg import word_act
 from dorothie_gym.dialogue.phrases import Register
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, Role
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.dialogue.speaker_style import SpeakerStyle
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.retrying import IN_VAIN, why_standing
 from dorothie_gym.policies.participant.state import ParticipantState

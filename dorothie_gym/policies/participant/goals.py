@@ -8,15 +8,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Predicate, Proposition, Wording
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.routing import router
-from dorothie_gym.ontology import (
-    ActionValue,
-    GoalStatus,
-    LandmarkName,
-    StreetName,
-)
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, StreetName
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal

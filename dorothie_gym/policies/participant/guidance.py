@@ -6,17 +6,15 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import (
-    CommunicativeFunction,
-    Direction,
-    Predicate,
-    Proposition,
-    Wording,
-    speech_seconds,
-    word_act,
-)
+from dorothie_gym.dialogue.conversation import speech_seconds
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.nlg import word_act
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.maps.routing import LaneEntry
-from dorothie_gym.ontology import ActionValue, DialogueMove, Role, Slot, StreetName
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, Slot, StreetName
 from dorothie_gym.policies.feasibility import slowing_distance
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import street_of

@@ -6,10 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction, Direction, Predicate, Proposition, Wording
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.whereabouts import corner_of, is_on_right, signals_near
-from dorothie_gym.ontology import LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import SeenLandmark, street_of
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView

@@ -6,9 +6,10 @@ import re
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Predicate, Proposition, Wording
 from dorothie_gym.dialogue.conversation import WORDS_PER_SECOND
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.policies.observation_parser import SeenLandmark
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView

@@ -5,8 +5,10 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.dialogue import CommunicativeFunction, Wording
-from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, StreetName
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, StreetName
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.speech import Remark, intend
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from dorothie_gym.dialogue import draw_style
-from dorothie_gym.maps import Town
+from dorothie_gym.dialogue.speaker_style import draw_style
+from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightColour
-from dorothie_gym.ontology import Role
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.participant.goals import announce_target, choose_target, note_tasks, resume_after_wait
@@ -22,7 +22,9 @@ from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.speech import SpeechState
-from dorothie_gym.spaces import ActionDict, ObservationMapping, ParticipantAction, SpaceLimits
+from dorothie_gym.spaces.actions import ActionDict, ParticipantAction
+from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.spaces.observations import ObservationMapping
 
 LONG_RED = 10.0
 """Standstill at a red light that is felt as long [s]."""

@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 
-from dorothie_gym.dialogue import ASKED, Predicate, Proposition, Wording, WordingContext
-from dorothie_gym.dialogue import CommunicativeFunction as Function
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.propositions import ASKED, Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording, WordingContext
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import ActionValue, LandmarkName, ObjectClass, PropKind, StreetName, WeatherParameter
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
+from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.mood import Happening

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction, ParsedText, is_partly_inaudible, speech_seconds
-from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalStatus, Slot, SlotValue
+from dorothie_gym.dialogue.conversation import is_partly_inaudible, speech_seconds
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot, SlotValue
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.participant.state import ParticipantState

@@ -7,16 +7,17 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import ParsedText, Predicate, Proposition, Wording
-from dorothie_gym.ontology import (
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import (
     ActionValue,
-    DialogueAct,
-    DialogueMove,
     GoalStatus,
     LandmarkName,
     ObjectClass,
-    Role,
     Slot,
     SlotValue,
     StreetName,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, Wording
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.routing import LaneEntry
-from dorothie_gym.ontology import ActionValue, MoveGroup
+from dorothie_gym.ontology.dialogue_acts import MoveGroup
+from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace

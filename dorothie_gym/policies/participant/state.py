@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from dorothie_gym.dialogue import Proposition
-from dorothie_gym.ontology import LandmarkName
+from dorothie_gym.dialogue.propositions import Proposition
+from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.noticing import Noticed
 from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle

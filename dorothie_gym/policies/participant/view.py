@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dorothie_gym import portable_math as pm
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import LandmarkName
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.policies.guidance_config import STANDING_SPEED
 from dorothie_gym.policies.observation_parser import (
     SeenLandmark,
@@ -18,7 +18,7 @@ from dorothie_gym.policies.observation_parser import (
     read_subgoals,
     scalar,
 )
-from dorothie_gym.spaces import ObservationMapping
+from dorothie_gym.spaces.observations import ObservationMapping
 
 ACROSS_LANE = 0.8
 """Cosine of the angle between car and lane below which the car is in the middle of a U-turn."""

@@ -7,17 +7,12 @@ from collections.abc import Collection
 
 import numpy as np
 
-from dorothie_gym.dialogue import CommunicativeFunction as Function
-from dorothie_gym.dialogue import Direction, ParsedText, Predicate, Proposition, Wording
-from dorothie_gym.ontology import (
-    ActionValue,
-    DialogueAct,
-    DialogueMove,
-    LandmarkName,
-    Slot,
-    SlotValue,
-    StreetName,
-)
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Direction, Wording
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.slots import ActionValue, LandmarkName, Slot, SlotValue, StreetName
 from dorothie_gym.policies import contents
 from dorothie_gym.policies.observation_parser import SeenSubgoal
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction

@@ -1,8 +1,5 @@
 """Situated Dialogue Navigation corpus (SDN): reader into `Session`, and writer of its release layout."""
 
-from dorothie_gym.recording.sdn.files import SdnLayout, detect_layout
-from dorothie_gym.recording.sdn.reader import read_sdn, settle_sign
-from dorothie_gym.recording.sdn.turn_angles import SignVote
-from dorothie_gym.recording.sdn.writer import write_sdn
+import lazy_loader
 
-__all__ = ["SdnLayout", "SignVote", "detect_layout", "read_sdn", "settle_sign", "write_sdn"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

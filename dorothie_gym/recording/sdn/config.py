@@ -9,7 +9,7 @@ from typing import Final
 
 from dorothie_gym import portable_math as pm
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology import parse_street
+from dorothie_gym.ontology.spellings import parse_street
 from dorothie_gym.recording.header import LandmarkRow, SessionHeader, SubgoalRow
 from dorothie_gym.recording.sdn.files import (
     CONFIG_FILE,

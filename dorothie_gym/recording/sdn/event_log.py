@@ -9,19 +9,16 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from dorothie_gym.errors import OntologyError, SessionError
-from dorothie_gym.ontology import (
+from dorothie_gym.ontology.actions import (
     LANE_SWITCH_LEFT,
     LANE_SWITCH_RIGHT,
     NAVIGATION_ACTIONS,
     ArgumentKind,
     MentalAction,
     PhysicalAction,
-    Role,
-    parse_goal_status,
-    parse_mental_action,
-    parse_physical_action,
-    parse_role,
 )
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.spellings import parse_goal_status, parse_mental_action, parse_physical_action, parse_role
 from dorothie_gym.ontology.vocabulary import normalise
 from dorothie_gym.recording.events import Event, EventType, check_event
 from dorothie_gym.recording.sdn.audio import AudioFiles

@@ -8,7 +8,8 @@ from types import MappingProxyType
 from typing import Final
 
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology import LandmarkName, parse_landmark
+from dorothie_gym.ontology.slots import LandmarkName
+from dorothie_gym.ontology.spellings import parse_landmark
 
 _WALKER: Final = "walker."
 _PREFIXES: Final = ("static.prop.", "null.")

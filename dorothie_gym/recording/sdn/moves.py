@@ -8,7 +8,9 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym.ontology import DialogueMove, Role, parse_act, parse_move
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.spellings import parse_act, parse_move
 from dorothie_gym.recording.sdn.audio import AudioFiles
 from dorothie_gym.recording.sdn.files import (
     MORE,

@@ -9,14 +9,10 @@ from pathlib import Path
 from typing import Final
 
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology import (
-    ExceptionKind,
-    MentalAction,
-    Role,
-    parse_exception,
-    parse_goal_status,
-    parse_prop,
-)
+from dorothie_gym.ontology.actions import MentalAction
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.spellings import parse_exception, parse_goal_status, parse_prop
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.file_names import MAX_EVENTS
 from dorothie_gym.recording.header import SessionHeader, SubgoalRow

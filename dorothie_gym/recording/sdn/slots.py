@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology import SLOT_VALUES, Slot, SlotValue, parse_slot, parse_slot_value
+from dorothie_gym.ontology.slots import SLOT_VALUES, Slot, SlotValue
+from dorothie_gym.ontology.spellings import parse_slot, parse_slot_value
 from dorothie_gym.ontology.vocabulary import normalise
 from dorothie_gym.recording.sdn.files import JsonObject, plain, whole_of
 from dorothie_gym.recording.sdn.landmark_names import landmark_name

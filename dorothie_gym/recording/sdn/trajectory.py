@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym import portable_arrays as pn
 from dorothie_gym.errors import SessionError
-from dorothie_gym.maps import NO_STREET, LinkType, Town
+from dorothie_gym.maps.model import NO_STREET, LinkType
+from dorothie_gym.maps.town import Town
 from dorothie_gym.recording.file_names import MAX_FRAME, MAX_FRAMES
 from dorothie_gym.recording.frames import read_frames, write_frames
 from dorothie_gym.recording.sdn.files import number_of, read_csv

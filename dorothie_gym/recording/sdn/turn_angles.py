@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.sdn.trajectory import CarPoses, SdnMap
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH

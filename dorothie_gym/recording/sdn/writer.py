@@ -14,18 +14,12 @@ import numpy as np
 
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.files import write_atomically
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.ontology import (
-    SPEED_STEP,
-    ArgumentKind,
-    ExceptionKind,
-    MentalAction,
-    Role,
-    parse_mental_action,
-    parse_physical_action,
-    parse_prop,
-)
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.actions import SPEED_STEP, ArgumentKind, MentalAction
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.spellings import parse_mental_action, parse_physical_action, parse_prop
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.recording.events import Event, EventType
 from dorothie_gym.recording.file_names import AUDIO_FOLDER, EVENTS_FILE
 from dorothie_gym.recording.header import LandmarkRow, SessionHeader
@@ -176,7 +170,7 @@ def _write_audio(folder: Path, session: Session) -> None:
         AudioError: a file is damaged.
         SpeechError: the extra `speech` is not installed.
     """
-    from dorothie_gym.speech import encode_flac, read_audio
+    from dorothie_gym.speech.audio import encode_flac, read_audio
 
     folder.mkdir()
     for utterance in session.utterances():

@@ -8,14 +8,20 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from dorothie_gym.errors import PolicyLoadError, short_repr
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import ALL_SCRIPTED, Player, find_player, policy_names
-from dorothie_gym.policies.language_model import LanguageModelConfig
-from dorothie_gym.policies.policy_loader import LANGUAGE_MODEL, WITH_TRAITS
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.language_model.config import LanguageModelConfig
+from dorothie_gym.policies.policy_loader import (
+    ALL_SCRIPTED,
+    LANGUAGE_MODEL,
+    WITH_TRAITS,
+    Player,
+    find_player,
+    policy_names,
+)
 from dorothie_gym.policies.pretrained import is_pretrained
 from dorothie_gym.recording.json_io import same_json
 from dorothie_gym.rollout.closed_loop.running import RolloutSettings
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.spaces.limits import SpaceLimits
 
 
 class Claim(enum.StrEnum):

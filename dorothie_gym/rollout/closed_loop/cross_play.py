@@ -14,9 +14,8 @@ from typing import Final
 from rich.table import Table
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import Player
-from dorothie_gym.policies.policy_loader import SCRIPTED
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.policy_loader import SCRIPTED, Player
 from dorothie_gym.rollout.closed_loop.leaderboard import model_name
 from dorothie_gym.rollout.closed_loop.many_rollouts import folder_name, roll_out_all
 from dorothie_gym.rollout.closed_loop.results import ALL_METRICS, RolloutResult, figure_text

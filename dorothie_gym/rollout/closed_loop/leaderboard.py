@@ -13,7 +13,8 @@ from typing import Final
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import RolloutError, printable
 from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
-from dorothie_gym.ontology import ExceptionKind, Role
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.rollout.closed_loop.claims import Claim, claims_of
 from dorothie_gym.rollout.closed_loop.metrics import ClosedLoopMetric, RecoverySeconds
 from dorothie_gym.rollout.closed_loop.results import (

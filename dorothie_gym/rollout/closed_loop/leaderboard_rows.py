@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import ALL_SCRIPTED, Player
-from dorothie_gym.policies.policy_loader import LANE_FOLLOW
+from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, LANE_FOLLOW, Player
 from dorothie_gym.policies.pretrained import names_for
 from dorothie_gym.rollout.closed_loop.leaderboard import ENOUGH, IMPORTED
 from dorothie_gym.rollout.closed_loop.many_rollouts import folder_name

@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import Player
-from dorothie_gym.recording import safe_name
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.policy_loader import Player
+from dorothie_gym.recording.file_names import safe_name
 from dorothie_gym.rollout.closed_loop.results import RESULT_FILE, RolloutResult, read_result
 from dorothie_gym.rollout.closed_loop.running import RolloutSettings, roll_out
 

@@ -15,7 +15,8 @@ from dorothie_gym.analysis.intervals import CONFIDENCE, RESAMPLES
 from dorothie_gym.errors import InputFileError, RolloutError
 from dorothie_gym.files import JsonValue
 from dorothie_gym.input_files import MAX_RESULT_JSON, checked, raising, read_json
-from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind
+from dorothie_gym.ontology.roles import AGENT_ROLES
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.language_model.usage import UsagePage
 from dorothie_gym.rollout.closed_loop.metrics import (
     BOOTSTRAP_SEED,

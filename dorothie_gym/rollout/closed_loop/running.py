@@ -13,11 +13,11 @@ import numpy as np
 from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.files import write_atomically
-from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import ALL_SCRIPTED, Player
-from dorothie_gym.policies.language_model import LanguageModelConfig
-from dorothie_gym.recording import safe_name
+from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS, load_town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.language_model.config import LanguageModelConfig
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
+from dorothie_gym.recording.file_names import safe_name
 from dorothie_gym.recording.json_io import to_page
 from dorothie_gym.rollout.closed_loop.results import RESULT_FILE, RolloutResult, RolloutRow
 from dorothie_gym.rollout.closed_loop.session_record import SessionRecord, measure

@@ -16,20 +16,22 @@ from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import DorothieGymError, SessionError, one_line, short_repr
-from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.policies import Player
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_seed
-from dorothie_gym.recording import (
-    EndReason,
-    EventType,
-    Session,
-    SessionHeader,
+from dorothie_gym.policies.policy_loader import Player
+from dorothie_gym.recording.comparison import first_difference
+from dorothie_gym.recording.events import EndReason, EventType
+from dorothie_gym.recording.file_names import (
+    ACTIONS_FILE,
+    AUDIO_FOLDER,
+    EVENTS_FILE,
+    FRAMES_FILE,
+    HEADER_FILE,
     SessionState,
-    first_difference,
-    session_state,
 )
-from dorothie_gym.recording.file_names import ACTIONS_FILE, AUDIO_FOLDER, EVENTS_FILE, FRAMES_FILE, HEADER_FILE
+from dorothie_gym.recording.header import SessionHeader
 from dorothie_gym.recording.json_io import same_json
+from dorothie_gym.recording.session import Session, session_state
 from dorothie_gym.rollout.closed_loop.results import RolloutRow
 from dorothie_gym.rollout.closed_loop.running import RolloutPlan
 from dorothie_gym.rollout.closed_loop.session_record import measure

@@ -15,10 +15,13 @@ from dorothie_gym.analysis.exception_attribution import MEETING_DISTANCE, kind_o
 from dorothie_gym.analysis.units import Units
 from dorothie_gym.dialogue.exchanges import ExchangeState
 from dorothie_gym.errors import RolloutError, short_repr
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
-from dorothie_gym.ontology import DialogueMove, ExceptionKind, ObjectClass
-from dorothie_gym.recording import FRAME_RATE, EndReason, Event, EventType, Session
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
+from dorothie_gym.recording.events import EndReason, Event, EventType
+from dorothie_gym.recording.session import Session
 from dorothie_gym.rollout.closed_loop.task_progress import (
     TaskRecord,
     TaskRoutes,
@@ -29,6 +32,7 @@ from dorothie_gym.rollout.closed_loop.task_progress import (
     task_at_end,
     without_reached,
 )
+from dorothie_gym.sim.config import FRAME_RATE
 
 Count: TypeAlias = Annotated[int, Meta(ge=0, lt=2**31)]
 """Number in JSON."""

@@ -23,9 +23,9 @@ from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import RolloutError, one_line, short_repr
 from dorothie_gym.files import JsonValue
 from dorothie_gym.input_files import MAX_RESULT_JSON, MAX_SMALL_JSON, checked, raising, read_json
-from dorothie_gym.ontology import Role
-from dorothie_gym.policies import ALL_SCRIPTED, Player
-from dorothie_gym.recording import FORMAT_VERSION
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
+from dorothie_gym.recording.header import FORMAT_VERSION
 from dorothie_gym.recording.json_io import same_json, to_line
 from dorothie_gym.rollout.closed_loop.claims import Claim, can_play, claims_of, faults_of_claims, shipped_player
 from dorothie_gym.rollout.closed_loop.results import RESULT_FILE, RolloutResult, read_result

@@ -12,11 +12,15 @@ from numpy.typing import NDArray
 from dorothie_gym import portable_arrays as pn
 from dorothie_gym import portable_math as pm
 from dorothie_gym.analysis.exception_attribution import kind_of
-from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place, router
-from dorothie_gym.ontology import ExceptionKind, GoalStatus
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.slots import GoalStatus
+from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
-from dorothie_gym.recording import NO_LANE, Event, EventType, LandmarkRow, Session
+from dorothie_gym.recording.events import Event, EventType
+from dorothie_gym.recording.header import LandmarkRow
+from dorothie_gym.recording.session import Session
+from dorothie_gym.recording.trajectory import NO_LANE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from dorothie_gym.errors import SessionError
 from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
-from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.policies.language_model.usage import ModelUsage, UsagePage
 from dorothie_gym.rollout.play import USAGE_FILE
 

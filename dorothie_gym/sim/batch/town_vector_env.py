@@ -22,7 +22,7 @@ from dorothie_gym.action_values import as_array
 from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.copying import Restorable
 from dorothie_gym.errors import short_repr
-from dorothie_gym.maps import load_town
+from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.batch.egos import (
     FASTER,

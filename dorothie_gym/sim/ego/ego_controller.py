@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from dorothie_gym.compilation.records import filled_records, plain
 from dorothie_gym.copying import shared
-from dorothie_gym.ontology import SPEED_STEP, PhysicalAction
+from dorothie_gym.ontology.actions import SPEED_STEP, PhysicalAction
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE
 from dorothie_gym.sim.ego.planner import LocalPlanner

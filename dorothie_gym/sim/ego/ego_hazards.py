@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.ego.limits import (
     BEGUN,
     EGO_STANDING,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dorothie_gym.ontology import SPEED_STEP
+from dorothie_gym.ontology.actions import SPEED_STEP
 from dorothie_gym.sim.ego.limits import (
     EGO_MOVING,
     HARD_STOP,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
-from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.ego.course import PATH_SPACING, height_at_point
 from dorothie_gym.sim.ego.path import WIDEST_SWEEP, point_at
 from dorothie_gym.sim.state.codes import STATIC

@@ -17,7 +17,7 @@ from dorothie_gym.compilation.records import plain
 from dorothie_gym.copying import Lookups
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.sim.ego.feasibility import FeasibleManoeuvres
 from dorothie_gym.sim.ego.manoeuvres import find_feasible, request
 from dorothie_gym.sim.ego.path import Path

@@ -7,7 +7,8 @@ from typing import cast
 
 import numpy as np
 
-from dorothie_gym.ontology import ObjectClass, PhysicalAction
+from dorothie_gym.ontology.actions import PhysicalAction
+from dorothie_gym.ontology.slots import ObjectClass
 
 VEHICLES, PEDESTRIAN_CLASS, STATIC = (
     int(kind.value) for kind in (ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC)

@@ -7,7 +7,7 @@ from typing import Any
 from dorothie_gym.baselines.acting.decision_trigger import DecisionTrigger, TriggerState
 from dorothie_gym.ontology import ObjectClass, PhysicalAction
 from dorothie_gym.policies.route_progress import Choice
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 from tests.baselines.acting.observed import town, view
 
 NOTHING, BOTH, DRIVES = DecisionTrigger(), DecisionTrigger(speaks=True, drives=True), DecisionTrigger(drives=True)

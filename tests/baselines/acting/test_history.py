@@ -8,7 +8,8 @@ from dorothie_gym.baselines.acting.history import History, HistoryTracker, carri
 from dorothie_gym.benchmark.features import HistorySizes
 from dorothie_gym.dialogue import Span
 from dorothie_gym.ontology import DialogueAct, DialogueMove, PhysicalAction, Role
-from dorothie_gym.spaces import Motion, Physical, Speech
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.spaces import Physical, Speech
 from tests.baselines.acting.observed import town, view
 
 OKAY = DialogueAct.of(DialogueMove.ACKNOWLEDGE)

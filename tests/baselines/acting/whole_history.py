@@ -20,7 +20,6 @@ from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.recording import (
     ACTOR_DTYPE,
-    FRAME_RATE,
     TRAJECTORY_DTYPE,
     WEATHER_DTYPE,
     Event,
@@ -33,6 +32,7 @@ from dorothie_gym.recording import (
 )
 from dorothie_gym.recording.surroundings import LIGHT_DTYPE
 from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
+from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.spaces import Physical
 
 

@@ -15,7 +15,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import HeardUtterance, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
-from dorothie_gym.spaces import Motion
+from dorothie_gym.sim.state.codes import Motion
 
 STANDS = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
 

@@ -19,9 +19,10 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 
 from stable_baselines3.common.vec_env import VecMonitor
 
-from dorothie_gym.baselines.rl import ALGORITHMS, ModelFileError, SettingsError, Training, TrainingSettings
+from dorothie_gym.baselines.rl import ALGORITHMS, Training, TrainingSettings
 from dorothie_gym.baselines.rl import training as training_module
 from dorothie_gym.baselines.rl.resumption import CHECKPOINT
+from dorothie_gym.errors import ModelFileError, SettingsError
 from tests.baselines.rl.test_training import settings_for
 
 POLE: dict[str, Any] = {"env": "CartPole-v1", "env_settings": {}, "evaluate_every": 128, "steps": 512, "episodes": 2}

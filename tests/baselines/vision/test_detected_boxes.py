@@ -21,11 +21,12 @@ from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes, actors_a
 from dorothie_gym.baselines.vision.detector import Detector
 from dorothie_gym.baselines.vision.frames import SPACE_COLUMNS
 from dorothie_gym.baselines.vision.segformer import SegFormer
-from dorothie_gym.benchmark.features import ObjectKind, columns_of, points
+from dorothie_gym.benchmark.features import columns_of, points
 from dorothie_gym.camera.pose import CameraPose, view_from
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import ActorKind, Session, Task
+from dorothie_gym.recording.recorded_perception import ObjectKind
 from tests.baselines.vision.test_detector import TINY
 from tests.baselines.vision.test_segformer import TINY as TINY_READER
 from tests.benchmark.features.played import play

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.benchmark.features import OBJECT_VALUES, Columns, ObjectKind, VisibleBoxes, build, columns_of
+from dorothie_gym.benchmark.features import Columns, VisibleBoxes, build, columns_of
 from dorothie_gym.camera.visibility import PERCEPTION_CAMERA
 from dorothie_gym.recording import Session
+from dorothie_gym.recording.recorded_perception import OBJECT_VALUES, ObjectKind
 from tests.benchmark.corpora import corpus
 
 ACTORS = (ObjectKind.VEHICLE, ObjectKind.CYCLIST, ObjectKind.PEDESTRIAN, ObjectKind.PROP)

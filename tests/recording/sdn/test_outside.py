@@ -300,7 +300,7 @@ def test_a_log_that_is_missing_is_no_session(layout: str, request: pytest.Fixtur
 
 @pytest.mark.parametrize("layout", ["release", "sample"])
 def test_it_plays_over_an_imported_town(layout: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
-    from dorothie_gym.rollout import Playback
+    from dorothie_gym.rendering.playback import Playback
 
     session = read_session(request.getfixturevalue(layout))
     scenes = list(Playback(session, load_town("brookside")).scenes(1.0))

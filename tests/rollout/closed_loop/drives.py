@@ -11,8 +11,9 @@ import numpy as np
 
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import GoalStatus, Role
-from dorothie_gym.recording import FRAME_RATE, Event, EventType, LandmarkRow, Session, SubgoalRow, trajectory_of
+from dorothie_gym.recording import Event, EventType, LandmarkRow, Session, SubgoalRow, trajectory_of
 from dorothie_gym.rollout.closed_loop import SessionRecord, TalkRecord
+from dorothie_gym.sim.config import FRAME_RATE
 from tests.recording.builders import header
 from tests.sim.network.towns import straight_town, town
 

@@ -1,0 +1,7 @@
+"""Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
+
+from .config import LanguageModelConfig as LanguageModelConfig
+from .config import SimulatedTime as SimulatedTime
+from .faults import Fault as Fault
+from .policy import LanguageModelPolicy as LanguageModelPolicy
+from .usage import ModelUsage as ModelUsage

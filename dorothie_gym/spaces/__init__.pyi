@@ -1,0 +1,37 @@
+"""Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
+
+from .actions import NO_MOVE as NO_MOVE
+from .actions import ActionDecoder as ActionDecoder
+from .actions import ActionDict as ActionDict
+from .actions import ActionMapping as ActionMapping
+from .actions import AdWizardAction as AdWizardAction
+from .actions import CoWizardAction as CoWizardAction
+from .actions import LanePosition as LanePosition
+from .actions import Mental as Mental
+from .actions import ParticipantAction as ParticipantAction
+from .actions import Physical as Physical
+from .actions import RoleAction as RoleAction
+from .actions import Speech as Speech
+from .actions import StepInfo as StepInfo
+from .actions import action_fields as action_fields
+from .actions import action_space as action_space
+from .actions import decode_action as decode_action
+from .actions import noop as noop
+from .fields import AnySpace as AnySpace
+from .fields import Column as Column
+from .fields import FieldKind as FieldKind
+from .fields import FieldSpec as FieldSpec
+from .fields import dict_space as dict_space
+from .limits import SpaceLimits as SpaceLimits
+from .limits import plain_text as plain_text
+from .observations import ExitColumn as ExitColumn
+from .observations import GuessColumn as GuessColumn
+from .observations import LandmarkColumn as LandmarkColumn
+from .observations import ObjectColumn as ObjectColumn
+from .observations import Observation as Observation
+from .observations import ObservationMapping as ObservationMapping
+from .observations import PropColumn as PropColumn
+from .observations import SubgoalColumn as SubgoalColumn
+from .observations import heard_acts as heard_acts
+from .observations import observation_fields as observation_fields
+from .observations import observation_space as observation_space
