@@ -21,15 +21,16 @@ from rich.progress import Progress
 from rich.table import Table
 
 from dorothie_gym.analysis.intervals import wilson_interval
+from dorothie_gym.camera.camera_perception import CameraPerception
 from dorothie_gym.camera.cells import sorted_by_cell
 from dorothie_gym.camera.mesh import empty_mesh
+from dorothie_gym.camera.pose import pose_on_car
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.scenery.lenses import Lenses
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.camera.visibility import PERCEPTION_CAMERA, is_body_seen
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.engine.camera_perception import CameraPerception
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.session_engine import SessionEngine
@@ -107,7 +108,7 @@ class Census:
     def _pixels(self, world: World, arrays: WorldArrays) -> dict[int, int]:
         """Returns the visible pixels of bodies by key, without the town."""
         x, y = world.car.position.tolist()
-        pose = PERCEPTION_CAMERA.pose_on(x, y, float(world.car.height), float(world.car.heading))
+        pose = pose_on_car(PERCEPTION_CAMERA.mount, x, y, float(world.car.height), float(world.car.heading))
         boxes = self._bodies_only.render_from(pose, arrays, world.weather, time=world.time).boxes
         assert boxes is not None
         return dict(zip(boxes.keys.tolist(), boxes.pixels.tolist(), strict=True))

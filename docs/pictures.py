@@ -30,12 +30,13 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from dorothie_gym.bench.report import Report, draw, world_report
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.camera.pose import pose_on_car
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.cli.run import draw_session
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
@@ -147,7 +148,7 @@ def draw_camera(path: Path) -> None:
     mark = next(mark for mark in marks if mark.name is CAMERA_LANDMARK)
     lane, station = engine.town.lanes[mark.lane], max(mark.station - 26.0, 0.0)
     x, y = lane.position(station).tolist()
-    pose = camera.config.pose_on(x, y, lane.height_at(station), lane.heading_at(station))
+    pose = pose_on_car(camera.config.mount, x, y, lane.height_at(station), lane.heading_at(station))
     day, night, rain = Weather(), Weather(), Weather()
     night.set(WeatherParameter.SUN_ALTITUDE_ANGLE, -20.0)
     for parameter, value in ((WeatherParameter.PRECIPITATION, 60.0), (WeatherParameter.CLOUDINESS, 90.0)):

@@ -1,9 +1,9 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
 from ._version import __version__ as __version__
-from .camera.config import CameraConfig as CameraConfig
-from .camera.config import CameraMount as CameraMount
-from .camera.config import CameraOutput as CameraOutput
+from .engine.camera_config import CameraConfig as CameraConfig
+from .engine.camera_config import CameraMount as CameraMount
+from .engine.camera_config import CameraOutput as CameraOutput
 from .engine.config import EnvConfig as EnvConfig
 from .engine.config import RewardWeights as RewardWeights
 from .engine.scenario import Scenario as Scenario

@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from dorothie_gym.camera import warm_up as camera
 from dorothie_gym.compilation import compiled_folder
-from dorothie_gym.engine import camera_warm_up as camera
 from dorothie_gym.engine.warm_up import is_warm
 from dorothie_gym.envs import warm_up as navigation
 from dorothie_gym.user_cache import CACHE_VARIABLE
@@ -55,7 +55,7 @@ if "2" in sys.argv[4:]:
         warm_up(everything=True)
 os.close(int(sys.argv[2]))
 if "3" in sys.argv[4:]:
-    from dorothie_gym.engine.camera_warm_up import warm_up
+    from dorothie_gym.camera.warm_up import warm_up
     warm_up()
 """
 """Program that compiles sessions, then batches, then the camera, and gives a lock back after each.

@@ -116,9 +116,9 @@ class TestRun:
         assert result.exit_code == 2 and "leave it out with --speech" in result.stderr
 
     def test_speech_without_its_extra_is_reported(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        from dorothie_gym.speech import extras
+        from dorothie_gym import optional_modules
 
-        monkeypatch.setattr(extras, "PACKAGES", ("no_such_voice",))
+        monkeypatch.setattr(optional_modules, "PACKAGES", ("no_such_voice",))
         result = call("run", "--speech")
         assert result.exit_code == 2
         assert "speech needs no_such_voice: pip install 'dorothie-gym[speech]'" in result.stderr

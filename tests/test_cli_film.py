@@ -12,12 +12,12 @@ from click.testing import Result
 from numpy.typing import NDArray
 from typer.testing import CliRunner
 
-from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.cli import app
 from dorothie_gym.cli import film as film_module
 from dorothie_gym.cli import sessions as sessions_module
 from dorothie_gym.cli.film import Film
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town

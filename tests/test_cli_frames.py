@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from PIL import Image
 from typer.testing import CliRunner
 
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.cli import app
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town

@@ -14,11 +14,11 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
+from dorothie_gym.audio import read_audio
 from dorothie_gym.cli import app
 from dorothie_gym.recording import Session, read_session
 from dorothie_gym.recording.sdn.writer import write_sdn
 from dorothie_gym.recording.sound import sound_track, utterance_audio
-from dorothie_gym.speech import read_audio
 from tests.recording.spoken import spoken_session
 
 

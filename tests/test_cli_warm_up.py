@@ -13,9 +13,9 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
+from dorothie_gym.camera import warm_up as camera
 from dorothie_gym.cli import warm_up as command
 from dorothie_gym.cli.app import app
-from dorothie_gym.engine import camera_warm_up as camera
 from dorothie_gym.engine import warm_up as compiling
 from dorothie_gym.envs import warm_up as batches
 

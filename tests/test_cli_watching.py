@@ -16,11 +16,11 @@ from dorothie_gym.cli import app
 from dorothie_gym.cli.film import Film
 from dorothie_gym.cli.live import LiveShow, script_lines
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.engine.session_scene import scene_of
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.recording import EventType, Session
 from dorothie_gym.rendering.playback import Playback
+from dorothie_gym.rendering.session_scene import scene_of
 from dorothie_gym.rollout import play_session
 
 

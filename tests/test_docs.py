@@ -18,10 +18,11 @@ import yaml
 from dorothie_gym.benchmark import metrics_of, read_predictions
 from dorothie_gym.benchmark.features import Batch
 from dorothie_gym.benchmark.predictions import file_schema
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.dialogue.grammar import parse_grammar
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.dialogue.talk_files import read_talk_files
+from dorothie_gym.engine.cabin import CabinState, signal_to_noise
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, describe, load_town, town_names
 from dorothie_gym.ontology import Question, WeatherParameter, paths
@@ -30,7 +31,6 @@ from dorothie_gym.recording import Task
 from dorothie_gym.rollout.closed_loop import METRICS, RecoverySeconds
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.weather import Weather
-from dorothie_gym.speech import CabinState, signal_to_noise
 from dorothie_gym.studies.export import COLUMNS
 from dorothie_gym.studies.items import Item
 from dorothie_gym.studies.study import Study

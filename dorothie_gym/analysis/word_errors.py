@@ -12,11 +12,11 @@ import numpy as np
 from rapidfuzz.distance import Levenshtein
 
 from dorothie_gym.dialogue.recognition_errors import Loudness, WordClass, word_class
+from dorothie_gym.engine.cabin import CabinState, signal_to_noise
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.recording.events import MoveRecord
 from dorothie_gym.recording.session import Session
-from dorothie_gym.speech.cabin_noise import CabinState, signal_to_noise
 from dorothie_gym.speech.spoken_form import spoken_words
 
 _Key = TypeVar("_Key", Role, Loudness, WordClass)

@@ -145,8 +145,8 @@ class SessionPage:
         Raises:
             SessionError: the session has no frames or no surroundings, or its town is not known.
         """
-        from dorothie_gym.camera.config import CameraConfig
         from dorothie_gym.camera.recorded_pictures import RecordedPictures
+        from dorothie_gym.engine.camera_config import CameraConfig
 
         if self.town is None:
             raise SessionError(f"{self.session.name}: its town {self.session.header.town!r} is not known; give --maps")

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from dorothie_gym.audio import read_audio
 from dorothie_gym.baselines.encoders.encoder import SpeechEncoder
 from dorothie_gym.baselines.encoders.pretrained import HubertEncoder
 from dorothie_gym.baselines.encoders.sound import BANDS, FRAMES, SpeechEmbeddingEncoder, mel_table
@@ -21,7 +22,6 @@ from dorothie_gym.recording.corpus import Corpus
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.sound import audio_files
 from dorothie_gym.recording.visibility import Task
-from dorothie_gym.speech.audio import read_audio
 
 Sound: TypeAlias = Literal["log-mel", "speech-embedding", "hubert"]
 """Encoder of sound: log-mel spectra for a convolution that is trained with the model, or frozen vectors."""

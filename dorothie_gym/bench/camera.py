@@ -17,11 +17,11 @@ import numpy as np
 from dorothie_gym.bench.metadrive import metadrive_reference
 from dorothie_gym.bench.opengl import opengl_reference
 from dorothie_gym.bench.timing import Figures, Progress, cpu_seconds, ignore_progress, machine, rounded
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
-from dorothie_gym.camera.pose import CameraPose
+from dorothie_gym.camera.pose import CameraPose, pose_on_car
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
+from dorothie_gym.engine.camera_config import CameraConfig, CameraMount, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps.catalogue import load_town
@@ -171,7 +171,7 @@ def _drive(engine: SessionEngine, seed: int) -> list[Shot]:
     def note(engine: SessionEngine) -> None:
         world = engine.session.world
         x, y = world.car.position.tolist()
-        pose = config.pose_on(x, y, float(world.car.height), float(world.car.heading))
+        pose = pose_on_car(config.mount, x, y, float(world.car.height), float(world.car.heading))
         shots.append(Shot(pose, world.actors.arrays.copy(), world.weather, world.time, world.ego.lights))
 
     scripted, silent = partial(make_policy, "scripted"), partial(make_policy, "silent")
@@ -192,7 +192,7 @@ def _places(town: Town, crowd: Shot) -> list[Shot]:
     for lane in chosen:
         station = 0.5 * lane.length
         x, y = lane.position(station).tolist()
-        pose = CameraConfig().pose_on(x, y, lane.height_at(station), lane.heading_at(station))
+        pose = pose_on_car(CameraMount(), x, y, lane.height_at(station), lane.heading_at(station))
         shots.append(Shot(pose, crowd.arrays, crowd.weather, crowd.time, lights=False))
     return shots
 

@@ -15,10 +15,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.mesh import Mesh
 from dorothie_gym.camera.pose import CameraPose, view_from
 from dorothie_gym.camera.town_scene import SessionScene
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.errors import one_line
 
 SAMPLES: Final = 4

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from dorothie_gym.bench.timing import Figures
-from dorothie_gym.camera.config import CameraOutput
+from dorothie_gym.engine.camera_config import CameraOutput
 from dorothie_gym.rendering.charts import GRID, INK, SHEET, SOFT, hexadecimal
 from dorothie_gym.rendering.palette import CAR, LIGHT_RED, ROAD
 from dorothie_gym.sim.config import FRAME_RATE

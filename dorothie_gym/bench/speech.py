@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from rapidfuzz.distance import Levenshtein
 
+from dorothie_gym.audio import SAMPLE_RATE, Samples
 from dorothie_gym.bench.timing import Figures, Progress, ignore_progress, machine, rounded
 from dorothie_gym.dialogue.conversation import Span, Utterance
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
@@ -20,7 +21,6 @@ from dorothie_gym.ontology.slots import Slot, SlotValue
 from dorothie_gym.policies.policy_loader import ALL_SCRIPTED
 from dorothie_gym.rollout.corpus_generation import plan_corpus
 from dorothie_gym.rollout.play import play_session
-from dorothie_gym.speech.audio import SAMPLE_RATE, Samples
 from dorothie_gym.speech.backends import find_recognizer, find_synthesizer
 from dorothie_gym.speech.cabin_noise import pink_noise
 from dorothie_gym.speech.recognizer import Recognition

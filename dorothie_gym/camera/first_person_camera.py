@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from dorothie_gym.camera.atlas import AtlasArrays
 from dorothie_gym.camera.cells import CellOrder, CellTable, new_order, sorted_by_cell
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.daylight import Daylight, daylight_of
 from dorothie_gym.camera.faces import new_faces
 from dorothie_gym.camera.ground.lookup import GroundArrays
@@ -31,6 +30,7 @@ from dorothie_gym.camera.texturing import textures_of
 from dorothie_gym.compilation import direct, fixed
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records, plain
 from dorothie_gym.copying import shared
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.sim.weather import Weather
 

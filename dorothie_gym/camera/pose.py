@@ -16,6 +16,7 @@ from dorothie_gym import portable_arrays as pn
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.by_reference import by_reference
 from dorothie_gym.copying import shared
+from dorothie_gym.engine.camera_config import CameraMount
 from dorothie_gym.maps.model import Array
 
 
@@ -89,6 +90,20 @@ class View(NamedTuple):
             x = 0.5 * self.width + self.focal * right / depth
             y = 0.5 * self.height - self.focal * up / depth
         return np.column_stack((x, y)), depth
+
+
+def pose_on_car(mount: CameraMount, x: float, y: float, z: float, heading: float, rise: float = 0.0) -> CameraPose:
+    """Returns the pose of a camera on a car.
+
+    Args:
+        mount: place of the camera on the car.
+        x: of the car [m].
+        y: of the car [m].
+        z: of the road below it [m].
+        heading: of the car [rad].
+        rise: of the road per metre ahead.
+    """
+    return CameraPose(x, y, z, heading, pm.atan(rise)).mounted(mount.forward, mount.up, math.radians(mount.pitch))
 
 
 def view_from(pose: CameraPose, width: int, height: int, field_of_view: float) -> View:

@@ -18,7 +18,6 @@ from dorothie_gym import portable_arrays as pn
 from dorothie_gym import portable_math as pm
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.camera.body_snapshots import BodySnapshot
-from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.camera.scene_cache import town_scene
@@ -28,6 +27,7 @@ from dorothie_gym.camera.solid_boxes import SolidBoxes, solid_boxes
 from dorothie_gym.camera.town_scene import SessionScene, TownScene
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.records import Record, RecordArray, empty_records, plain
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town

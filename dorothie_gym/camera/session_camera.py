@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from dorothie_gym import portable_math as pm
 from dorothie_gym.camera.cells import is_in_view
-from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.first_person_camera import CameraFrame, FirstPersonCamera
 from dorothie_gym.camera.ground.lookup import GROUND_SHEET, GroundArrays, material_at
 from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material, Relief
 from dorothie_gym.camera.models.model_bank import FIRST_PERSON, FIRST_PROP, PlacementRecord, place_bodies
-from dorothie_gym.camera.pose import CameraPose, View
+from dorothie_gym.camera.pose import CameraPose, View, pose_on_car
 from dorothie_gym.camera.road_slopes import RoadSlopes, rise_at
 from dorothie_gym.camera.scenery.lenses import LENS_OFF, LENS_ON, lens_rows
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.compilation import concurrent, fixed, inlined
 from dorothie_gym.compilation.records import RecordArray, argument, empty_records
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.traffic_lights import LightColour, LightPhase
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
@@ -98,7 +98,7 @@ class SessionCamera:
             heading: of the car [rad].
         """
         rise = rise_at(self.scene.town.slopes, x, y, z, pm.cos(heading), pm.sin(heading))
-        return self.config.pose_on(x, y, z, heading, rise)
+        return pose_on_car(self.config.mount, x, y, z, heading, rise)
 
     def render(self, world: World) -> CameraFrame:
         """Returns the picture that the camera takes of a world."""

@@ -69,7 +69,7 @@ def frames(
 
 def _export(rate: float, size: str, outputs: str | None, layout: str) -> FrameExport:
     """Returns the settings of a command line; exits where one is wrong."""
-    from dorothie_gym.camera.config import CameraConfig, CameraOutput
+    from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
     from dorothie_gym.rollout.frame_export import FrameExport, FrameLayout
 
     width, cross, height = size.partition("x")

@@ -135,7 +135,7 @@ def env_config(
         speech: whether they speak; a word error rate is then refused.
         pictures: whether they observe the picture of the car's camera.
     """
-    from dorothie_gym.camera.config import CameraConfig
+    from dorothie_gym.engine.camera_config import CameraConfig
     from dorothie_gym.engine.channel_kind import ChannelKind
     from dorothie_gym.engine.config import EnvConfig
 
@@ -143,7 +143,7 @@ def env_config(
         fail("--word-errors is for simulated recognition; leave it out with --speech, where speech is recognised")
     if speech:
         from dorothie_gym.errors import SpeechError
-        from dorothie_gym.speech.extras import check_installed
+        from dorothie_gym.optional_modules import check_installed
 
         try:
             check_installed()

@@ -252,8 +252,8 @@ def _exit_interrupted(engine: SessionEngine, plan: _Plan) -> None:
 
 def draw_session(engine: SessionEngine, path: Path) -> None:
     """Draws the whole town at the end of the session, with route and dialogue."""
-    from dorothie_gym.engine.session_scene import scene_of
     from dorothie_gym.rendering.frames import PICTURE_SIZE, SceneRenderer
+    from dorothie_gym.rendering.session_scene import scene_of
 
     scenario = engine.scenario
     caption = f"{engine.town.name} · {scenario.storyboard.name} · seed {scenario.seed}"

@@ -249,8 +249,8 @@ def _film(path: Path, sources: ReplaySources, out: Path, view: RenderView, fps: 
         frames: Iterable[NDArray[np.uint8]] = (renderer.draw(scene) for scene in playback.scenes(fps))
         count, first = playback.count(fps), playback.first_frame
     else:
-        from dorothie_gym.camera.config import CameraConfig
         from dorothie_gym.camera.recorded_pictures import RecordedPictures
+        from dorothie_gym.engine.camera_config import CameraConfig
 
         compile_first(pictures=True)
         pictures = RecordedPictures(session, town, CameraConfig(width=size[0], height=size[1]))
@@ -276,8 +276,8 @@ def _sound_file(session: Session, start: float, seconds: float) -> Iterator[Path
     if not session.audio:
         yield None
         return
+    from dorothie_gym.audio import encode_wav
     from dorothie_gym.recording.sound import sound_track
-    from dorothie_gym.speech.audio import encode_wav
 
     with tempfile.TemporaryDirectory(prefix="dorothie_gym.") as folder:
         file = Path(folder) / "sound.wav"

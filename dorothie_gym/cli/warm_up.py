@@ -50,9 +50,9 @@ def compile_first(*, everything: bool = False, batches: bool = False, pictures: 
 
 
 def _is_camera_warm() -> bool:
-    from dorothie_gym.engine import camera_warm_up  # imported here: most commands draw no pictures
+    from dorothie_gym.camera import warm_up as pictures  # imported here: most commands draw no pictures
 
-    return camera_warm_up.is_warm()
+    return pictures.is_warm()
 
 
 def compile_with_progress(*, everything: bool, batches: bool, pictures: bool) -> int:
@@ -83,7 +83,7 @@ def compile_with_progress(*, everything: bool, batches: bool, pictures: bool) ->
             navigation.warm_up(show)
             total, begun = total + begun, 0
         if pictures:
-            from dorothie_gym.engine import camera_warm_up
+            from dorothie_gym.camera import warm_up as camera
 
-            camera_warm_up.warm_up(show)
+            camera.warm_up(show)
     return total + begun

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 
-from dorothie_gym.camera.config import CameraConfig
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.config import EnvConfig
 
 

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.console.config import ConsoleConfig
 from dorothie_gym.console.connection import Connection, changes, encode
 from dorothie_gym.console.lane_lookup import LaneLookup
@@ -16,6 +15,7 @@ from dorothie_gym.console.spectator_view import spectator_view
 from dorothie_gym.console.views import role_view, static_view
 from dorothie_gym.console.vocabulary import vocabulary
 from dorothie_gym.console.windscreen import Windscreen
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import ARRIVAL_DISTANCE

@@ -17,10 +17,10 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from dorothie_gym.audio import SAMPLE_RATE, encode_flac, encode_wav
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.seat import Seat
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.speech.audio import SAMPLE_RATE, encode_flac, encode_wav
 from dorothie_gym.speech.backends import find_recognizer, find_synthesizer
 from dorothie_gym.speech.spoken_understanding import readable
 from dorothie_gym.speech.synthesizer import Voice, say

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from PIL import Image
 
+from dorothie_gym.camera.session_pictures import windscreen_camera
 from dorothie_gym.console.config import ConsoleConfig
 from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.engine.pictures import windscreen_camera
 
 if TYPE_CHECKING:
     from dorothie_gym.camera.session_camera import SessionCamera

@@ -17,9 +17,12 @@ from dorothie_gym.dialogue.nlg import word_act
 from dorothie_gym.dialogue.recognition_errors import Loudness
 from dorothie_gym.dialogue.speaker_style import SpeakerStyle, draw_style
 from dorothie_gym.dialogue.transactions import Annotator
+from dorothie_gym.engine.cabin import CabinState, signal_to_noise
 from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.providers import speak_aloud
 from dorothie_gym.engine.scenario import Scenario
+from dorothie_gym.engine.spoken_channel import SpokenChannel
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
@@ -27,9 +30,7 @@ from dorothie_gym.spaces.actions import Speech
 from dorothie_gym.spaces.limits import UTTERANCE_LENGTH, plain_text
 
 if TYPE_CHECKING:
-    from dorothie_gym.engine.spoken_dialogue import SpokenDialogue
-    from dorothie_gym.speech.audio import Samples
-    from dorothie_gym.speech.cabin_noise import CabinState
+    from dorothie_gym.audio import Samples
 
 SpanRecord: TypeAlias = dict[str, object]
 """Event data of one span."""
@@ -94,14 +95,10 @@ class DialogueChannel:
         self._annotator = Annotator(storyboard.landmarks[subgoal.landmark].name for subgoal in storyboard.subgoals)
         self._seeds = words, ears, styles
         self._rate = config.word_error_rate
-        self._spoken: SpokenDialogue | None = None
+        self._spoken: SpokenChannel | None = None
         if config.channel is ChannelKind.SPEECH:
-            from dorothie_gym.engine.spoken_dialogue import SpokenDialogue
-
             self._misheard = True
-            self._spoken = SpokenDialogue(
-                voices, words_per_second=config.words_per_second, classify=config.observe_acts
-            )
+            self._spoken = speak_aloud(voices, words_per_second=config.words_per_second, classify=config.observe_acts)
 
     # made when the first utterance needs them: there are sessions without words
 
@@ -138,7 +135,7 @@ class DialogueChannel:
         return self._say_aloud(self._spoken, role, span, speech, now)
 
     def _say_aloud(
-        self, spoken: SpokenDialogue, role: Role, span: Span, speech: Speech, now: float
+        self, spoken: SpokenChannel, role: Role, span: Span, speech: Speech, now: float
     ) -> str | None:  # fmt: skip
         if not self._conversation.has_room(role):
             return self._conversation.say(role, span, now)  # refuses
@@ -150,7 +147,7 @@ class DialogueChannel:
         return reason
 
     def give_voices(self, pitches: Mapping[Role, float]) -> None:
-        """Gives speakers a pitch of their own, see `SpokenDialogue.give_voices`; without effect on the text channel."""
+        """Gives speakers a pitch of their own, see `SpokenChannel.give_voices`; without effect on the text channel."""
         if self._spoken is not None:
             self._spoken.give_voices(pitches)
 
@@ -203,8 +200,6 @@ class DialogueChannel:
 
     @staticmethod
     def _noise(cabin: Callable[[], CabinState]) -> Loudness:
-        from dorothie_gym.speech.cabin_noise import signal_to_noise
-
         return Loudness.of(signal_to_noise(cabin()))
 
     def _understood(self, utterance: Utterance) -> tuple[DialogueAct, ...]:

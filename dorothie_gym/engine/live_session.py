@@ -10,14 +10,15 @@ import numpy as np
 
 from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
-from dorothie_gym.engine.camera_perception import CameraPerception
+from dorothie_gym.engine.cabin import CabinState
 from dorothie_gym.engine.config import EnvConfig, RewardTerms
 from dorothie_gym.engine.dialogue_channel import DialogueChannel
 from dorothie_gym.engine.exception_executor import ExceptionExecutor
 from dorothie_gym.engine.masks import ActionMasks
 from dorothie_gym.engine.observations import DeliveredMessages, ObservationBuilder
 from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.engine.pictures import SessionPictures
+from dorothie_gym.engine.pictures import Pictures, VisiblePerception
+from dorothie_gym.engine.providers import draw_pictures, see_by_camera
 from dorothie_gym.engine.scenario import Scenario, header_of
 from dorothie_gym.engine.session_log import EventLog, SessionSummary, SubgoalCounts, SubgoalTracker
 from dorothie_gym.engine.session_views import SessionViews
@@ -47,9 +48,8 @@ from dorothie_gym.spaces.observations import Observation
 from dorothie_gym.tasks.state import TaskState
 
 if TYPE_CHECKING:
+    from dorothie_gym.audio import Samples
     from dorothie_gym.camera.first_person_camera import CameraFrame
-    from dorothie_gym.speech.audio import Samples
-    from dorothie_gym.speech.cabin_noise import CabinState
 
 _INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
@@ -140,9 +140,11 @@ class LiveSession:
         self._end_reason = ""
         self._infractions: dict[str, int] | None = None
         self._delivered = self._deliver("")
-        self._pictures = None if config.camera is None else SessionPictures(self.world, scenario, config.camera)
-        self.camera_perception = (
-            CameraPerception(self.world, scenario) if config.perception is PerceptionModel.CAMERA else None
+        self._pictures: Pictures | None = (
+            None if config.camera is None else draw_pictures(self.world, scenario, config.camera)
+        )
+        self.camera_perception: VisiblePerception | None = (
+            see_by_camera(self.world, scenario) if config.perception is PerceptionModel.CAMERA else None
         )
 
     # made when they are first used: not all sessions observe by dicts, or ask for masks
@@ -373,8 +375,6 @@ class LiveSession:
 
     def _cabin(self) -> CabinState:
         """Returns what makes noise in the car."""
-        from dorothie_gym.speech.cabin_noise import CabinState
-
         weather = self.world.weather.values
         return CabinState(
             speed=abs(float(self.world.car.speed)),

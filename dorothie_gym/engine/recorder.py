@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym.audio import encode_flac
 from dorothie_gym.compilation.records import plain
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
@@ -225,8 +226,6 @@ class SessionRecorder:
         frames, world = self._engine.last_frames, self._engine.session.world
         self._writer.append(self._engine.last_events if events is None else events, frames)
         if recordings := self._engine.last_recordings:
-            from dorothie_gym.speech.audio import encode_flac  # sessions of text do not load it
-
             for name, samples in recordings.items():
                 self._writer.add_audio(name, encode_flac(samples))
         self._frame = world.frame

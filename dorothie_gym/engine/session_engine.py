@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym import maps  # lazy: a town that is given needs no reader
 from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.config import EnvConfig, RewardTerms, term_names
 from dorothie_gym.engine.live_session import LiveSession, StepBegun
@@ -20,7 +21,6 @@ from dorothie_gym.engine.pictures import OBSERVERS, picture_spaces
 from dorothie_gym.engine.scenario import Scenario, draw_scenario, template_option
 from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.input_files import settings_of
-from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.recording.events import EndReason, Event
@@ -34,7 +34,7 @@ from dorothie_gym.spaces.observations import camera_perception_fields, observati
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 if TYPE_CHECKING:
-    from dorothie_gym.speech.audio import Samples
+    from dorothie_gym.audio import Samples
 
 
 class StepOutcome(NamedTuple):
@@ -84,7 +84,7 @@ class SessionEngine(Restorable):
     ) -> None:
         if max_cycles is not None and max_cycles < 1:
             raise ValueError(f"max_cycles is {max_cycles}; it must be at least 1")
-        self.town = town if isinstance(town, Town) else load_town(town)
+        self.town = town if isinstance(town, Town) else maps.load_town(town)
         self.template = template_option(storyboard)
         self.config = EnvConfig() if config is None else settings_of(config, EnvConfig, "config")
         self.max_cycles = max_cycles

@@ -9,9 +9,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from dorothie_gym import camera  # lazy: most environments have no camera
 from dorothie_gym import portable_math as pm
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.compilation.records import plain
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.pictures import FIELDS, picture_spaces
 from dorothie_gym.envs.dashboard import Readings, show_dashboard
 from dorothie_gym.envs.navigation_config import NavigationConfig
@@ -26,7 +27,6 @@ from dorothie_gym.sim.ego.limits import KMH
 from dorothie_gym.sim.weather import Weather
 
 if TYPE_CHECKING:
-    from dorothie_gym.camera.session_camera import SessionCamera
     from dorothie_gym.envs.driving_rows import DrivingFace, DrivingRows
 
 DriverObservation: TypeAlias = "NDArray[np.float32] | NDArray[np.uint8]"
@@ -52,7 +52,7 @@ class DrivingCameras:
     def __init__(self, config: CameraConfig, count: int) -> None:
         self.config = config
         self.pictures = np.zeros((count, config.height, config.width, 3), np.uint8)
-        self._cameras: list[tuple[DrivingFace, SessionCamera] | None] = [None] * count
+        self._cameras: list[tuple[DrivingFace, camera.SessionCamera] | None] = [None] * count
         self._compiled = False
 
     @property
@@ -74,31 +74,24 @@ class DrivingCameras:
 
         pool.do(work, lambda home: (home,))
 
-    def _camera(self, batch: DrivingRows, number: int) -> SessionCamera:
+    def _camera(self, batch: DrivingRows, number: int) -> camera.SessionCamera:
         """Returns the camera of an environment, a new one in a new session."""
-        # imported here: most environments have no camera
-        from dorothie_gym.camera.scene_cache import town_scene
-        from dorothie_gym.camera.session_camera import SessionCamera
-        from dorothie_gym.camera.town_scene import SessionScene
-
         face, known = batch.faces[number], self._cameras[number]
         assert face is not None  # the session has begun
         if known is not None and known[0] is face:
             return known[1]
-        names = [name.label for name in face.scenario.street_names]
-        scene = SessionScene(town_scene(batch.town), names, face.scenario.storyboard.landmarks)
-        camera = SessionCamera(scene, self.config)
-        self._cameras[number] = face, camera
-        return camera
+        made = camera.camera_of(batch.town, face.scenario, self.config)
+        self._cameras[number] = face, made
+        return made
 
-    def _draw(self, batch: DrivingRows, number: int, camera: SessionCamera) -> None:
+    def _draw(self, batch: DrivingRows, number: int, eye: camera.SessionCamera) -> None:
         face, arrays = batch.faces[number], batch.row(number)
         assert face is not None  # see `_camera`
         car, plan = plain(arrays.vehicles)[0], plain(arrays.plan)[0]
         # the Ad-Wizard changes weather and sensors of a session with objects only
         world = None if face.live is None else face.live.world
-        pose = camera.pose_on(float(car["x"]), float(car["y"]), float(car["height"]), float(car["heading"]))
-        frame = camera.render_from(
+        pose = eye.pose_on(float(car["x"]), float(car["y"]), float(car["height"]), float(car["heading"]))
+        frame = eye.render_from(
             pose, arrays, Weather() if world is None else world.weather,
             time=int(plain(arrays.clock)["frame"][0]) / FRAME_RATE, head_lights=bool(plan["lights"]),
             faults=() if world is None else world.faults,

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.copying import shared
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.input_files import settings_of
 from dorothie_gym.policies.ad_wizard import MOST_TRICKS

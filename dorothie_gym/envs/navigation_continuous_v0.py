@@ -10,7 +10,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.action_values import real_numbers
-from dorothie_gym.camera.config import CameraConfig
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.driving_cameras import DriverObservation, driver_space
 from dorothie_gym.envs.driving_env import DrivingEnv

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.config import CameraConfig
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.envs.batched_env import Towns
 from dorothie_gym.envs.driving_cameras import driver_space
 from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv

@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from dorothie_gym.action_values import as_array
-from dorothie_gym.camera.config import CameraConfig
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.envs.batched_env import Towns
 from dorothie_gym.envs.driving_batch import DrivingBatch
 from dorothie_gym.envs.driving_cameras import driver_space

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym import camera, rendering  # lazy: most sessions are never drawn
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.render_view import RenderView, checked_view
 from dorothie_gym.spaces.observations import Observation
-
-if TYPE_CHECKING:
-    from dorothie_gym.camera.session_camera import SessionCamera
-    from dorothie_gym.engine.role_scene import RoleView
-    from dorothie_gym.rendering.frames import HumanWindow
-    from dorothie_gym.rendering.scene import Scene, SpokenLine
-    from dorothie_gym.rendering.session_views import SessionRenderer
 
 RENDER_MODES: Final[tuple[str, ...]] = ("human", "rgb_array")
 """Render modes of the environments that play sessions."""
@@ -53,9 +47,9 @@ class SessionView(Lookups):
 
     LOOKED_UP: ClassVar[Sequence[str]] = ("_renderer", "_camera", "_window")
 
-    _renderer: SessionRenderer | None = None
-    _camera: tuple[LiveSession, SessionCamera] | None = None
-    _window: HumanWindow | None = None
+    _renderer: rendering.SessionRenderer | None = None
+    _camera: tuple[LiveSession, camera.SessionCamera] | None = None
+    _window: rendering.HumanWindow | None = None
 
     def __init__(
         self,
@@ -69,8 +63,8 @@ class SessionView(Lookups):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or one of {', '.join(RENDER_MODES)}")
         self._view = checked_view(render_view)
         self._mode, self._rate, self._role = render_mode, frames_per_second, role
-        self._seen: RoleView | None = None
-        self._heard: list[SpokenLine] = []
+        self._seen: rendering.RoleView | None = None
+        self._heard: list[rendering.SpokenLine] = []
 
     @classmethod
     def of_role(
@@ -86,12 +80,10 @@ class SessionView(Lookups):
         """Begins a session; what was noted of the last one is forgotten."""
         self._heard = []
         if self._mode is not None and self._role is not None:
-            from dorothie_gym.engine.role_scene import RoleView
-
-            self._seen = RoleView(self._role, session.world.town)
+            self._seen = rendering.RoleView(self._role, session.world.town)
 
     @property
-    def notes(self) -> tuple[RoleView | None, list[SpokenLine]]:
+    def notes(self) -> tuple[rendering.RoleView | None, list[rendering.SpokenLine]]:
         """What was noted of the session, for a state of the environment."""
         return self._seen, self._heard
 
@@ -113,45 +105,34 @@ class SessionView(Lookups):
         """Notes an instruction of the participant that is not an utterance of the session; its time is in seconds."""
         if self._mode is None:
             return
-        from dorothie_gym.rendering.scene import SpokenLine
-
-        self._heard.append(SpokenLine(time=time, speaker=Role.PARTICIPANT, text=text, acts=acts))
+        self._heard.append(rendering.SpokenLine(time=time, speaker=Role.PARTICIPANT, text=text, acts=acts))
 
     def render(self, session: LiveSession) -> NDArray[np.uint8] | None:
         """Draws the view: an array (800, 1280, 3), with a windscreen (720, 1280, 3); None in human mode."""
         if self._mode is None:
             raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
         if self._renderer is None:
-            # Imported here: pygame's fonts and surfaces are slow to import, and most sessions are never drawn.
-            from dorothie_gym.rendering.session_views import SessionRenderer
-
-            self._renderer = SessionRenderer(self._view)
+            self._renderer = rendering.SessionRenderer(self._view)
         size = self._renderer.windscreen
         frame = self._renderer.draw(self._scene(session), None if size is None else self._windscreen(session, size))
         if self._mode != "human":
             return frame
         if self._window is None:
-            from dorothie_gym.rendering.frames import HumanWindow
-
             height, width, _ = frame.shape
-            self._window = HumanWindow((width, height), "dorothie_gym")
+            self._window = rendering.HumanWindow((width, height), "dorothie_gym")
         self._window.show(frame, self._rate)
         return None
 
     def _windscreen(self, session: LiveSession, size: tuple[int, int]) -> NDArray[np.uint8] | None:
         """Returns what a camera of this width and height sees [px], otherwise with the settings of the session's."""
         if self._camera is None or self._camera[0] is not session:
-            from dorothie_gym.engine.pictures import windscreen_camera
-
-            self._camera = session, windscreen_camera(session.world.town, session.scenario, session.config, size)
+            self._camera = session, camera.windscreen_camera(session.world.town, session.scenario, session.config, size)
         return self._camera[1].render(session.world).rgb
 
-    def _scene(self, session: LiveSession) -> Scene:
-        from dorothie_gym.engine.session_scene import scene_of, utterances_of
-
+    def _scene(self, session: LiveSession) -> rendering.Scene:
         if self._seen is None:
-            return scene_of(session, heard=self._heard)
-        own = [line for line in utterances_of(session) if line.speaker is self._role]
+            return rendering.scene_of(session, heard=self._heard)
+        own = [line for line in rendering.utterances_of(session) if line.speaker is self._role]
         return self._seen.scene([*self._heard, *own])
 
     def close(self) -> None:

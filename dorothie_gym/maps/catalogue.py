@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from dorothie_gym.errors import InputFileError, TownError, did_you_mean
 from dorothie_gym.files import JsonValue
 from dorothie_gym.input_files import MAX_OPENDRIVE, check_file
+from dorothie_gym.maps import opendrive, yaml  # lazy: their parsers are slow to import
 from dorothie_gym.maps.cache import through_cache
 from dorothie_gym.maps.model import LaneLink, SignalKind
 from dorothie_gym.maps.town import Town, check_extent
@@ -102,15 +103,7 @@ def _read(path: Path, _modified: int, _size: int) -> Town:
 
 
 def _compile(path: Path) -> Town:
-    # imported on demand: lxml and scipy are slow to import
-    if path.suffix.lower() == ".xodr":
-        from dorothie_gym.maps.opendrive.compile import read_opendrive
-
-        town = read_opendrive(path)
-    else:
-        from dorothie_gym.maps.yaml.compile import read_yaml_town
-
-        town = read_yaml_town(path)
+    town = opendrive.read_opendrive(path) if path.suffix.lower() == ".xodr" else yaml.read_yaml_town(path)
     check_extent(town, str(path))
     return town
 

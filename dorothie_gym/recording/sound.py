@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from dorothie_gym.audio import SAMPLE_RATE, Samples, read_audio
 from dorothie_gym.copying import shared
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.events import UtteranceRecord
 from dorothie_gym.recording.session import Session
-from dorothie_gym.speech.audio import SAMPLE_RATE, Samples, read_audio
 
 
 @shared

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.copying import shared
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.errors import SessionError
 from dorothie_gym.files import PART, write_atomically
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass

@@ -1,21 +1,12 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
-from .audio import SAMPLE_RATE as SAMPLE_RATE
-from .audio import Samples as Samples
-from .audio import checked_samples as checked_samples
-from .audio import encode_flac as encode_flac
-from .audio import encode_wav as encode_wav
-from .audio import read_audio as read_audio
-from .audio import resample as resample
 from .backends import RECOGNIZER_NAMES as RECOGNIZER_NAMES
 from .backends import SYNTHESIZER_NAMES as SYNTHESIZER_NAMES
 from .backends import find_recognizer as find_recognizer
 from .backends import find_synthesizer as find_synthesizer
-from .cabin_noise import CabinState as CabinState
 from .cabin_noise import cabin_noise as cabin_noise
 from .cabin_noise import mixed as mixed
 from .cabin_noise import pink_noise as pink_noise
-from .cabin_noise import signal_to_noise as signal_to_noise
 from .http_speech import HttpRecognizer as HttpRecognizer
 from .http_speech import HttpSynthesizer as HttpSynthesizer
 from .recognizer import Hypothesis as Hypothesis

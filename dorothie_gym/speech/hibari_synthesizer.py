@@ -11,9 +11,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from dorothie_gym.audio import Samples, trimmed
 from dorothie_gym.errors import SpeechError
-from dorothie_gym.speech.audio import Samples, trimmed
-from dorothie_gym.speech.extras import speech_module
+from dorothie_gym.optional_modules import speech_module
 from dorothie_gym.speech.synthesizer import check_request, check_script, chosen_voice
 
 VOICE: Final = "heart"

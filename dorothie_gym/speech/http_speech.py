@@ -9,9 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from dorothie_gym.audio import LONGEST, SAMPLE_RATE, Samples, checked_samples, encode_wav, resample
 from dorothie_gym.errors import SpeechError, one_line
-from dorothie_gym.speech.audio import LONGEST, SAMPLE_RATE, Samples, checked_samples, encode_wav, resample
-from dorothie_gym.speech.extras import speech_module
+from dorothie_gym.optional_modules import speech_module
 from dorothie_gym.speech.recognizer import Recognition, RecognizedWord, single_hypothesis
 from dorothie_gym.speech.spoken_form import spoken_words
 from dorothie_gym.speech.synthesizer import check_request

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from dorothie_gym.audio import SAMPLE_RATE, Samples, checked_samples, resample
 from dorothie_gym.errors import SpeechError
-from dorothie_gym.speech.audio import SAMPLE_RATE, Samples, checked_samples, resample
-from dorothie_gym.speech.extras import speech_module
+from dorothie_gym.optional_modules import speech_module
 from dorothie_gym.speech.recognizer import Hypothesis, Recognition, RecognizedWord
 from dorothie_gym.speech.spoken_form import spoken_words
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dorothie_gym.audio import encode_flac
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import make_policy
 from dorothie_gym.recording import EventType, Session
 from dorothie_gym.rollout import play_session
-from dorothie_gym.speech import encode_flac
 from tests.chromium import chromium
 
 

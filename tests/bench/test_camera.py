@@ -11,11 +11,12 @@ from typer.testing import CliRunner
 from dorothie_gym.bench.camera import EVERYTHING, RGB, measure
 from dorothie_gym.bench.opengl import opengl_reference
 from dorothie_gym.bench.report import camera_report, draw
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.camera.pose import pose_on_car
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.cli.app import app
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import ObjectClass
@@ -81,7 +82,7 @@ def test_opengl_draws_the_same_view() -> None:
         pytest.skip("there is no driver with EGL")
     config = CameraConfig(width=120, height=80, outputs=(CameraOutput.SEMANTIC,))
     x, y = world.car.position.tolist()
-    pose = config.pose_on(x, y, float(world.car.height), float(world.car.heading))
+    pose = pose_on_car(config.mount, x, y, float(world.car.height), float(world.car.heading))
     drawn = reference.draw(pose)
     reference.close()
     classes = SessionCamera(scene, config).render(world).semantic

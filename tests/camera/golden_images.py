@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from dorothie_gym.camera.config import CameraConfig
+from dorothie_gym.camera.pose import pose_on_car
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.compilation.records import RecordArray, empty_records
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.maps import load_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology import LandmarkName, Sensor, WeatherParameter
@@ -109,7 +110,7 @@ def draw(image: GoldenImage) -> NDArray[np.uint8]:
         weather.set(WeatherParameter[name.upper()], value)
     lane = town.lanes[image.lane]
     x, y = lane.position(image.station).tolist()
-    pose = SIZE.pose_on(x, y, lane.height_at(image.station), lane.heading_at(image.station))
+    pose = pose_on_car(SIZE.mount, x, y, lane.height_at(image.station), lane.heading_at(image.station))
     picture = camera.render_from(
         pose, _bodies(town, image), weather, time=image.time, head_lights=image.head_lights, faults=image.faults
     ).rgb

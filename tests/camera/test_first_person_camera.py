@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from dorothie_gym.camera.atlas import TextureAtlas
 from dorothie_gym.camera.cells import sorted_by_cell
-from dorothie_gym.camera.config import CameraConfig, CameraMount, CameraOutput
 from dorothie_gym.camera.first_person_camera import CameraScene, FirstPersonCamera
 from dorothie_gym.camera.ground.arrays import ground_arrays
 from dorothie_gym.camera.ground.cells import Painted
@@ -29,6 +28,7 @@ from dorothie_gym.camera.models.vehicles import Lamps
 from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.camera.sky import sky_noise
 from dorothie_gym.compilation.records import RecordArray, empty_records
+from dorothie_gym.engine.camera_config import CameraConfig, CameraMount, CameraOutput
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import ObjectClass, Sensor, WeatherParameter
 from dorothie_gym.rendering.shapes import disc

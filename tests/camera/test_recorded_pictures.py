@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.first_person_camera import CameraFrame
+from dorothie_gym.camera.pose import pose_on_car
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
@@ -148,7 +149,7 @@ def test_the_camera_follows_the_car_frame_by_frame(played: Played, recorded: Rec
     for frame in (31, 200, 451):
         row = rows[np.searchsorted(rows["frame"], frame)]
         pose = recorded.pose(frame)
-        expected = CONFIG.pose_on(float(row["x"]), float(row["y"]), 0.0, float(row["heading"]))
+        expected = pose_on_car(CONFIG.mount, float(row["x"]), float(row["y"]), 0.0, float(row["heading"]))
         assert (pose.x, pose.y, pose.z, pose.heading) == pytest.approx(
             (expected.x, expected.y, expected.z, expected.heading), abs=1e-9
         )

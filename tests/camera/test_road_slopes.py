@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.camera.ground.lookup import material_at
 from dorothie_gym.camera.ground.materials import KERB_HEIGHT, LOOKS, Material, Relief
 from dorothie_gym.camera.pose import CameraPose
@@ -16,6 +15,7 @@ from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.compilation.records import plain
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town

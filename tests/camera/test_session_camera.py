@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.first_person_camera import CameraFrame
-from dorothie_gym.camera.pose import CameraPose
+from dorothie_gym.camera.pose import CameraPose, pose_on_car
 from dorothie_gym.camera.scene_building import build_town_scene
 from dorothie_gym.camera.scenery.landmarks import landmark_key
 from dorothie_gym.camera.session_camera import REACH, SHADED, SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene, TownScene
 from dorothie_gym.compilation.records import plain
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import Town, load_town
@@ -60,7 +60,7 @@ def frame_of(
     """Returns the picture of a camera on a car at a station of a lane."""
     place = world.town.lanes[lane]
     x, y = place.position(station).tolist()
-    pose = camera.config.pose_on(x, y, place.height_at(station), place.heading_at(station))
+    pose = pose_on_car(camera.config.mount, x, y, place.height_at(station), place.heading_at(station))
     return camera.render_from(pose, world.actors.arrays, weather or world.weather, time=world.time)
 
 
@@ -136,7 +136,7 @@ def test_bodies_are_listed_that_may_be_seen_or_cast_shadows(engine: SessionEngin
     left_out = 0
     for lane in range(0, len(world.town.lanes), 6):
         x, y = world.town.lanes[lane].position(0.0).tolist()
-        pose = camera.config.pose_on(x, y, 0.0, world.town.lanes[lane].heading_at(0.0))
+        pose = pose_on_car(camera.config.mount, x, y, 0.0, world.town.lanes[lane].heading_at(0.0))
         view = camera.camera.view_of(pose)
         listed = set(plain(camera.placed(pose, world.actors.arrays, world.weather))["key"].tolist())
         for body in bodies:

@@ -17,7 +17,6 @@ import shapely
 from numpy.typing import NDArray
 
 from dorothie_gym.camera.cells import draw_cells, new_order, sorted_by_cell
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.first_person_camera import FirstPersonCamera
 from dorothie_gym.camera.ground.cells import Painted
 from dorothie_gym.camera.ground.materials import LOOKS, Material
@@ -32,6 +31,7 @@ from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.compilation.records import plain
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import Town, load_town

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("soundfile", reason="needs the extra speech")
 
+from dorothie_gym.audio import SAMPLE_RATE, encode_flac
 from dorothie_gym.console.recordings import SpanRecordings
 from dorothie_gym.console.resuming import Resumed
 from dorothie_gym.console.room import Room, RoomState
@@ -17,7 +18,6 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.recording import Event, EventType, Session, first_difference
 from dorothie_gym.recording.sound import audio_files, sound_track, utterance_audio
 from dorothie_gym.rollout.replay import begin_replay, resimulate
-from dorothie_gym.speech import SAMPLE_RATE, encode_flac
 from tests.console.people import Person, Table
 
 ROLES = "participant=human,co_wizard=human,ad_wizard=silent"

@@ -14,12 +14,13 @@ import pytest
 
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
+from dorothie_gym.audio import read_audio
 from dorothie_gym.console.config import ConsoleConfig
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.seating import parse_roles
 from dorothie_gym.console.spoken_turns import MAX_BYTES
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.speech import find_synthesizer, read_audio, say
+from dorothie_gym.speech import find_synthesizer, say
 from tests.console.people import SEED, TOWN
 from tests.console.serving import Served
 

@@ -7,9 +7,9 @@ import io
 import numpy as np
 from PIL import Image
 
-from dorothie_gym.camera.config import CameraConfig
 from dorothie_gym.console.config import ConsoleConfig
 from dorothie_gym.console.windscreen import Windscreen
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from tests.console.people import Table

@@ -13,7 +13,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from dorothie_gym import DuoWizardEnv, EnvConfig
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.ontology import Sensor
 
 with warnings.catch_warnings():

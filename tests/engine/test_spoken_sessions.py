@@ -10,10 +10,10 @@ import pytest
 from rapidfuzz.distance import Levenshtein
 
 from dorothie_gym import DuoWizardEnv, EnvConfig
+from dorothie_gym.audio import read_audio
 from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.recorder import SessionRecorder, expand, idle_actions
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.engine.spoken_dialogue import SpokenDialogue, SpokenSpan
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import load_town
@@ -24,7 +24,8 @@ from dorothie_gym.recording.sdn.writer import write_sdn
 from dorothie_gym.rollout import play_session
 from dorothie_gym.rollout.replay import resimulate
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.speech import read_audio, spoken_words
+from dorothie_gym.speech import spoken_words
+from dorothie_gym.speech.spoken_dialogue import SpokenDialogue, SpokenSpan
 
 TOWN = "brookside"
 SPEAKERS = (Role.PARTICIPANT, Role.CO_WIZARD)

@@ -15,7 +15,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import dorothie_gym
 from dorothie_gym import EnvConfig, WorldConfig, make_policy
-from dorothie_gym.camera.config import CameraConfig, CameraMount
+from dorothie_gym.engine.camera_config import CameraConfig, CameraMount
 from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
 from dorothie_gym.rendering import palette
@@ -92,7 +92,7 @@ def test_the_three_roles_see_different_pictures_of_one_session() -> None:
 
 
 def test_participant_sees_its_tasks_and_the_co_wizard_has_none() -> None:
-    from dorothie_gym.engine.role_scene import RoleView
+    from dorothie_gym.rendering.role_scene import RoleView
 
     env = pettingzoo.make("parallel", "dorothie_gym/DuoWizard-v0")
     observations, _ = env.reset(seed=7)

@@ -449,14 +449,14 @@ def _unpack(folder: Path) -> None:
 
 
 def _audio(folder: Path) -> None:
-    from dorothie_gym.speech import encode_flac
+    from dorothie_gym.audio import encode_flac
 
     tone = np.sin(np.arange(4000) * 0.2).astype(np.float32)
     (folder / "speech.flac").write_bytes(encode_flac(tone))
 
 
 def _read_audio(folder: Path) -> None:
-    from dorothie_gym.speech import read_audio
+    from dorothie_gym.audio import read_audio
 
     read_audio(folder / "speech.flac")
 

@@ -16,7 +16,7 @@ import gymnasium as gym
 import numpy as np
 
 from dorothie_gym import make_policy
-from dorothie_gym.camera.config import CameraConfig
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.config import ChannelKind, EnvConfig, PerceptionModel
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv

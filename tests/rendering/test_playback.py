@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_scene import scene_of
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES
@@ -15,6 +14,7 @@ from dorothie_gym.policies import make_policy
 from dorothie_gym.recording import Session, read_session
 from dorothie_gym.rendering.playback import Playback
 from dorothie_gym.rendering.scene import Scene
+from dorothie_gym.rendering.session_scene import scene_of
 from dorothie_gym.rollout import play_session
 from tests.recording.sdn.builders import release
 

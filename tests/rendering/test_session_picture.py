@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.engine.session_scene import scene_of
 from dorothie_gym.maps import load_town, town_names
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, Role
 from dorothie_gym.rendering import MapPainter, palette
@@ -18,6 +17,7 @@ from dorothie_gym.rendering.figures import PIN_LENGTH, pin_direction
 from dorothie_gym.rendering.frames import PICTURE_SIZE, SceneRenderer
 from dorothie_gym.rendering.map_sheet import site_key
 from dorothie_gym.rendering.scene import ExceptionMark, Scene, SpokenLine
+from dorothie_gym.rendering.session_scene import scene_of
 from dorothie_gym.spaces import AdWizardAction, noop
 from tests.rendering.test_frames import count, scene, town  # noqa: F401  # fixtures
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from dorothie_gym.speech import CabinState, cabin_noise, mixed, signal_to_noise
-from dorothie_gym.speech.cabin_noise import active_rms, noise_level, noise_levels
+from dorothie_gym.engine.cabin import CabinState, noise_level, noise_levels, signal_to_noise
+from dorothie_gym.speech import cabin_noise, mixed
+from dorothie_gym.speech.cabin_noise import active_rms
 
 
 def test_noise_grows_with_speed_rain_wind_and_talk() -> None:

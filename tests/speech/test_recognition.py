@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dorothie_gym.audio import resample
 from dorothie_gym.dialogue import is_partly_inaudible
 from dorothie_gym.dialogue.conversation import INAUDIBLE
 from dorothie_gym.errors import AudioError, SpeechError
@@ -28,7 +29,6 @@ from dorothie_gym.speech import (
     mixed,
     pink_noise,
     readable,
-    resample,
     say,
     understand_speech,
 )

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
+from dorothie_gym.camera.camera_perception import CameraPerception
 from dorothie_gym.camera.scenery import landmarks as landmark_models
-from dorothie_gym.engine.camera_perception import CameraPerception
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.scenario import draw_scenario

@@ -28,9 +28,9 @@ from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
 from dorothie_gym.baselines.vision.segformer import SegFormer, normalised
 from dorothie_gym.baselines.vision.solids import spaces_of
 from dorothie_gym.benchmark.features.sight import drawing_digest
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.pose import View
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.errors import CheckpointError
 from dorothie_gym.files import replacing
 from dorothie_gym.maps.town import Town

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.camera.array_cache import builder_digest
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.camera.solid_boxes import SolidBoxes
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.errors import OntologyError, SessionError
 from dorothie_gym.files import PART
 from dorothie_gym.input_files import MIB

@@ -19,7 +19,7 @@ from torch import Tensor
 
 from dorothie_gym.angles import wrap_radians
 from dorothie_gym.baselines.vision.frames import SPACE_COLUMNS
-from dorothie_gym.camera.config import CameraConfig
+from dorothie_gym.engine.camera_config import CameraConfig
 
 SOLID: Final = 8
 """Number of columns of a solid."""

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from dorothie_gym.audio import encode_flac, read_audio
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.files import write_atomically
 from dorothie_gym.maps.catalogue import find_town
@@ -170,8 +171,6 @@ def _write_audio(folder: Path, session: Session) -> None:
         AudioError: a file is damaged.
         SpeechError: the extra `speech` is not installed.
     """
-    from dorothie_gym.speech.audio import encode_flac, read_audio
-
     folder.mkdir()
     for utterance in session.utterances():
         events = [session.events[move.index].data for move in utterance.moves]

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
-from dorothie_gym.camera.config import CameraConfig
+from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import Role

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dorothie_gym.camera.config import CameraConfig, CameraOutput
 from dorothie_gym.camera.labels import write_labels
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.shading import shade
 from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.compilation.dispatcher import CompiledFunction
+from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.engine.warm_up import TOWN, Progress, reporting

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.errors import AudioError, short_repr
 from dorothie_gym.input_files import raising, read_file
-from dorothie_gym.speech.extras import speech_module
+from dorothie_gym.optional_modules import speech_module
 
 Samples: TypeAlias = NDArray[np.float32]
 """Mono audio (n,), float32, full scale is 1."""

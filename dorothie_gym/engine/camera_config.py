@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.camera.pose import CameraPose
 from dorothie_gym.copying import shared
 
 
@@ -108,17 +105,3 @@ class CameraConfig:
     def samples(self) -> int:
         """Number of samples along each side of a pixel."""
         return 2 if self.antialiasing else 1
-
-    def pose_on(self, x: float, y: float, z: float, heading: float, rise: float = 0.0) -> CameraPose:
-        """Returns the pose of the camera on a car.
-
-        Args:
-            x: of the car [m].
-            y: of the car [m].
-            z: of the road below it [m].
-            heading: of the car [rad].
-            rise: of the road per metre ahead.
-        """
-        mount = self.mount
-        car = CameraPose(x, y, z, heading, pm.atan(rise))
-        return car.mounted(mount.forward, mount.up, math.radians(mount.pitch))

@@ -9,17 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from dorothie_gym import portable_math as pm
 from dorothie_gym.angles import wrap_radians
+from dorothie_gym.camera.scenery.landmarks import landmark_key
+from dorothie_gym.camera.session_camera import SessionCamera
+from dorothie_gym.camera.session_pictures import camera_of
 from dorothie_gym.camera.visibility import PERCEPTION_CAMERA, is_body_seen, is_landmark_recognised
 from dorothie_gym.compilation.records import RecordArray, empty_records, plain
 from dorothie_gym.copying import Lookups
 from dorothie_gym.engine.observations import write_landmarks
-from dorothie_gym.engine.pictures import OBSERVERS, camera_of
+from dorothie_gym.engine.pictures import OBSERVERS
 from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.roles import Role
@@ -28,9 +31,6 @@ from dorothie_gym.sim.state.sensing_records import EyeRecord, SeenRecord
 from dorothie_gym.sim.world import World
 from dorothie_gym.spaces.observations import Observation
 from dorothie_gym.tasks.storyboard import Landmark
-
-if TYPE_CHECKING:
-    from dorothie_gym.camera.session_camera import SessionCamera
 
 
 class CameraPerception(Lookups):
@@ -72,8 +72,6 @@ class CameraPerception(Lookups):
 
     def look(self) -> None:
         """Looks at the present decision."""
-        from dorothie_gym.camera.scenery.landmarks import landmark_key  # here: most sessions have no camera
-
         boxes = self._camera.render(self._world).boxes
         assert boxes is not None
         self._pixels = dict(zip(boxes.keys.tolist(), boxes.pixels.tolist(), strict=True))
