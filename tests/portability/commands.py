@@ -77,7 +77,8 @@ def error_lines(name: str) -> Values:
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
         Path("cut.xodr").write_text('<?xml version="1.0"?>\n<OpenDRIVE>\n  <road id="1" leng', encoding="utf-8")
         result = invoke(*ERRORS[name])
-    yield "text", f"{result.stdout}{result.stderr}exit code {result.exit_code}\n"
+    printed = (result.stdout + result.stderr).replace(f"{Path(folder).resolve()}{os.sep}", "")
+    yield "text", f"{printed}exit code {result.exit_code}\n"
 
 
 # --- Leaderboard ------------------------------------------------------------------------------------------------------

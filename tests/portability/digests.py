@@ -58,7 +58,7 @@ def main() -> None:
     if "--freeze" in sys.argv[1:]:
         freeze(*patterns)
         return
-    found = {}
+    found: dict[str, dict[str, str]] = {}
     for part in part_names(*patterns):
         start = time.perf_counter()
         found |= computed(part)

@@ -14,7 +14,9 @@ import numpy as np
 
 from dorothie_gym import make_policy
 from dorothie_gym.camera.config import CameraConfig
-from dorothie_gym.engine.config import ChannelKind, EnvConfig, PerceptionModel
+from dorothie_gym.engine.channel_kind import ChannelKind
+from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.engine.perception_model import PerceptionModel
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv
 from dorothie_gym.maps import Town, load_town, town_names
