@@ -1,6 +1,5 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
-from .asr_channel import USUAL_WORD_ERROR_RATE as USUAL_WORD_ERROR_RATE
 from .asr_channel import AsrChannel as AsrChannel
 from .asr_channel import Recogniser as Recogniser
 from .asr_channel import word_error_rate as word_error_rate
@@ -41,6 +40,7 @@ from .propositions import read_meaning as read_meaning
 from .realization_context import Direction as Direction
 from .realization_context import Wording as Wording
 from .realization_context import WordingContext as WordingContext
+from .recognition_errors import USUAL_WORD_ERROR_RATE as USUAL_WORD_ERROR_RATE
 from .recognition_errors import ErrorProfile as ErrorProfile
 from .recognition_errors import Loudness as Loudness
 from .recognition_errors import WordClass as WordClass

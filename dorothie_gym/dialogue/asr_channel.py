@@ -9,7 +9,6 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
 
 import numpy as np
 from rapidfuzz import process
@@ -21,7 +20,13 @@ from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.dialogue.entity_recognition import sound_of
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
-from dorothie_gym.dialogue.recognition_errors import Loudness, measured_errors, proper_words, word_class
+from dorothie_gym.dialogue.recognition_errors import (
+    USUAL_WORD_ERROR_RATE,
+    Loudness,
+    measured_errors,
+    proper_words,
+    word_class,
+)
 from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -29,13 +34,6 @@ from dorothie_gym.ontology.roles import Role
 _WORD = re.compile(r"[A-Za-z][A-Za-z']*")
 _CANDIDATES = 6
 """Number of candidate words for a substitution."""
-
-USUAL_WORD_ERROR_RATE: Final = round(measured_errors().rate, 3)
-"""Word error rate of sessions by default: that of spoken sessions (`recognition_errors.measured_errors`).
-
-Systems of the time of the paper, and professional transcribers, have 5.1 % on telephone conversations of strangers
-(Switchboard; Xiong et al., ICASSP 2018; Saon et al., Interspeech 2017).
-"""
 
 
 @shared

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, field
 from typing import TypeAlias
 
 from dorothie_gym.copying import shared
-from dorothie_gym.dialogue.asr_channel import USUAL_WORD_ERROR_RATE
 from dorothie_gym.dialogue.conversation import WORDS_PER_SECOND
+from dorothie_gym.dialogue.recognition_errors import USUAL_WORD_ERROR_RATE
 from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.perception_model import PerceptionModel

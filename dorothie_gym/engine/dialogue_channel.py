@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from dorothie_gym.dialogue.asr_channel import AsrChannel, Recogniser
+from dorothie_gym import dialogue  # lazy: words and their recognition are made when a session needs them
 from dorothie_gym.dialogue.conversation import Conversation, Span, Utterance
-from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
 from dorothie_gym.dialogue.disfluency import fluent
-from dorothie_gym.dialogue.nlg import word_act
 from dorothie_gym.dialogue.recognition_errors import Loudness
-from dorothie_gym.dialogue.speaker_style import SpeakerStyle, draw_style
 from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.engine.cabin import CabinState, signal_to_noise
 from dorothie_gym.engine.channel_kind import ChannelKind
@@ -107,14 +104,14 @@ class DialogueChannel:
         return np.random.default_rng(self._seeds[0])
 
     @cached_property
-    def _recogniser(self) -> Recogniser:
+    def _recogniser(self) -> dialogue.Recogniser:
         ears = np.random.default_rng(self._seeds[1])
-        return Recogniser(AsrChannel(rate=self._rate), ears, classify=self._observe_acts)
+        return dialogue.Recogniser(dialogue.AsrChannel(rate=self._rate), ears, classify=self._observe_acts)
 
     @cached_property
-    def _styles(self) -> dict[Role, SpeakerStyle]:
+    def _styles(self) -> dict[Role, dialogue.SpeakerStyle]:
         rng = np.random.default_rng(self._seeds[2])
-        return {role: draw_style(role, rng) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
+        return {role: dialogue.draw_style(role, rng) for role in (Role.PARTICIPANT, Role.CO_WIZARD)}
 
     @property
     def exchanges(self) -> int:
@@ -185,7 +182,7 @@ class DialogueChannel:
 
     def _worded(self, act: DialogueAct, role: Role) -> str:
         """Returns words for an act, in the style of the speaker."""
-        return plain_text(word_act(act, role, self._words, style=self._styles[role]), UTTERANCE_LENGTH)
+        return plain_text(dialogue.word_act(act, role, self._words, style=self._styles[role]), UTTERANCE_LENGTH)
 
     def _hear(self, utterance: Utterance, cabin: Callable[[], CabinState]) -> DeliveredUtterance:
         if self._spoken is None:
@@ -206,7 +203,7 @@ class DialogueChannel:
         """Returns the acts of an utterance, or those classified from its words where acts are not observed."""
         if self._observe_acts:
             return utterance.acts
-        return tuple(span.act for span in guess_spans(utterance.text))
+        return tuple(span.act for span in dialogue.guess_spans(utterance.text))
 
     def _records(self, utterance: Utterance, heard: Utterance) -> tuple[SpanRecord, ...]:
         exchanges, transaction = self._annotator.update(utterance)

@@ -10,14 +10,13 @@ from typing import TypeAlias
 import gymnasium
 import numpy as np
 
+from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
 from dorothie_gym.copying import shared
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import did_you_mean, short_repr
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.recording.header import SessionHeader, SubgoalRow
-from dorothie_gym.tasks.binding import bind
-from dorothie_gym.tasks.parsing import load_template, template_names
 from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
 
 STREET_NAMES = tuple(
@@ -83,7 +82,7 @@ def template_option(storyboard: str | Path | StoryboardTemplate | None) -> Story
         raise ValueError(
             f"storyboard is a {type(storyboard).__name__}; it must be a name, a path or a StoryboardTemplate"
         )
-    return load_template(storyboard)
+    return tasks.load_template(storyboard)
 
 
 def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) -> Scenario:
@@ -99,9 +98,9 @@ def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) ->
     """
     task, streets, departure = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     if template is None:
-        names = template_names()
-        template = load_template(names[int(task.integers(len(names)))])
-    storyboard = bind(template, town.sites, task)
+        names = tasks.template_names()
+        template = tasks.load_template(names[int(task.integers(len(names)))])
+    storyboard = tasks.bind(template, town.sites, task)
     taken = {landmark.site for landmark in storyboard.landmarks}
     free = [site for site in town.sites if site.id not in taken] or list(town.sites)
     start = free[int(departure.integers(len(free)))]
