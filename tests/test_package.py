@@ -110,3 +110,52 @@ def test_distributions_contain_the_shipped_models(target: str, tmp_path: Path) -
     for path in files:
         (found,) = (name for name in contents if name.endswith(path.relative_to(shipped.parent).as_posix()))
         assert contents[found] == path.read_bytes()
+
+
+PACKAGE = Path(str(dorothie_gym.__file__)).parent
+
+
+def module_of(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+LAZY_FACES = sorted(
+    module_of(path)
+    for path in PACKAGE.rglob("__init__.py")
+    if path.parent != PACKAGE and "attach_stub" in path.read_text(encoding="utf-8")
+)
+
+
+@pytest.mark.parametrize("face", LAZY_FACES)
+def test_each_name_of_a_lazy_face_is_found(face: str) -> None:
+    module = importlib.import_module(face)
+    for name in module.__all__:
+        value = getattr(module, name)
+        assert not isinstance(value, type(sys)), f"{face}.{name} is a module"
+
+
+def test_modules_import_names_from_where_they_are_defined() -> None:
+    """A face hides what a module depends on; what is meant to be lazy is used as `maps.load_town`."""
+    through_faces = [
+        f"{module_of(path)}:{node.lineno} imports {alias.name} from {node.module}"
+        for path in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module in LAZY_FACES
+        for alias in node.names
+        if not list((PACKAGE.parent / str(node.module).replace(".", "/")).glob(f"{alias.name}.py"))
+        and not (PACKAGE.parent / str(node.module).replace(".", "/") / alias.name).is_dir()
+    ]
+    assert through_faces == []
+
+
+def test_importing_an_environment_loads_neither_pictures_nor_speech() -> None:
+    modules = loaded_by(
+        "import json, sys, dorothie_gym.envs.duo_wizard_v0; "
+        "print(json.dumps([name for name in sys.modules if name.startswith('dorothie_gym.')]))"
+    )
+    drawn = [name for name in modules if name.startswith(("dorothie_gym.camera.", "dorothie_gym.rendering."))]
+    spoken = [name for name in modules if name.startswith(("dorothie_gym.speech", "dorothie_gym.audio"))]
+    assert drawn + spoken == []
+    assert not {"dorothie_gym.dialogue.nlg", "dorothie_gym.dialogue.nlu", "dorothie_gym.tasks.parsing"} & set(modules)
+    assert not [name for name in modules if name.startswith(("dorothie_gym.maps.yaml", "dorothie_gym.maps.opendrive"))]
