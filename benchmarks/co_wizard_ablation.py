@@ -22,7 +22,7 @@ from dorothie_gym.baselines.co_wizard.decision import Inputs, Scene
 from dorothie_gym.baselines.co_wizard.features import ordered_exit
 from dorothie_gym.baselines.co_wizard.files import load_network
 from dorothie_gym.baselines.co_wizard.memory import FRESH, SPEEDS, Memory, Update
-from dorothie_gym.baselines.co_wizard.policy import Choice, LearnedCoWizard, LearnedState, Turn
+from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard, LearnedState, Turn
 from dorothie_gym.baselines.co_wizard.remarks import Sources, filled
 from dorothie_gym.baselines.imitation.drawing import drawn
 from dorothie_gym.cli.output import reporting_errors, session_progress
@@ -51,9 +51,9 @@ class RandomCommands(LearnedCoWizard):
 
     def _act(
         self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
-    ) -> tuple[Choice, tuple[Remark, ...]]:  # fmt: skip
-        choice, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
-        return replace(choice, command=int(rng.integers(len(inputs.rows)))), remarks
+    ) -> tuple[int, tuple[Remark, ...]]:  # fmt: skip
+        _, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
+        return int(rng.integers(len(inputs.rows))), remarks
 
 
 class RuledCommands(LearnedCoWizard):
@@ -61,9 +61,9 @@ class RuledCommands(LearnedCoWizard):
 
     def _act(
         self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
-    ) -> tuple[Choice, tuple[Remark, ...]]:  # fmt: skip
-        choice, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
-        return replace(choice, command=ruled_command(memory, scene.view)), remarks
+    ) -> tuple[int, tuple[Remark, ...]]:  # fmt: skip
+        _, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
+        return ruled_command(memory, scene.view), remarks
 
 
 def ruled_command(memory: Memory, view: CoWizardView) -> int:

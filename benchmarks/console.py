@@ -75,6 +75,7 @@ class Browser:
         self.measuring = False
 
     async def run(self, until: float) -> None:
+        """Drives until a time on the monotonic clock [s]."""
         import websockets
 
         async with websockets.connect(self.address, compression=None, max_size=2**22, open_timeout=60) as socket:
@@ -146,6 +147,7 @@ async def measure(port: int, tokens: list[str], seconds: float, pictures: int, p
 
 
 def main() -> None:
+    """Measures a server with simulated people and prints the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=int, default=20)
     parser.add_argument("--seconds", type=float, default=20.0)

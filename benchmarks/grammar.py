@@ -104,8 +104,9 @@ def main(
         return
     print(f"{total:,} utterances, flagged for grammar {shares['grammar']:.2%}, for style {shares['style']:.2%}")
     table = Table("kind", "rule", "utterances", "examples")
-    for (kind, rule), found in ranked:
-        table.add_row(kind, rule, str(found.total()), "\n".join(text for text, _ in found.most_common(EXAMPLES)))
+    for (kind, rule), flagged_texts in ranked:
+        examples = "\n".join(text for text, _ in flagged_texts.most_common(EXAMPLES))
+        table.add_row(kind, rule, str(flagged_texts.total()), examples)
     Console().print(table)
 
 

@@ -77,11 +77,6 @@ RECIPES: Final[Mapping[str, Recipe]] = {
         commands=(GENERATE_TALKS, "train co-wizard --corpus talks --workers 2 --out models"),
         folders=(f"models/co-wizard/seed-{SEED}",),
     ),
-    "co-wizard-rl": Recipe(
-        description="The learned Co-Wizard, its commands and remarks trained further by reinforcement",
-        commands=(GENERATE_TALKS, "train co-wizard-rl --corpus talks --workers 2 --out models"),
-        folders=(f"models/co-wizard-rl/seed-{SEED}",),
-    ),
     "participant": Recipe(
         description="A network decides errand, guidance and remarks; rules read, plan and word",
         commands=(GENERATE_TALKS, "train participant --corpus talks --workers 2 --out models"),

@@ -52,6 +52,7 @@ def relative(rows: Mapping[str, WordErrors], rate: float) -> dict[str, float]:
 
 
 def main() -> None:
+    """Measures a corpus and writes the profile into the package."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--out", type=Path, default=TARGET)

@@ -1,4 +1,4 @@
-"""Runs `dorothie-gym bench` and stores the figures with the date in `benchmarks/results/NAME.json`."""
+"""Runs `python -m benchmarks` and stores the figures with the date in `benchmarks/results/NAME.json`."""
 
 import datetime
 import json
@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-RESULTS = Path(__file__).parent / "results"
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
 BENCHMARKS = {
     "world": ("world",),
     "world_100_vehicles": ("world", "--vehicles", "100", "--pedestrians", "50"),
@@ -32,9 +33,9 @@ def main(
     for name in names or list(BENCHMARKS):
         if name not in BENCHMARKS:
             raise typer.BadParameter(f"{name} is none of {', '.join(BENCHMARKS)}")
-        picture = [] if charts is None else ["--picture", str(charts / f"bench_{name}.png")]
-        command = [sys.executable, "-m", "dorothie_gym.cli", "bench", *BENCHMARKS[name], "--json", *picture]
-        done = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True)
+        picture = [] if charts is None else ["--picture", str(charts.absolute() / f"bench_{name}.png")]
+        command = [sys.executable, "-m", "benchmarks", *BENCHMARKS[name], "--json", *picture]
+        done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True, text=True)
         figures = {"date": datetime.date.today().isoformat(), **json.loads(done.stdout)}
         path = RESULTS / f"{name}.json"
         path.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")

@@ -3,7 +3,7 @@
     dorothie-gym generate --sessions 240 --seed 21001 --out CORPUS
     python benchmarks/speech_transcripts.py CORPUS
 
-Sessions that measure recognition have other seeds (`dorothie-gym bench speech`).
+Sessions that measure recognition have other seeds (`python -m benchmarks speech`).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ TARGET = Path(__file__).parent.parent / "dorothie_gym" / "speech" / "data" / TRA
 
 
 def utterances(corpus: Path) -> list[str]:
+    """Returns the utterances of all sessions of a corpus, their spans separated by " | "."""
     found = []
     for session in load_sessions(corpus):
         for utterance in session.utterances():
@@ -28,6 +29,7 @@ def utterances(corpus: Path) -> list[str]:
 
 
 def main() -> None:
+    """Writes the transcripts of a corpus into the package."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("corpus", type=Path)
     lines = utterances(parser.parse_args().corpus)

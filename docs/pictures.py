@@ -3,10 +3,9 @@
 python docs/pictures.py --corpus DIR       # all; DIR: dorothie-gym generate --sessions 183 --seed 77 --out DIR
 python docs/pictures.py session midtown    # some of them
 
-`navigation_curve.png` and `selfplay_curve.png` come from training runs, see `docs/pages.py curves` and
-docs/selfplay.md; `perception.png` comes from `benchmarks/perception.py --picture`, `detections.webp` from
-`benchmarks/detections.py`. Charts have a hash of what they show
-(`FINGERPRINT`), with which the tests find charts that are out of date without drawing them: the pixels of a chart
+`navigation_curve.png` comes from training runs, see `docs/pages.py curves`; `perception.png` comes from
+`benchmarks/perception.py --picture`, `detections.webp` from `benchmarks/detections.py`. Charts have a hash of what they
+show (`FINGERPRINT`), with which the tests find charts that are out of date without drawing them: the pixels of a chart
 depend on the version of matplotlib.
 """
 
@@ -29,7 +28,6 @@ from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from dorothie_gym.bench.report import Report, draw, world_report
 from dorothie_gym.camera.pose import pose_on_car
 from dorothie_gym.camera.recorded_pictures import RecordedPictures
 from dorothie_gym.camera.scene_cache import town_scene
@@ -54,6 +52,9 @@ from dorothie_gym.rollout.closed_loop.leaderboard import PART_TITLES
 from dorothie_gym.rollout.closed_loop.leaderboard_chart import CHART_METRICS, ChartRow, draw_rows
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.weather import Weather
+
+sys.path.append(str(Path(__file__).parents[1]))  # the benchmarks are a folder of the checkout and not installed
+from benchmarks.report import Report, draw, world_report
 
 DOCS = Path(__file__).parent
 BENCHMARK = DOCS.parent / "benchmarks" / "results" / "world.json"
@@ -198,12 +199,12 @@ def draw_corpus(path: Path, corpus: Path) -> None:
 
 
 def benchmark_report() -> Report:
-    """Returns the recorded measurement of `dorothie-gym bench world`."""
+    """Returns the recorded measurement of `python -m benchmarks world`."""
     return world_report(json.loads(BENCHMARK.read_text(encoding="utf-8")))
 
 
 def draw_benchmark(path: Path) -> None:
-    """Draws the recorded measurement of `dorothie-gym bench world`."""
+    """Draws the recorded measurement of `python -m benchmarks world`."""
     report = benchmark_report()
     draw(report, path)
     sign(path, dataclasses.asdict(report))

@@ -107,7 +107,6 @@ def environments() -> Iterator[RegisteredEnvironment]:
         name="Town-v0",
         entry_point=f"{_ENVS}.town_v0:TownEnv",
         description="Drive among traffic in highway-env, without roles, dialogue and errands.",
-        vector_entry_point="dorothie_gym.sim.batch.town_vector_env:TownVectorEnv",
     )
 
 

@@ -27,7 +27,6 @@ DorothieGymError
 ├── SpeechError          speech cannot be synthesised or recognised: a package, voice, model or server is missing
 ├── CacheError           the cache folder cannot be written
 └── ProcessError         a worker process failed
-    └── BenchmarkProcessError   a measuring process ended early
 ```
 """
 
@@ -187,10 +186,6 @@ class CacheError(DorothieGymError, RuntimeError):
 
 class ProcessError(DorothieGymError, RuntimeError):
     """A task failed in its worker process, or the process died; the message names the task and the cause."""
-
-
-class BenchmarkProcessError(ProcessError):
-    """A measuring process ended before it reported a result."""
 
 
 def printable(text: str) -> str:

@@ -127,7 +127,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 def _is_warm(stage: int) -> bool:
     if stage == 3:
         return is_warm() and camera.is_warm()
-    return is_warm(everything=stage == 2) and (stage == 1 or navigation.is_warm())
+    return is_warm() and (stage == 1 or navigation.is_warm())
 
 
 @pytest.hookimpl(tryfirst=True)

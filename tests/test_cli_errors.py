@@ -143,7 +143,7 @@ def test_invalid_evaluations_are_reported(arguments: list[str], words: str) -> N
         (["film", "a", "--out", "b.mp4", "--view", "side"], "'--view': 'side' is not one of 'map', 'camera', 'both'"),
         (["run", "--bogus"], "No such option: --bogus"),
         (["film"], "Missing argument 'SESSION'; see dorothie-gym film --help"),
-        (["bench", "camera", "--size"], "Option '--size' requires an argument"),
+        (["film", "a", "--out"], "Option '--out' requires an argument"),
         (["walk"], "No such command 'walk'; see dorothie-gym --help"),
         (["--bogus"], "No such option: --bogus"),
     ],
@@ -153,5 +153,5 @@ def test_invalid_options_are_reported(arguments: list[str], words: str) -> None:
 
 
 def test_a_group_without_a_command_shows_its_help() -> None:
-    result = CliRunner().invoke(app, ["bench"])
-    assert "Usage: " in result.output and "camera" in result.output and "Error" not in result.output
+    result = CliRunner().invoke(app, ["study"])
+    assert "Usage: " in result.output and "invite" in result.output and "Error" not in result.output

@@ -50,7 +50,6 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     ),
     "two trainings": ("train", "toto", "--corpus", "CORPUS", "--seeds", "2", "--encoder", "hashing", "--workers", "2"),
     "table": ("table", "--corpus", "CORPUS", "--models", "tfidf", "--seeds", "1"),
-    "selfplay": ("train-rl", "selfplay", "--steps", "128", "--environments", "1", *SHORT),
     "dqn": ("train-rl", "dqn", "--steps", "512", "--environments", "2", "--evaluate-every", "256", *SHORT),
 }  # fmt: skip
 

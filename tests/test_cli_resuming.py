@@ -105,7 +105,7 @@ def test_killed_and_interrupted_training_ends_as_an_undisturbed_one(tmp_path: Pa
         ("a2c", "--workers", "0"),
         ("dqn", "--workers", "2"),
         ("sac", "--env", "dorothie_gym/Navigation-continuous-v0", "--workers", "0"),
-        ("selfplay", "--workers", "0"),
+        ("maskable_ppo", "--env", "dorothie_gym/AdWizard-v0", "--workers", "2"),
     ],
 )
 def test_training_killed_at_random_moments_ends_as_an_undisturbed_one(

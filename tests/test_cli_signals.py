@@ -26,7 +26,6 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "rollout": ("rollout", "--sessions", "40", "--workers", "2", "--out", "out"),
     "train": ("train", "toto", "--corpus", "CORPUS", "--seeds", "2", "--workers", "2", "--out", "out"),
     "train-rl": ("train-rl", "ppo", "--workers", "2", "--out", "out"),
-    "selfplay": ("train-rl", "selfplay", "--workers", "2", "--out", "out"),
     "evaluate": ("evaluate", "--corpus", "CORPUS", "--split", "all", "--model", "random", "--seeds", "99"),
 }
 """Long commands by name; CORPUS stands for the folder of a small corpus."""

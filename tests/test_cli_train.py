@@ -9,7 +9,6 @@ import pytest
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from dorothie_gym.policies import pretrained_folder
 
 runner = CliRunner()
 
@@ -36,12 +35,6 @@ runner = CliRunner()
         (["train", "co-wizard", "--config", "paper"], "--config and --encoder are not for co-wizard"),
         (["train", "co-wizard", "--encoder", "minilm"], "--config and --encoder are not for co-wizard"),
         (["train", "participant", "--strict"], "--config and --encoder are not for participant"),
-        (["train", "co-wizard", "--ad-wizard", "silent"], "--ad-wizard is for co-wizard-rl only"),
-        (["train", "co-wizard-rl", "--ad-wizard", "scriptd"], "there is no policy 'scriptd'"),
-        (
-            ["train", "co-wizard-rl", "--ad-wizard", str(pretrained_folder("pretrained:co-wizard"))],
-            "plays the co_wizard, not the ad_wizard",
-        ),
         (["train", "segformer", "--strict"], "--hubert, --strict and --encoder are not for segformer"),
         (["train", "detr", "--encoder", "hashing"], "--hubert, --strict and --encoder are not for detr"),
         (["train", "detr"], "run first: dorothie-gym train segformer"),
@@ -111,28 +104,6 @@ def test_killed_training_resumes_to_the_same_bytes(corpus, tmp_path):
     for name in ("best.safetensors", "last.safetensors"):
         whole, killed = (tmp_path / out / folder / name for out in ("whole", "killed"))
         assert whole.read_bytes() == killed.read_bytes()
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(1200)
-def test_training_speed_is_compared_with_the_published_loop(corpus):
-    arguments = [
-        "bench",
-        "train",
-        "--corpus",
-        str(corpus),
-        "--threads",
-        "1",
-        "--repeats",
-        "1",
-        "--batch",
-        "8",
-        "--json",
-    ]
-    figures = json.loads(runner.invoke(app, arguments, catch_exceptions=False).stdout)
-    assert 92e6 < figures["published_parameters"] < 95e6
-    assert figures["points_per_second"] > 0 and 0 < figures["matrix_share"] < 1.5
-    assert figures["flops_per_point"] > 2e9
 
 
 @pytest.mark.slow

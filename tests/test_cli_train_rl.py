@@ -12,6 +12,8 @@ from dorothie_gym.cli.app import app
 
 SHORT = ["--set", "max_seconds=5", "--set", "traffic=none", "--episodes", "1", "--environments", "1", "--workers", "0"]
 
+AD_WIZARD = ["maskable_ppo", "--env", "dorothie_gym/AdWizard-v0", "--set"]
+
 
 def test_training_prints_its_result_as_json(tmp_path: Path) -> None:
     out = tmp_path / "run"
@@ -26,55 +28,29 @@ def test_training_prints_its_result_as_json(tmp_path: Path) -> None:
     assert again.exit_code == 0 and "curve.png" in again.stdout
 
 
-def test_selfplay_trains_roles_that_rollout_can_play(tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    short = ["--steps", "128", "--environments", "1", "--workers", "0", "--episodes", "1", "--set", "max_seconds=5"]
-    result = CliRunner().invoke(
-        app, ["train-rl", "selfplay", "--out", str(out), *short, "--set", "shared=true", "--json"]
-    )
+@pytest.mark.long
+def test_an_ad_wizard_is_trained_against_given_partners_and_plays_in_rollouts(tmp_path: Path) -> None:
+    out, env = tmp_path / "run", "dorothie_gym/AdWizard-v0"
+    options = ["--steps", "64", "--environments", "1", "--workers", "0", "--episodes", "1", "--set", "max_cycles=20"]
+    partners = 'partners={co_wizard: "pretrained:maskable-ppo", participant: silent}'
+    words = ["train-rl", "maskable_ppo", "--env", env, "--out", str(out), *options, "--set", partners]
+    result = CliRunner().invoke(app, [*words, "--json"])
     assert result.exit_code == 0, result.output
-    facts = json.loads(result.stdout)
-    assert facts["finished"] and facts["steps"] == 128 and facts["settings"]["shared"] is True
-    assert set(facts["evaluations"][0]["returns"]) == {"participant", "co_wizard", "ad_wizard"}
-    again = CliRunner().invoke(app, ["train-rl", "selfplay", "--out", str(out), *short, "--set", "shared=true"])
-    assert again.exit_code == 0 and "curve.png" in again.stdout and f"--co-wizard {out / 'co_wizard'}" in again.stdout
-    roles = [
-        word
-        for role in ("participant", "co-wizard", "ad-wizard")
-        for word in (f"--{role}", str(out / role.replace("-", "_")))
-    ]
-    played = CliRunner().invoke(
-        app,
-        [
-            "rollout",
-            *roles,
-            "--sessions",
-            "1",
-            "--towns",
-            "brookside",
-            "--max-seconds",
-            "20",
-            "--workers",
-            "1",
-            "--json",
-        ],
-    )
+    settings = json.loads(result.stdout)["settings"]["env_settings"]
+    assert settings["partners"] == {"co_wizard": "pretrained:maskable-ppo", "participant": "silent"}
+    sessions = ["--sessions", "1", "--towns", "brookside", "--max-seconds", "20", "--workers", "1", "--json"]
+    played = CliRunner().invoke(app, ["rollout", "--ad-wizard", str(out), *sessions])
     assert played.exit_code == 0, played.output
     assert json.loads(played.stdout)["errored"] == 0
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "module"), [("ppo", "rl.behaviour_cloning"), ("selfplay", "selfplay.demonstrations")]
-)
-def test_ctrl_c_while_a_corpus_is_read_is_reported(
-    algorithm: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_while_a_corpus_is_read_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(f"dorothie_gym.baselines.{module}.replayable_sessions", interrupted)
+    monkeypatch.setattr("dorothie_gym.baselines.rl.behaviour_cloning.replayable_sessions", interrupted)
     result = CliRunner().invoke(
-        app, ["train-rl", algorithm, "--out", str(tmp_path), "--warm-start", str(tmp_path), "--workers", "0"]
+        app, ["train-rl", "ppo", "--out", str(tmp_path), "--warm-start", str(tmp_path), "--workers", "0"]
     )
     assert result.exit_code == 130 and "before the first step" in result.stderr
 
@@ -90,9 +66,10 @@ def test_ctrl_c_while_a_corpus_is_read_is_reported(
         (["ppo", "--env", "dorothie_gym/Nope-v0", "--workers", "1"], "Nope"),
         (["ppo", "--env", "dorothie_gym/NoSuch-v0"], "dorothie_gym/NoSuch-v0"),
         (["sac", "--env", "dorothie_gym/Navigation-v0"], "sac on dorothie_gym/Navigation-v0"),
-        (["selfplay", "--set", "colour=red"], "selfplay has no 'colour'"),
-        (["selfplay", "--set", "town=atlantis"], "atlantis"),
-        (["selfplay", "--env", "dorothie_gym/CoWizard-v0"], "omit the option"),
+        (["selfplay"], "algorithm is 'selfplay'"),
+        ([*AD_WIZARD, "partners={co_wizard: scriptd}"], "co_wizard: there is no policy 'scriptd', nor a file"),
+        ([*AD_WIZARD, "partners={ad_wizard: scripted}"], "partners has 'ad_wizard'"),
+        ([*AD_WIZARD, "partners={participant: 'pretrained:co-wizard'}"], "participant: there is no policy"),
         (["ppo", "--environments", "1", "--workers", "2"], "workers is 2"),
         (["dqn", "--warm-start", "corpus"], "warm_start: dqn"),
         (["ppo", "--warm-start", "no-such-corpus"], "no-such-corpus"),

@@ -11,15 +11,17 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
+from typer import Typer
 from typer.testing import CliRunner
 
+from benchmarks.commands import app as benchmarks
 from dorothie_gym.camera import warm_up as camera
 from dorothie_gym.cli import warm_up as command
 from dorothie_gym.cli.app import app
 from dorothie_gym.engine import warm_up as compiling
 from dorothie_gym.envs import warm_up as batches
 
-NAMES = ("sim.step.step", "sim.batch.play_share")
+NAMES = ("sim.step.step", "sim.batch.worlds.step_share")
 BATCH_NAME = "envs.driving_steps.act_share"
 CAMERA_NAME = "camera.shading.shade"
 
@@ -59,10 +61,10 @@ def test_warm_up_compiles_everything_and_reports_it(asked: list[bool]) -> None:
 
 def test_cold_run_shows_what_is_compiled_before_the_session(asked: list[bool], monkeypatch: pytest.MonkeyPatch) -> None:
     words = ["run", "--max-seconds", "2", "--no-picture"]
-    monkeypatch.setattr(compiling, "is_warm", lambda *, everything: True)
+    monkeypatch.setattr(compiling, "is_warm", lambda: True)
     warm = CliRunner().invoke(app, words, catch_exceptions=False)
     assert warm.exit_code == 0 and asked == [] and "Compiling" not in warm.stderr
-    monkeypatch.setattr(compiling, "is_warm", lambda *, everything: False)
+    monkeypatch.setattr(compiling, "is_warm", lambda: False)
     cold = CliRunner().invoke(app, words, catch_exceptions=False)
     assert cold.exit_code == 0 and asked == [False]
     assert "Compiling, once per machine" in cold.stderr and NAMES[-1] in cold.stderr
@@ -70,16 +72,17 @@ def test_cold_run_shows_what_is_compiled_before_the_session(asked: list[bool], m
 
 
 @pytest.mark.parametrize(
-    ("words", "stepped"),
+    ("program", "words", "stepped"),
     [
-        (["bench", "rl"], True),
-        (["bench", "world"], False),
-        (["train-rl", "ppo", "--out", "run", "--workers", "0"], True),
-        (["train-rl", "ppo", "--out", "run", "--workers", "2"], False),
+        (benchmarks, ["rl"], True),
+        (benchmarks, ["vector"], True),
+        (benchmarks, ["world"], False),
+        (app, ["train-rl", "ppo", "--out", "run", "--workers", "0"], True),
+        (app, ["train-rl", "ppo", "--out", "run", "--workers", "2"], False),
     ],
 )
 def test_commands_that_step_batches_compile_them_first(
-    asked: list[bool], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: list[str], stepped: bool
+    asked: list[bool], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, program: Typer, words: list[str], stepped: bool
 ) -> None:
     def interrupt(progress: Callable[[str, int, int], None], *, everything: bool) -> None:
         raise KeyboardInterrupt  # the command itself is not to run
@@ -90,12 +93,12 @@ def test_commands_that_step_batches_compile_them_first(
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(batches, "is_warm", lambda: False)
-    monkeypatch.setattr(compiling, "is_warm", lambda *, everything: stepped)
+    monkeypatch.setattr(compiling, "is_warm", lambda: stepped)
     if stepped:
         monkeypatch.setattr(batches, "warm_up", interrupt_batch)
     else:
         monkeypatch.setattr(compiling, "warm_up", interrupt)
-    result = CliRunner().invoke(app, words)
+    result = CliRunner().invoke(program, words)
     assert (BATCH_NAME in result.stderr) is stepped
     assert result.exit_code != 0
 

@@ -12,13 +12,16 @@ from typing import Any, Final, get_args, get_type_hints
 import pytest
 import typer
 
+from benchmarks.commands import app as benchmarks
 from dorothie_gym.cli.app import app
 
 ROOT: Final = Path(__file__).parents[1]
 
+FOLDERS: Final = ("docs", "dorothie_gym", "benchmarks")
+
 PAGES: Final = sorted(
     str(path.relative_to(ROOT))
-    for path in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "dorothie_gym").rglob("*.md"))
+    for path in (*ROOT.glob("*.md"), *(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.md")))
 )
 
 FOREIGN: Final = frozenset(
@@ -34,14 +37,15 @@ FOREIGN: Final = frozenset(
 CHANGELOG: Final = "CHANGELOG.md"
 """Page about earlier versions too, whose options may be gone."""
 
-_PROGRAM: Final = "dorothie-gym"
-_COMMAND: Final = re.compile(rf"{_PROGRAM}((?:[ \n][^`#&;]*)?)")
 _OPTION: Final = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 _CHOICES: Final = re.compile(r"[a-z]+(\|[a-z]+)+")
 _SCRIPT_OPTION: Final = re.compile(r'add(?:_argument|option)\(\s*"(--[a-z0-9-]+)"')
 
 COMMANDS: Final = typer.main.get_command(app)
 """The command line: groups have `commands`, commands have `params`."""
+
+PROGRAMS: Final = {"dorothie-gym": COMMANDS, "python -m benchmarks": typer.main.get_command(benchmarks)}
+"""Command lines by the words that call them."""
 
 
 def options_of(command: Any) -> Mapping[str, Any]:
@@ -65,7 +69,7 @@ def choices_of(command: Any, parameter: Any) -> Collection[str]:
     return found
 
 
-def all_options(command: Any = COMMANDS) -> Iterator[str]:
+def all_options(command: Any) -> Iterator[str]:
     """Yields the options of a command and of those below it."""
     yield from options_of(command)
     for below in getattr(command, "commands", {}).values():
@@ -82,17 +86,17 @@ def quoted(page: str) -> Iterator[str]:
     yield from (" ".join(span.split()) for span in re.findall(r"`([^`]+)`", rest))
 
 
-def command_lines(page: str) -> Iterator[list[str]]:
-    """Yields the words behind the name of the program, for each of its calls on a page."""
+def command_lines(page: str, program: str) -> Iterator[list[str]]:
+    """Yields the words behind the name of a program, for each of its calls on a page."""
     for code in quoted(page):
-        for found in _COMMAND.finditer(code):
+        for found in re.finditer(rf"{program}((?:[ \n][^`#&;]*)?)", code):
             line = found[1].split(" | ")[0].replace("[", " ").replace("]", " ").replace("...", " ")
             yield shlex.split(line)
 
 
-def faults(words: list[str]) -> Iterator[str]:
-    """Yields what the command line would refuse in a call: names of commands and options, choices, missing values."""
-    alternatives: list[Any] = [COMMANDS]
+def faults(words: list[str], program: Any = COMMANDS) -> Iterator[str]:
+    """Yields what a command line would refuse in a call: names of commands and options, choices, missing values."""
+    alternatives: list[Any] = [program]
     while words and not words[0].startswith("-") and hasattr(alternatives[0], "commands"):
         names = [name for name in words[0].split("|") if name]
         unknown = [name for name in names for command in alternatives if name not in command.commands]
@@ -119,17 +123,18 @@ def _option_faults(words: list[str], command: Any) -> Iterator[str]:
             yield from (f"{command.name} {name} cannot be {each!r}" for each in given.split("|") if each not in choices)
 
 
+@pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("page", [page for page in PAGES if page != CHANGELOG])
-def test_every_command_line_of_a_page_is_accepted(page: str) -> None:
-    found = [(" ".join(words), fault) for words in command_lines(page) for fault in faults(words)]
-    assert not found
+def test_every_command_line_of_a_page_is_accepted(page: str, program: str) -> None:
+    lines = command_lines(page, program)
+    assert not [(" ".join(words), fault) for words in lines for fault in faults(words, PROGRAMS[program])]
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page != CHANGELOG])
 def test_every_option_of_a_page_exists(page: str) -> None:
     scripts = [path for folder in ("benchmarks", "docs", "examples", "tests") for path in (ROOT / folder).rglob("*.py")]
     known = {option for path in scripts for option in _SCRIPT_OPTION.findall(path.read_text(encoding="utf-8"))}
-    known |= {*all_options(), *FOREIGN}
+    known |= {*FOREIGN, *(option for program in PROGRAMS.values() for option in all_options(program))}
     named = {option for code in quoted(page) for option in _OPTION.findall(code)}
     assert named <= known, "neither a command of the package nor a script has them"
 
@@ -150,4 +155,5 @@ def test_faults_of_a_command_line_are_found(line: str, fault: str) -> None:
 
 
 def test_command_lines_are_found_on_the_pages() -> None:
-    assert sum(1 for page in PAGES for words in command_lines(page) if words) > 150
+    found = {name: sum(1 for page in PAGES for words in command_lines(page, name) if words) for name in PROGRAMS}
+    assert found["dorothie-gym"] > 150 and found["python -m benchmarks"] > 8

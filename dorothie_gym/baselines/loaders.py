@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from dorothie_gym.baselines.acting.policy import BenchmarkCoWizard
     from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
     from dorothie_gym.baselines.participant.policy import LearnedParticipant
-    from dorothie_gym.baselines.selfplay.policy import LearnedPolicy
-    from dorothie_gym.policies.navigation.navigation_policy import NavigationPolicy
+    from dorothie_gym.policies.policy import AnyPolicy
 
 
 def load_benchmark_model(path: Path, role: Role, limits: SpaceLimits) -> BenchmarkCoWizard:
@@ -38,23 +37,20 @@ def load_benchmark_model(path: Path, role: Role, limits: SpaceLimits) -> Benchma
     return BenchmarkCoWizard(BenchmarkModel.load(path.resolve()), limits)
 
 
-def load_navigation_model(path: Path, role: Role, limits: SpaceLimits) -> NavigationPolicy:
-    """Returns a Co-Wizard that drives by a model trained in `Navigation-v0` (`dorothie-gym train-rl`).
+def load_rl_model(path: Path, role: Role, limits: SpaceLimits) -> AnyPolicy:
+    """Returns a policy that plays by a model of stable-baselines3 (`dorothie-gym train-rl`).
 
     Args:
-        path: folder of the model, or a file in it.
+        path: folder of the training, or a file of the model in it.
         role: the role to play.
         limits: sizes of the spaces.
 
     Raises:
-        ValueError: the role is not the Co-Wizard, the model was trained in another environment, or its files are
-            missing or damaged.
+        ValueError: the model was trained in an environment of another role, or its files are missing or damaged.
     """
-    if role is not Role.CO_WIZARD:
-        raise ValueError(f"{path}: navigation models play the co_wizard, not the {role}")
-    from dorothie_gym.baselines.rl.evaluation import make_player
+    from dorothie_gym.baselines.rl.players import make_player
 
-    return make_player(path, limits)
+    return make_player(path, role, limits)
 
 
 def load_co_wizard(path: Path, role: Role, limits: SpaceLimits) -> LearnedCoWizard:
@@ -101,19 +97,3 @@ def load_participant(path: Path, role: Role, limits: SpaceLimits) -> LearnedPart
     torch.set_num_threads(1)  # a small network: more threads only wait for each other
     network, page = load_network(path)
     return LearnedParticipant(network, page.vocabulary, limits)
-
-
-def load_selfplay_model(path: Path, role: Role, limits: SpaceLimits) -> LearnedPolicy:
-    """Returns the policy that self-play has learned for a role (`dorothie-gym train-rl selfplay`).
-
-    Args:
-        path: folder of the role, or `model.json` in it.
-        role: the role to play.
-        limits: sizes of the spaces.
-
-    Raises:
-        ValueError: the files are missing or damaged, or of another role or version.
-    """
-    from dorothie_gym.baselines.selfplay.policy import read_policy
-
-    return read_policy(path, role, limits)

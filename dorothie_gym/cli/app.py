@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Annotated, Any, Final
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
 from dorothie_gym._startup import exit_on_signals
 from dorothie_gym._version import __version__
 from dorothie_gym.cli.annotate import annotate
 from dorothie_gym.cli.annotations import agreement, annotations_app
-from dorothie_gym.cli.bench import bench
 from dorothie_gym.cli.console import console
 from dorothie_gym.cli.convert import convert
 from dorothie_gym.cli.cross_play import cross_play
@@ -24,8 +20,7 @@ from dorothie_gym.cli.frames import frames
 from dorothie_gym.cli.generate import generate
 from dorothie_gym.cli.leaderboard import leaderboard
 from dorothie_gym.cli.listings import envs, policies, storyboards, towns
-from dorothie_gym.cli.options import PictureCommand
-from dorothie_gym.cli.output import exit_interrupted, fail
+from dorothie_gym.cli.options import CommandGroup, PictureCommand
 from dorothie_gym.cli.rollout import rollout
 from dorothie_gym.cli.run import run
 from dorothie_gym.cli.sessions import compare, film, replay
@@ -36,44 +31,10 @@ from dorothie_gym.cli.submit import submit
 from dorothie_gym.cli.train import table, train
 from dorothie_gym.cli.train_rl import train_rl
 from dorothie_gym.cli.warm_up import warm_up
-from dorothie_gym.interruption import message, raising_interrupts
-
-_UsageError: Final[Any] = typer.BadParameter.__base__
-"""`UsageError` of click, or of the copy of click in newer releases of typer."""
-
-
-class _Commands(TyperGroup):
-    """Commands, of which each ends at Ctrl-C, at SIGTERM and at a wrong option with one line."""
-
-    def make_context(self, *args: Any, **settings: Any) -> Any:
-        """Reads the options before the command."""
-        with _reporting_usage():
-            return super().make_context(*args, **settings)
-
-    def invoke(self, ctx: Any) -> Any:  # the context of click, or of its copy
-        """Runs a command and returns its result."""
-        try:
-            with raising_interrupts(), _reporting_usage():
-                return super().invoke(ctx)
-        except KeyboardInterrupt:
-            exit_interrupted(message())
-
-
-@contextmanager
-def _reporting_usage() -> Iterator[None]:
-    """Turns the box in which typer prints wrong options and arguments into one message."""
-    try:
-        yield
-    except _UsageError as error:
-        if type(error).__name__ == "NoArgsIsHelpError":  # its text is the help of a command without arguments
-            raise
-        commands = [] if error.ctx is None else error.ctx.command_path.split()[1:]
-        text = error.format_message().replace("Value error, ", "").rstrip(".")  # pydantic's, in newer releases of typer
-        fail(f"{text}; see {' '.join(['dorothie-gym', *commands])} --help", error.exit_code)
-
 
 app = typer.Typer(
-    cls=_Commands,
+    name="dorothie-gym",
+    cls=CommandGroup,
     help="Simulation of situated dialogue between a passenger and a car that drives through a town, with an adversary.",
     no_args_is_help=True,
     rich_markup_mode="rich",
@@ -91,7 +52,6 @@ app.command()(storyboards)
 app.command()(envs)
 app.command()(policies)
 app.command()(evaluate)
-app.add_typer(bench, name="bench")
 app.command()(convert)
 app.command(cls=PictureCommand)(stats)
 app.command()(generate)

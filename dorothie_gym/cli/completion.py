@@ -62,7 +62,7 @@ def complete_algorithm(incomplete: str) -> list[str]:
         from dorothie_gym.baselines.rl.settings import ALGORITHMS
     except ImportError:
         return []
-    return _names(incomplete, (*ALGORITHMS, "selfplay"))
+    return _names(incomplete, ALGORITHMS)
 
 
 def complete_env(incomplete: str) -> list[str]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from dorothie_gym.cli.completion import complete_policy, complete_storyboard, complete_town
-from dorothie_gym.cli.output import fail
+from dorothie_gym.cli.output import exit_interrupted, fail
 from dorothie_gym.engine.perception_model import PerceptionModel
+from dorothie_gym.interruption import message, raising_interrupts
 from dorothie_gym.render_view import RenderView
 
 if TYPE_CHECKING:
@@ -210,6 +213,40 @@ _TOWNS = (".yaml", ".yml", ".xodr")
 
 CommandContext: TypeAlias = Any
 """`Context` of click, or of typer's own copy of click, depending on its version."""
+
+
+_UsageError: Final[Any] = typer.BadParameter.__base__
+"""`UsageError` of click, or of the copy of click in newer releases of typer."""
+
+
+class CommandGroup(TyperGroup):
+    """Commands, of which each ends at Ctrl-C, at SIGTERM and at a wrong option with one line."""
+
+    def make_context(self, *args: Any, **settings: Any) -> Any:
+        """Reads the options before the command."""
+        with _reporting_usage(self.name):
+            return super().make_context(*args, **settings)
+
+    def invoke(self, ctx: Any) -> Any:  # the context of click, or of its copy
+        """Runs a command and returns its result."""
+        try:
+            with raising_interrupts(), _reporting_usage(self.name):
+                return super().invoke(ctx)
+        except KeyboardInterrupt:
+            exit_interrupted(message())
+
+
+@contextmanager
+def _reporting_usage(program: str | None) -> Iterator[None]:
+    """Turns the box in which typer prints wrong options and arguments into one message."""
+    try:
+        yield
+    except _UsageError as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # its text is the help of a command without arguments
+            raise
+        text = error.format_message().replace("Value error, ", "").rstrip(".")  # pydantic's, in newer releases of typer
+        command = program if error.ctx is None else error.ctx.command_path
+        fail(f"{text}; see {command} --help", error.exit_code)
 
 
 class PictureCommand(TyperCommand):

@@ -23,7 +23,7 @@ from dorothie_gym.cli.output import (
     stdout,
     wide_stdout,
 )
-from dorothie_gym.cli.train_roles import CO_WIZARD_RL, ROLES, train_role
+from dorothie_gym.cli.train_roles import ROLES, train_role
 from dorothie_gym.cli.train_vision import VISION_MODELS, train_vision
 
 if TYPE_CHECKING:
@@ -68,13 +68,6 @@ Detector = Annotated[
         help="Models of detections and queries: folder of the trained detector; default OUT/detr/small/seed-0.",
     ),
 ]  # fmt: skip
-AdWizard = Annotated[
-    str | None,
-    typer.Option(
-        "--ad-wizard", metavar="POLICY",
-        help="co-wizard-rl: Ad-Wizard of every other session, by name or path; default scripted.",
-    ),
-]  # fmt: skip
 Hubert = Annotated[
     Path | None,
     typer.Option("--hubert", metavar="DIR", help="Models of HuBERT: folder of its weights (safetensors)."),
@@ -98,7 +91,7 @@ def train(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="toto, toto-belief, text, ... (see `table`); segformer, detr; co-wizard, co-wizard-rl, participant.",
+            help="toto, toto-belief, text, ... (see `table`); segformer, detr; co-wizard, participant.",
             autocompletion=complete_model,
         ),
     ],
@@ -114,17 +107,13 @@ def train(
     epochs: Epochs = None,
     detector: Detector = None,
     hubert: Hubert = None,
-    ad_wizard: AdWizard = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a model with several seeds, test it, and print its scores.
 
     An interrupted run is resumed by the same command. The vision models, segformer and detr, learn from pictures of the
     recorded sessions; co-wizard learns to talk and drive, and participant to guide, by imitation and practice.
-    co-wizard-rl is co-wizard, trained further by reinforcement.
     """
-    if ad_wizard is not None and model != CO_WIZARD_RL:
-        fail(f"--ad-wizard is for {CO_WIZARD_RL} only")
     if model in VISION_MODELS:
         if detector is not None:
             fail(_NOT_OF_DETECTIONS)
@@ -144,10 +133,7 @@ def train(
         if detector is not None or hubert is not None or strict or size != SMALL or encoder != AUTO:
             fail(f"--detector, --hubert, --strict, --config and --encoder are not for {model}")
         with _reporting_errors():
-            train_role(
-                model, *_places(corpus, out), seeds=seeds or 1, workers=workers, ad_wizard=ad_wizard or "scripted",
-                as_json=as_json,
-            )  # fmt: skip
+            train_role(model, *_places(corpus, out), seeds=seeds or 1, workers=workers, as_json=as_json)
         return
     _train_benchmark_model(
         model, corpus, out, size=size, seeds=seeds or 5, encoder=encoder, workers=workers, strict=strict,

@@ -1,13 +1,13 @@
-"""`dorothie-gym train-rl`: reinforcement learning and self-play."""
+"""`dorothie-gym train-rl`: reinforcement learning."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, NoReturn, TypeAlias
 
 import typer
 
@@ -15,17 +15,11 @@ from dorothie_gym.cli.completion import complete_algorithm, complete_env
 from dorothie_gym.cli.options import AsJson, Ray
 from dorothie_gym.cli.output import FAILED, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.cli.warm_up import compile_first
-from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.rl.run import OnProgress, OnStage, RunEvaluation, TrainingResult
-    from dorothie_gym.baselines.rl.settings import RunSettings, SelfPlaySettings, TrainingSettings
-    from dorothie_gym.baselines.rl.training import TrainingEvaluation
-    from dorothie_gym.baselines.selfplay.training import SelfPlayEvaluation
-
-Evaluation = TypeVar("Evaluation", bound="RunEvaluation")
-Settings = TypeVar("Settings", bound="RunSettings")
+    from dorothie_gym.baselines.rl.run import OnProgress, OnStage, TrainingEvaluation, TrainingResult
+    from dorothie_gym.baselines.rl.settings import TrainingSettings
 
 DEFAULT_ENV = "dorothie_gym/Navigation-v0"
 """Environment of train-rl."""
@@ -42,16 +36,14 @@ _OPTIONS = ("steps", "environments", "workers", "seed", "evaluate_every", "episo
 def train_rl(
     algorithm: Annotated[
         str,
-        typer.Argument(
-            metavar="ALGO", help="ppo, maskable_ppo, a2c, dqn, sac or selfplay.", autocompletion=complete_algorithm
-        ),
+        typer.Argument(metavar="ALGO", help="ppo, maskable_ppo, a2c, dqn or sac.", autocompletion=complete_algorithm),
     ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the run; a started run is resumed.")],
     env: Annotated[
         str | None,
         typer.Option(
             metavar="ID",
-            help=f"Id of the environment; default {DEFAULT_ENV}, for sac {CONTINUOUS_ENV}; selfplay has its own.",
+            help=f"Id of the environment; default {DEFAULT_ENV}, for sac {CONTINUOUS_ENV}.",
             autocompletion=complete_env,
         ),
     ] = None,
@@ -85,21 +77,18 @@ def train_rl(
     warm_start: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", help="Corpus for behaviour cloning before training (PPO and A2C on Navigation-v0; selfplay)."
+            metavar="DIR", help="Corpus for behaviour cloning before training (PPO and A2C on Navigation-v0)."
         ),
     ] = None,
-    device: Annotated[
-        str | None, typer.Option(help="Device of the networks, such as cuda; default cpu. Not for selfplay.")
-    ] = None,
+    device: Annotated[str | None, typer.Option(help="Device of the networks, such as cuda; default cpu.")] = None,
     ray: Ray = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a driver (or another role) with stable-baselines3 from tuned defaults.
 
     The folder receives the model (weights in safetensors, the rest in JSON), the best model so far, a line of JSON per
-    evaluation, and the learning curve. Ctrl-C saves the run; the same command resumes it. selfplay trains all three
-    roles at once, each in its own folder that rollout can play; --set shared=true gives them one network, and
-    --set co_wizard=POLICY --set participant=POLICY trains an Ad-Wizard against these.
+    evaluation, and the learning curve. Ctrl-C saves the run; the same command resumes it. With --env
+    dorothie_gym/AdWizard-v0, --set partners={co_wizard: POLICY, participant: POLICY} names those it is trained against.
     """
     given = _read_settings(setting or []) | ({} if observation is None else {"observation": observation})
     changes: Given = {
@@ -108,15 +97,8 @@ def train_rl(
         "warm_start": None if warm_start is None else str(warm_start),
     }  # fmt: skip
     with _reporting_errors():
-        if algorithm == "selfplay":
-            if env is not None:
-                fail("--env: selfplay uses DuoWizardEnv; omit the option, and choose a town with --set town=NAME")
-            if device is not None:
-                fail("--device: the networks of selfplay are trained on the processor; omit the option")
-            _train_selfplay(out, given, changes, ray=ray, as_json=as_json)
-        else:
-            env = env or (CONTINUOUS_ENV if algorithm == "sac" else DEFAULT_ENV)
-            _train(algorithm, env, out, given, changes, ray=ray, device=device, as_json=as_json)
+        env = env or (CONTINUOUS_ENV if algorithm == "sac" else DEFAULT_ENV)
+        _train(algorithm, env, out, given, changes, ray=ray, device=device, as_json=as_json)
 
 
 def _read_settings(given: list[str]) -> dict[str, object]:
@@ -154,9 +136,6 @@ def _reporting_errors() -> Iterator[None]:
             fail(str(error), FAILED)
 
 
-# --- Reinforcement learning -------------------------------------------------------------------------------------------
-
-
 def _train(
     algorithm: str,
     env: str,
@@ -189,10 +168,10 @@ def _train(
         settings = _with_default_workers(settings)
     if ray is None and settings.env.startswith("dorothie_gym/"):
         compile_first(batches=has_batch(settings.env) and settings.workers == 0, pictures=settings.sees)
-    with _progress(settings.steps, out, _line, quiet=as_json) as (on_progress, on_stage):
+    with _progress(settings.steps, out, quiet=as_json) as (on_progress, on_stage):
         result = Training(settings, out, on_progress, ray, on_stage, device or "cpu").run()
     if as_json:
-        best = best_of(result.rows)
+        best = best_of(result.rows, settings)
         print_json({**_facts(result, settings), "best": None if best is None else best.as_json()})
     else:
         _show(result, settings)
@@ -211,14 +190,14 @@ def _line(row: TrainingEvaluation) -> str:
     )
 
 
-def _show(result: TrainingResult[TrainingEvaluation], settings: TrainingSettings) -> None:
+def _show(result: TrainingResult, settings: TrainingSettings) -> None:
     from dorothie_gym.baselines.rl.run import BEST, CURVE
     from dorothie_gym.baselines.rl.training import best_of
     from dorothie_gym.policies.policy_loader import DESCRIPTION
 
     console = stdout()
     console.print(_rate_line(f"{settings.algorithm} on {settings.env}", result), markup=False, soft_wrap=True)
-    best = best_of(result.rows)
+    best = best_of(result.rows, settings)
     if best is not None:
         console.print(f"Best: {_line(best).strip()}", markup=False, soft_wrap=True)
         console.print(f"Curve: {result.folder / CURVE}", markup=False, soft_wrap=True)
@@ -226,78 +205,19 @@ def _show(result: TrainingResult[TrainingEvaluation], settings: TrainingSettings
     console.print(f"Model: {result.folder / DESCRIPTION}", markup=False, soft_wrap=True)
 
 
-# --- Self-play --------------------------------------------------------------------------------------------------------
-
-
-def _train_selfplay(out: Path, given: Given, changes: Given, *, ray: str | None, as_json: bool) -> None:
-    """Trains all three roles by self-play and prints the result.
-
-    Args:
-        out: folder of the run.
-        given: settings of --set.
-        changes: other settings.
-        ray: address of a Ray cluster that steps the sessions, or None.
-        as_json: whether to print one JSON object and nothing else.
-    """
-    from dorothie_gym.baselines.rl.settings import selfplay_settings
-    from dorothie_gym.baselines.selfplay.training import SelfPlayTraining
-
-    settings: SelfPlaySettings = selfplay_settings(given, **changes)
-    if changes["workers"] is None and ray is None:
-        settings = _with_default_workers(settings)
-    if ray is None:
-        compile_first()
-    with _progress(settings.steps, out, _selfplay_line, quiet=as_json) as (on_progress, on_stage):
-        result = SelfPlayTraining(settings, out, on_progress, ray, on_stage).run()
-    if as_json:
-        print_json(_facts(result, settings))
-    else:
-        _show_selfplay(result, settings)
-    if not result.finished:
-        command = _command(["selfplay", "--out", str(out)], given, settings, ray)
-        _exit_interrupted(result.steps, settings, out, command)
-
-
-def _selfplay_line(row: SelfPlayEvaluation) -> str:
-    returns = ", ".join(f"{role} {'-' if value is None else f'{value:.2f}'}" for role, value in row.returns.items())
-    return (
-        f"{row.steps:>10,} steps, {row.seconds:6.0f} s: success against the scripted Ad-Wizard "
-        f"{100 * row.scripted.success:5.1f} %, the learned one {100 * row.learned.success:5.1f} %; rewards {returns}"
-    )
-
-
-def _show_selfplay(result: TrainingResult[SelfPlayEvaluation], settings: SelfPlaySettings) -> None:
-    from dorothie_gym.baselines.rl.run import CURVE
-
-    console = stdout()
-    console.print(_rate_line("selfplay", result), markup=False, soft_wrap=True)
-    if result.rows:
-        console.print(f"Curve: {result.folder / CURVE}", markup=False, soft_wrap=True)
-    if result.steps:
-        players = {role: settings.partners.get(role, str(result.folder / role)) for role in AGENT_ROLES}
-        roles = " ".join(f"--{role.replace('_', '-')} {shlex.quote(name)}" for role, name in players.items())
-        console.print(f"Play: dorothie-gym rollout {roles}", markup=False, soft_wrap=True)
-
-
-# --- Both -------------------------------------------------------------------------------------------------------------
-
-
-def _with_default_workers(settings: Settings) -> Settings:
+def _with_default_workers(settings: TrainingSettings) -> TrainingSettings:
     """Returns settings with one worker process per processor; with none on a single processor."""
     processors = available_processors()
     return replace(settings, workers=min(processors, settings.environments) if processors > 1 else 0)
 
 
 @contextmanager
-def _progress(
-    total: int, out: Path, line: Callable[[Evaluation], str], *, quiet: bool
-) -> Iterator[tuple[OnProgress[Evaluation], OnStage]]:
+def _progress(total: int, out: Path, *, quiet: bool) -> Iterator[tuple[OnProgress, OnStage]]:
     """Shows a progress bar on a terminal and a line per evaluation; handles Ctrl-C before the first step.
 
     Args:
         total: number of training steps.
         out: folder of the run.
-        line: formats an evaluation.
         quiet: whether bar and lines are hidden.
 
     Yields:
@@ -310,10 +230,10 @@ def _progress(
     with Progress(*columns, console=console, disable=quiet or not console.is_terminal, transient=True) as progress:
         bar = progress.add_task("Steps", total=total)
 
-        def on_progress(done: int, steps: int, row: Evaluation | None) -> None:
+        def on_progress(done: int, steps: int, row: TrainingEvaluation | None) -> None:
             progress.update(bar, description="Steps", completed=done, total=steps)
             if row is not None and not quiet:
-                progress.console.print(line(row), markup=False, soft_wrap=True)
+                progress.console.print(_line(row), markup=False, soft_wrap=True)
 
         def on_stage(stage: str, done: int, stage_total: int) -> None:
             progress.update(bar, description=stage, completed=done, total=stage_total)
@@ -325,7 +245,7 @@ def _progress(
             exit_interrupted("Interrupted before the first step; the same command starts again.")
 
 
-def _facts(result: TrainingResult[Evaluation], settings: RunSettings) -> dict[str, object]:
+def _facts(result: TrainingResult, settings: TrainingSettings) -> dict[str, object]:
     """Returns the result of a run and its settings in JSON types."""
     return {
         "out": str(result.folder),
@@ -338,13 +258,13 @@ def _facts(result: TrainingResult[Evaluation], settings: RunSettings) -> dict[st
     }
 
 
-def _rate_line(name: str, result: TrainingResult[Evaluation]) -> str:
+def _rate_line(name: str, result: TrainingResult) -> str:
     """Returns a line with the number of steps of a run and their rate."""
     rate = result.steps / result.seconds if result.seconds else 0.0
     return f"{name}: {result.steps:,} steps in {result.seconds:.0f} s ({rate:.0f} per second, without evaluations)"
 
 
-def _command(arguments: list[str], given: Given, settings: RunSettings, ray: str | None) -> str:
+def _command(arguments: list[str], given: Given, settings: TrainingSettings, ray: str | None) -> str:
     """Returns the command that resumes a run."""
     words = ["dorothie-gym", "train-rl", *arguments]
     words += [word for name, value in given.items() for word in ("--set", f"{name}={value}")]
@@ -354,7 +274,7 @@ def _command(arguments: list[str], given: Given, settings: RunSettings, ray: str
     return shlex.join(words)
 
 
-def _exit_interrupted(steps: int, settings: RunSettings, out: Path, command: str) -> NoReturn:
+def _exit_interrupted(steps: int, settings: TrainingSettings, out: Path, command: str) -> NoReturn:
     """Prints after Ctrl-C the folder of the run and the command that resumes it, and exits."""
     exit_interrupted(
         f"Interrupted after {steps:,} of {settings.steps:,} steps; the run is saved in {out}. Resume with: {command}"

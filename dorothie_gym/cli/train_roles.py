@@ -1,10 +1,10 @@
-"""`dorothie-gym train` for the learned roles: co-wizard, co-wizard-rl and participant."""
+"""`dorothie-gym train` for the learned roles: co-wizard and participant."""
 
 from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
 OnStage = Callable[[str, int, int], None]
 
-CO_WIZARD_RL: Final = "co-wizard-rl"
-"""Name of the Co-Wizard that is trained further by reinforcement."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
@@ -29,7 +26,6 @@ class Request:
         out: folder of the trainings.
         seed: seed.
         workers: number of processes.
-        ad_wizard: Ad-Wizard of half the sessions of reinforcement, by name or path.
         on_stage: callback for the progress.
     """
 
@@ -37,7 +33,6 @@ class Request:
     out: Path
     seed: int
     workers: int
-    ad_wizard: str
     on_stage: OnStage
 
     def folder(self, model: str) -> Path:
@@ -72,30 +67,6 @@ def _train_co_wizard(request: Request) -> RoleReport:
     return _fits("co-wizard", stages)
 
 
-def _reinforce_co_wizard(request: Request) -> RoleReport:
-    from dorothie_gym.baselines.co_wizard.reinforcement import (
-        ReinforcementSettings,
-        check_ad_wizard,
-        reinforce_co_wizard,
-    )
-
-    check_ad_wizard(request.ad_wizard)  # before the imitation, which takes longer
-    imitation = _train_co_wizard(request)
-    settings = ReinforcementSettings(
-        start=request.folder("co-wizard"), seed=request.seed, ad_wizard=request.ad_wizard
-    )  # fmt: skip
-    found = reinforce_co_wizard(
-        settings, request.folder(CO_WIZARD_RL), workers=request.workers, on_stage=request.on_stage
-    )
-    lines = tuple(
-        f"iteration {number}: {each.sessions} sessions, mean reward {each.reward:.2f}, divergence "
-        f"{each.distance:.3f} from the imitation"
-        for number, each in enumerate(found, start=1)
-    )
-    figures = {**imitation.figures, "iterations": [asdict(each) for each in found]}
-    return RoleReport(role="co-wizard", lines=(*imitation.lines, *lines), figures=figures)
-
-
 def _train_participant(request: Request) -> RoleReport:
     from dorothie_gym.baselines.imitation.rounds import LESSONS, RoundSettings
     from dorothie_gym.baselines.participant.training import train_participant
@@ -117,13 +88,13 @@ def _fits(role: str, stages: Sequence[Stage]) -> RoleReport:
 
 
 ROLES: Final[Mapping[str, Callable[[Request], RoleReport]]] = MappingProxyType(
-    {"co-wizard": _train_co_wizard, CO_WIZARD_RL: _reinforce_co_wizard, "participant": _train_participant}
+    {"co-wizard": _train_co_wizard, "participant": _train_participant}
 )
 """Training of each learned role by the name of the model."""
 
 
 def train_role(
-    model: str, corpus: Path, out: Path, *, seeds: int, workers: int | None, ad_wizard: str, as_json: bool
+    model: str, corpus: Path, out: Path, *, seeds: int, workers: int | None, as_json: bool
 ) -> None:  # fmt: skip
     """Trains players of a role with several seeds, each in a folder of its own, and prints how to play them."""
     from dorothie_gym.processors import available_processors
@@ -134,7 +105,7 @@ def train_role(
             for seed in range(seeds):
                 request = Request(
                     corpus=corpus, out=out, seed=seed, workers=workers or available_processors(),
-                    ad_wizard=ad_wizard, on_stage=on_stage,
+                    on_stage=on_stage,
                 )  # fmt: skip
                 found.append((request.folder(model), ROLES[model](request)))
     except KeyboardInterrupt:

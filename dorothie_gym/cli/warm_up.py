@@ -32,11 +32,10 @@ def warm_up(
         stdout().print(f"Nothing to compile; all is in {folder}", soft_wrap=True, markup=False)
 
 
-def compile_first(*, everything: bool = False, batches: bool = False, pictures: bool = False) -> None:
+def compile_first(*, batches: bool = False, pictures: bool = False) -> None:
     """Compiles what is not in the cache, with a progress bar on a terminal.
 
     Args:
-        everything: whether vectorised environments of `Town-v0` are needed, too, or sessions only.
         batches: whether batches of the navigation environments are needed.
         pictures: whether the first-person camera is needed.
     """
@@ -45,8 +44,8 @@ def compile_first(*, everything: bool = False, batches: bool = False, pictures: 
 
     batches = batches and not navigation.is_warm()
     pictures = pictures and not _is_camera_warm()
-    if batches or pictures or not sessions.is_warm(everything=everything):
-        compile_with_progress(everything=everything, batches=batches, pictures=pictures)
+    if batches or pictures or not sessions.is_warm():
+        compile_with_progress(batches=batches, pictures=pictures)
 
 
 def _is_camera_warm() -> bool:
@@ -55,8 +54,17 @@ def _is_camera_warm() -> bool:
     return pictures.is_warm()
 
 
-def compile_with_progress(*, everything: bool, batches: bool, pictures: bool) -> int:
-    """Compiles with a progress bar on a terminal; returns the number of functions. Arguments as `compile_first`."""
+def compile_with_progress(*, everything: bool = False, batches: bool, pictures: bool) -> int:
+    """Compiles with a progress bar on a terminal.
+
+    Args:
+        everything: whether to compile what `Town-v0` needs, too.
+        batches: see `compile_first`.
+        pictures: see `compile_first`.
+
+    Returns:
+        The number of functions.
+    """
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     from dorothie_gym.engine import warm_up as sessions

@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final, TypeAlias
 
@@ -25,9 +25,7 @@ from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.processors import available_processors
-from dorothie_gym.sim.batch.egos import play_share
 from dorothie_gym.sim.batch.threads import turns_of
-from dorothie_gym.sim.batch.town_vector_env import TownVectorEnv
 from dorothie_gym.sim.batch.worlds import alone, step_share
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.briefing import note_props
@@ -50,15 +48,14 @@ Progress: TypeAlias = Callable[[str, int, int], None]
 _HELPER: Final = """
 import os, sys, threading
 threading.Thread(target=lambda: os._exit(len(os.read(0, 1))), daemon=True).start()  # the parent's end closes stdin
-from dorothie_gym.engine.warm_up import compile_loops
-compile_loops(lambda name, *_: print(name, flush=True), everything=sys.argv[1:] == ["everything"])
+from dorothie_gym.engine.warm_up import compile_loop
+compile_loop(lambda name, *_: print(name, flush=True))
 """
 
 
-def is_warm(*, everything: bool = False) -> bool:
-    """Returns whether the loop over substeps needs no compilation; with `everything` that of batches neither."""
-    loops = (step_share, play_share) if everything else (step_share,)
-    return all(not isinstance(loop, CompiledFunction) or loop.is_cached() for loop in loops)
+def is_warm() -> bool:
+    """Returns whether the loop over substeps needs no compilation."""
+    return not isinstance(step_share, CompiledFunction) or step_share.is_cached()
 
 
 def warm_up(progress: Progress | None = None, *, everything: bool = False) -> None:
@@ -66,9 +63,9 @@ def warm_up(progress: Progress | None = None, *, everything: bool = False) -> No
 
     Args:
         progress: called when the compilation of a function begins, perhaps in another thread.
-        everything: whether to compile what `Town-v0` and its vectorised form need, too.
+        everything: whether to compile what `Town-v0` needs, too.
     """
-    with reporting(progress) as report, _helper(report, everything) as wait:
+    with reporting(progress) as report, _helper(report) as wait:
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
         engine.reset(seed=0)
         engine.session.observe()
@@ -78,19 +75,15 @@ def warm_up(progress: Progress | None = None, *, everything: bool = False) -> No
             _play(TownEnv())
         wait()
         engine.step({str(role): noop(role, engine.limits) for role in AGENT_ROLES})
-        if everything:
-            _play(TownVectorEnv(num_envs=2))
 
 
-def compile_loops(progress: Progress | None = None, *, everything: bool) -> None:
-    """Compiles the loop over substeps, and with `everything` the one of vectorised environments."""
+def compile_loop(progress: Progress | None = None) -> None:
+    """Compiles the loop over substeps."""
     with reporting(progress):
         town, world = _examples()
         if isinstance(step_share, CompiledFunction):
             zeros, answers = np.zeros(1), np.zeros(1, dtype=np.int64)
             step_share.compile_for(turns_of(1, 1), 0, town, alone(world), 1, 1.0 / FRAME_RATE, zeros, zeros, answers)
-        if everything:
-            _play(TownVectorEnv(num_envs=2))
 
 
 def _examples() -> tuple[TownArrays, WorldArrays]:
@@ -116,7 +109,7 @@ def _call_what_follows_a_step(world: World) -> None:
     note_props(world.actors.arrays, 0)
 
 
-def _play(env: TownEnv | TownVectorEnv) -> None:
+def _play(env: TownEnv) -> None:
     env.reset(seed=0)
     env.step(env.action_space.sample())
     env.close()
@@ -171,16 +164,15 @@ def reporting(progress: Progress | None) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def _helper(report: Callable[[str], None], everything: bool) -> Iterator[Callable[[], None]]:
-    """Compiles the loops in a second process; yields a function that waits for its end."""
-    if is_warm(everything=everything) or available_processors() < 2:
+def _helper(report: Callable[[str], None]) -> Iterator[Callable[[], None]]:
+    """Compiles the loop in a second process; yields a function that waits for its end."""
+    if is_warm() or available_processors() < 2:
         yield lambda: None
         return
-    arguments: Sequence[str] = ["everything"] if everything else []
     path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the package may lie anywhere on it
     with starting_process():
         process = subprocess.Popen(
-            [sys.executable, "-c", _HELPER, *arguments],
+            [sys.executable, "-c", _HELPER],
             env={**os.environ, "PYTHONPATH": path},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

@@ -103,8 +103,7 @@ MODEL_LOADERS: Final[Mapping[str, str]] = MappingProxyType(
         "benchmark": "dorothie_gym.baselines.loaders:load_benchmark_model",
         "co-wizard": "dorothie_gym.baselines.loaders:load_co_wizard",
         "participant": "dorothie_gym.baselines.loaders:load_participant",
-        "dorothie_gym-rl": "dorothie_gym.baselines.loaders:load_navigation_model",
-        "selfplay": "dorothie_gym.baselines.loaders:load_selfplay_model",
+        "dorothie_gym-rl": "dorothie_gym.baselines.loaders:load_rl_model",
     }
 )
 """Loaders of the models that `dorothie-gym train` and `train-rl` write, by kind, as "module:function"."""

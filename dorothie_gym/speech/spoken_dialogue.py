@@ -26,7 +26,7 @@ from dorothie_gym.speech.synthesizer import Voice, say
 
 VOICE_RATE: Final = 3.6
 """Speaking rate of the synthesised voice [words/s], by which the rate of a session is divided; measured on 150 spans of
-sessions, without silence around them (`dorothie-gym bench speech`)."""
+sessions, without silence around them (`python -m benchmarks speech`)."""
 
 PITCHES: Final = {Role.PARTICIPANT: (0.86, 0.97), Role.CO_WIZARD: (0.92, 0.96)}
 """Ranges from which the pitch of a speaker without a voice of its own is drawn; set by hand, see `policies.persona`."""

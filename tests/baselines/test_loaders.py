@@ -10,13 +10,13 @@ pytest.importorskip("sb3_contrib", reason="needs the extra 'baselines'")
 from dorothie_gym.baselines import checkpoints, loaders
 from dorothie_gym.baselines.co_wizard import files as co_wizard_files
 from dorothie_gym.baselines.participant import files as participant_files
-from dorothie_gym.baselines.rl import checkpoint, settings
+from dorothie_gym.baselines.rl import checkpoint
 from dorothie_gym.policies.policy_loader import MODEL_LOADERS
 
 
 def test_each_kind_of_model_has_a_loader() -> None:
     roles = {co_wizard_files.KIND, participant_files.KIND}
-    assert set(MODEL_LOADERS) == {checkpoints.KIND, checkpoint.KIND, settings.SELFPLAY, *roles}
+    assert set(MODEL_LOADERS) == {checkpoints.KIND, checkpoint.KIND, *roles}
     for entry in MODEL_LOADERS.values():
         module, name = entry.split(":")
         assert module == loaders.__name__ and callable(getattr(loaders, name))

@@ -43,8 +43,6 @@ def test_town_is_an_argument_of_the_plain_environment() -> None:
     (first, _), (second, _) = by_argument.reset(seed=3), by_setting.reset(seed=3)
     assert (first == second).all()
     assert by_argument.unwrapped.config["town"] == "midtown"  # type: ignore[attr-defined]  # of highway-env
-    batch = gym.make_vec("dorothie_gym/Town-v0", num_envs=2, town="midtown")
-    assert batch.reset(seed=3)[0].shape[0] == 2
 
 
 @pytest.mark.parametrize("name", ["CoWizard-v0", "Navigation-v0", "Navigation-continuous-v0", "Town-v0"])

@@ -246,18 +246,3 @@ def test_state_of_another_town_or_of_other_settings_is_refused(other: Callable[[
     assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 500
     with pytest.raises(StateError, match="a value that clone_state"):
         env.restore_state(b"bytes" * 1000)  # type: ignore[arg-type]  # what a user may try
-
-
-def test_vectorised_towns_are_copied_and_go_back_to_a_state() -> None:
-    env: Any = gym.make_vec("dorothie_gym/Town-v0", num_envs=3, vectorization_mode="vector_entry_point", threads=2)
-    env.reset(seed=1)
-    env.action_space.seed(1)
-    actions = [env.action_space.sample() for _ in range(90)]
-    for action in actions[:30]:
-        env.step(action)
-    twins, state = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))], env.unwrapped.clone_state()
-    found = [env.step(action) for action in actions[30:]]
-    env.unwrapped.restore_state(state)
-    for later in (*twins, env):
-        assert_equal([later.step(action) for action in actions[30:]], found)
-        later.close()

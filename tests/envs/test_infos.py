@@ -151,7 +151,7 @@ def batch_of(name: str, mode: AutoresetMode, native: bool) -> Any:
     )
 
 
-NATIVE = ("Navigation-v0", "Navigation-continuous-v0", "Town-v0")
+NATIVE = ("Navigation-v0", "Navigation-continuous-v0")
 
 
 @pytest.mark.parametrize("mode", AutoresetMode)

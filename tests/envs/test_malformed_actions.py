@@ -168,13 +168,3 @@ def test_ten_thousand_malformed_actions_are_value_errors(name: str) -> None:
 @pytest.mark.parametrize("role", ["participant", "co_wizard", "ad_wizard"])
 def test_ten_thousand_malformed_actions_of_a_role_are_value_errors(role: str) -> None:
     try_role(role, 10_000)
-
-
-def test_vectorised_towns_refuse_malformed_actions() -> None:
-    rng = random.Random(SEED)
-    for config in ({}, {"action": {"type": "ContinuousAction"}}):
-        env = gym.make_vec("dorothie_gym/Town-v0", 2, vectorization_mode="vector_entry_point", config=config)
-        env.reset(seed=1)
-        for _ in range(200):
-            assert_refused_or_played(env.step, broken(env.action_space.sample(), rng))
-        env.close()

@@ -7,6 +7,7 @@ import json
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
@@ -260,28 +261,14 @@ def _rl_model(folder: Path) -> None:
     save_model(make_model(settings, make_env(NAVIGATION, given)), settings, folder / "rl", 12.0)
 
 
-def _selfplay_model(folder: Path) -> None:
-    from dorothie_gym.baselines.rl.checkpoint import save_model
-    from dorothie_gym.baselines.rl.settings import SELFPLAY, selfplay_settings
-    from dorothie_gym.baselines.selfplay.env import RoleLayout
-    from dorothie_gym.baselines.selfplay.learner import make_network
-    from dorothie_gym.ontology import AGENT_ROLES, Role
-    from dorothie_gym.spaces import SpaceLimits
+def _ad_wizard_model(folder: Path) -> None:
+    from dorothie_gym.baselines.rl.checkpoint import make_model, save_model
+    from dorothie_gym.baselines.rl.environments import make_env
+    from dorothie_gym.baselines.rl.settings import tuned_settings
 
-    settings, layout, k = (
-        selfplay_settings(network=(8,)),
-        RoleLayout.of(SpaceLimits()),
-        AGENT_ROLES.index(Role.CO_WIZARD),
-    )
-    size, actions = layout.sizes[k], layout.actions[k]
-    fields = {
-        "kind": SELFPLAY,
-        "role": "co_wizard",
-        "size": size,
-        "actions": actions,
-        "padded": [size + 8, actions + 2],
-    }
-    save_model(make_network(settings.learner(), size + 8, actions + 2), settings, folder / "selfplay", 9.0, fields)
+    name, given = "dorothie_gym/AdWizard-v0", {"town": "brookside", "partners": {"co_wizard": "silent"}}
+    settings = tuned_settings("maskable_ppo", name, env_settings=given, network=(8,))
+    save_model(make_model(settings, make_env(name, given)), settings, folder / "ad-wizard", 9.0)
 
 
 def _unfinished_run(folder: Path) -> None:
@@ -358,22 +345,18 @@ def _benchmark_model(folder: Path) -> None:
     ).write(path)  # fmt: skip
 
 
-def _read_model(folder: Path) -> None:
+def _read_models(role: str, folder: Path) -> None:
     from dorothie_gym.ontology import Role
     from dorothie_gym.policies import find_player
     from dorothie_gym.spaces import SpaceLimits
 
     for path in sorted(folder.iterdir()):
-        find_player(str(path), Role.CO_WIZARD).make(Role.CO_WIZARD, SpaceLimits())
+        find_player(str(path), Role(role)).make(Role(role), SpaceLimits())
 
 
-def _read_participant(folder: Path) -> None:
-    from dorothie_gym.ontology import Role
-    from dorothie_gym.policies import find_player
-    from dorothie_gym.spaces import SpaceLimits
-
-    for path in sorted(folder.iterdir()):
-        find_player(str(path), Role.PARTICIPANT).make(Role.PARTICIPANT, SpaceLimits())
+_read_co_wizards, _read_participants, _read_ad_wizards = (
+    partial(_read_models, role) for role in ("co_wizard", "participant", "ad_wizard")
+)
 
 
 # --- Caches, with correct checksums ----------------------------------------------------------------------------------
@@ -478,12 +461,12 @@ SUBJECTS: Final = MappingProxyType(
         "rollout": Subject(_rollout, _read_rollout),
         "cassette": Subject(make_cassette, read_cassette),
         "cache": Subject(_cache, _read_cache),
-        "rl": Subject(_rl_model, _read_model, slow=True),
-        "selfplay": Subject(_selfplay_model, _read_model, slow=True),
-        "co-wizard": Subject(_co_wizard_model, _read_model, slow=True),
-        "participant": Subject(_participant_model, _read_participant, slow=True),
+        "rl": Subject(_rl_model, _read_co_wizards, slow=True),
+        "ad-wizard": Subject(_ad_wizard_model, _read_ad_wizards, slow=True),
+        "co-wizard": Subject(_co_wizard_model, _read_co_wizards, slow=True),
+        "participant": Subject(_participant_model, _read_participants, slow=True),
         "run": Subject(_unfinished_run, _resume_run, slow=True),
-        "benchmark": Subject(_benchmark_model, _read_model),
+        "benchmark": Subject(_benchmark_model, _read_co_wizards),
     }
 )
 """Kinds by name; folders and files that begin with a dot are not mutated."""

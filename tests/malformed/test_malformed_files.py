@@ -38,7 +38,7 @@ GROUPS = (
         "audio",
     ),
     ("yaml",),
-    ("rl", "selfplay", "run", "benchmark", "co-wizard", "participant"),
+    ("rl", "ad-wizard", "run", "benchmark", "co-wizard", "participant"),
 )
 """Kinds that share a process, by the time that they take."""
 

@@ -49,7 +49,7 @@ def test_file_is_read_by_loader_of_its_kind(tmp_path: Path, as_folder: bool) -> 
     (tmp_path / "model.json").write_text(json.dumps({"kind": "quiet"}))
     player = find_player(str(tmp_path if as_folder else tmp_path / "model.json"), Role.CO_WIZARD)
     assert isinstance(player.make(Role.CO_WIZARD, LIMITS), SilentPolicy)
-    assert loadable_kinds() == ("benchmark", "co-wizard", "dorothie_gym-rl", "participant", "quiet", "selfplay")
+    assert loadable_kinds() == ("benchmark", "co-wizard", "dorothie_gym-rl", "participant", "quiet")
 
 
 def test_file_without_kind_is_read_by_suffix(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ LIMIT = 10_000_000
 """Largest size of all shipped models [bytes]."""
 
 CO_WIZARDS = (
-    "pretrained:co-wizard", "pretrained:co-wizard-rl", "pretrained:maskable-ppo", "pretrained:ppo", "pretrained:reader",
+    "pretrained:co-wizard", "pretrained:maskable-ppo", "pretrained:ppo", "pretrained:reader",
     "pretrained:toto",
 )  # fmt: skip
 NAMES = tuple(sorted((*CO_WIZARDS, "pretrained:participant")))
@@ -54,7 +54,7 @@ def play(name: str, folder: Path, sessions: int, seconds: float) -> RolloutResul
     return roll_out(settings, folder)
 
 
-def test_seven_models_are_shipped_in_less_than_ten_megabytes() -> None:
+def test_six_models_are_shipped_in_less_than_ten_megabytes() -> None:
     assert pretrained_names() == NAMES
     files = [path for path in pretrained.SHIPPED.rglob("*") if path.is_file()]
     assert sum(path.stat().st_size for path in files) < LIMIT

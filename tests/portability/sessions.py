@@ -192,7 +192,10 @@ def navigation_episodes(name: str) -> Values:
         num_envs=64,
         vectorization_mode="vector_entry_point",
         town=town_names(),
-        max_seconds=30.0,
+        max_seconds=45.0,
+        traffic="heavy",
+        exceptions=2.0,
+        patience=20.0,
     )
     rng = np.random.default_rng(SEED)
     observations, infos = batch.reset(seed=SEED)
@@ -214,7 +217,7 @@ def _actions(rng: np.random.Generator, infos: Mapping[str, Any]) -> Any:
     return np.stack([rng.uniform(0.2, 0.8, 64), rng.uniform(-0.1, 0.1, 64), np.zeros(64)], axis=1, dtype=np.float32)
 
 
-@group(*NAVIGATION, "Town-v0")
+@group(*NAVIGATION)
 def batches(name: str) -> Values:
     batch = gym.make_vec(f"dorothie_gym/{name}", num_envs=4, vectorization_mode="vector_entry_point", town="midtown")
     batch.action_space.seed(SEED)

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from matplotlib.figure import Figure
 
+from benchmarks.report import draw, world_report
 from dorothie_gym.analysis import corpus_stats_of
 from dorothie_gym.analysis.profiles import draw_profiles
-from dorothie_gym.bench.report import draw, world_report
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import make_policy

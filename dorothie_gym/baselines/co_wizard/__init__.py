@@ -4,5 +4,5 @@ Rules read the words, plan the route, answer questions from evidence, and word t
 
 `memory` is what it remembers, `hearing` what it hears, `features` what it sees, `remarks` what it can say, `network`
 the network, `teacher` the scripted Co-Wizard whose decisions it imitates, `demonstrations`, `fitting` and `training`
-the training, and `policy` the player; `experience`, `policy_gradient` and `reinforcement` train it further.
+the training, and `policy` the player.
 """

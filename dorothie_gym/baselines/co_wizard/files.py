@@ -29,11 +29,9 @@ class ModelPage(RoleModelPage):
     layout: Layout
 
 
-def save_network(
-    network: CoWizardNetwork, page: ModelPage, folder: Path, dtype: torch.dtype = torch.float16
-) -> None:  # fmt: skip
-    """Writes a model into a folder; an older one stays whole until it is replaced. See `save_model`."""
-    save_model(network, page, folder, dtype)
+def save_network(network: CoWizardNetwork, page: ModelPage, folder: Path) -> None:
+    """Writes a model into a folder, in half precision; an older one stays whole until it is replaced."""
+    save_model(network, page, folder, torch.float16)
 
 
 def load_network(folder: Path) -> tuple[CoWizardNetwork, ModelPage]:

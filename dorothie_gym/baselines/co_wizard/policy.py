@@ -24,7 +24,6 @@ from dorothie_gym.baselines.co_wizard.decision import (
 from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory, Update
 from dorothie_gym.baselines.co_wizard.network import SIZES, CoWizardNetwork
 from dorothie_gym.baselines.co_wizard.remarks import Sources, filled, sources, sources_of, topic_of
-from dorothie_gym.baselines.imitation.batches import UNKNOWN
 from dorothie_gym.baselines.imitation.drawing import drawn
 from dorothie_gym.dialogue.realization_context import WordingContext
 from dorothie_gym.dialogue.speaker_style import draw_style
@@ -71,31 +70,12 @@ class LearnedState:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choice:
-    """What is chosen in the second step of a decision, among what.
-
-    Attributes:
-        inputs: inputs of the step.
-        command: index of the command.
-        first: number of the first remark's form; 0 for silence, `UNKNOWN` if none could be chosen.
-        possible: whether each form could be drawn (r,), if one was: its names and numbers are known, and it was not
-            found unsayable.
-    """
-
-    inputs: Inputs
-    command: int
-    first: int
-    possible: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, kw_only=True)
 class Turn:
     """Decision of the player.
 
     Attributes:
         scene: what was perceived.
         memory: memory after listening.
-        choice: what was chosen in the second step.
         action: the action.
         remarks: what was decided to say.
         queued: whether own remarks waited before.
@@ -105,7 +85,6 @@ class Turn:
 
     scene: Scene
     memory: Memory
-    choice: Choice
     action: CoWizardAction
     remarks: tuple[Remark, ...]
     queued: bool
@@ -123,8 +102,7 @@ class LearnedCoWizard(Policy[LearnedState]):
     reads_mask = True
 
     def __init__(
-        self, network: CoWizardNetwork, vocabulary: Sequence[str], limits: SpaceLimits | None = None, *,
-        command_temperature: float = 0.0,
+        self, network: CoWizardNetwork, vocabulary: Sequence[str], limits: SpaceLimits | None = None
     ) -> None:  # fmt: skip
         """Prepares the policy.
 
@@ -132,11 +110,9 @@ class LearnedCoWizard(Policy[LearnedState]):
             network: trained network.
             vocabulary: forms of remarks; the first one stands for silence.
             limits: sizes of the spaces.
-            command_temperature: temperature at which commands are drawn; 0 for the likeliest ones.
         """
         super().__init__(Role.CO_WIZARD, limits)
         self._network, self._vocabulary = network.eval(), tuple(vocabulary)
-        self._command_temperature = command_temperature
         self._needs = [frozenset() if not form else sources_of(form) for form in self._vocabulary]
 
     def initial_state(self, seed: int, town: Town) -> LearnedState:
@@ -170,8 +146,8 @@ class LearnedCoWizard(Policy[LearnedState]):
         with torch.inference_mode():
             memory = remember(scene, self._listen(scene, listening_inputs(scene, queued=queued)))
             inputs, commands = acting_inputs(scene, memory, queued=queued)
-            choice, remarks = self._act(scene, memory, inputs, rng, silent=silent)
-        physical = commands[choice.command]
+            command, remarks = self._act(scene, memory, inputs, rng, silent=silent)
+        physical = commands[command]
         voice = voice.plan(*remarks)
         speech, voice = voice.speak(
             view.time, view.speaking, rng, _scene(view, memory), interval=memory.clock.interval,
@@ -180,7 +156,7 @@ class LearnedCoWizard(Policy[LearnedState]):
         mental, attention = finished(scene, memory, physical, remarks)
         action = CoWizardAction(speech=speech, physical=physical, mental=mental)
         return Turn(
-            scene=scene, memory=memory, choice=choice, action=action, remarks=remarks, queued=queued, silent=silent,
+            scene=scene, memory=memory, action=action, remarks=remarks, queued=queued, silent=silent,
             state=replace(state, attention=attention, voice=voice, count=state.count + 1),
         )  # fmt: skip
 
@@ -203,35 +179,27 @@ class LearnedCoWizard(Policy[LearnedState]):
 
     def _act(
         self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
-    ) -> tuple[Choice, tuple[Remark, ...]]:  # fmt: skip
-        """Returns what is chosen, and the remarks that are drawn."""
+    ) -> tuple[int, tuple[Remark, ...]]:  # fmt: skip
+        """Returns the index of the likeliest command, and the remarks that are drawn."""
         scores, first, hidden = self._network.act(*_tensors(inputs))
-        command = self._command(scores[0], rng)
-        none = np.zeros(len(self._vocabulary), dtype=np.bool_)
+        command = int(scores[0].argmax())
         if silent:
-            return Choice(inputs=inputs, command=command, first=UNKNOWN, possible=none), ()
+            return command, ()
         shares = torch.softmax(first[0].double() / TEMPERATURE, dim=0).numpy()
         if rng.random() < shares[0]:
-            return Choice(inputs=inputs, command=command, first=0, possible=none), ()
+            return command, ()
         available = sources(memory, scene.view, scene.utterances)
         possible = np.array([bool(needs <= available.keys()) for needs in self._needs])
         possible[0] = False
         shares *= possible
         chosen, remark = self._draw(shares, scene, memory, available, rng)
         if remark is None:
-            return Choice(inputs=inputs, command=command, first=UNKNOWN, possible=none), ()
-        choice = Choice(inputs=inputs, command=command, first=chosen, possible=shares > 0.0)
+            return command, ()
         possible[0] = True
         then = self._network.then(hidden, torch.tensor([chosen]))[0]
         shares = torch.softmax(then.double() / TEMPERATURE, dim=0).numpy() * possible
         _, more = self._draw(shares, scene, memory, available, rng, joined=True)
-        return choice, (remark,) if more is None else (remark, more)
-
-    def _command(self, scores: torch.Tensor, rng: np.random.Generator) -> int:
-        """Returns the index of the likeliest command, or of one that is drawn."""
-        if not self._command_temperature:
-            return int(scores.argmax())
-        return drawn(torch.softmax(scores.double() / self._command_temperature, dim=0).numpy(), rng)
+        return command, (remark,) if more is None else (remark, more)
 
     def _draw(
         self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,

@@ -194,13 +194,9 @@ class CriticWarmUp(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        freeze_actor(self.model.policy, self.num_timesteps)
-
-
-def freeze_actor(policy: Network, steps: int) -> None:
-    """Freezes the actor of a cloned policy until `CRITIC_STEPS` steps are done."""
-    for part in (policy.mlp_extractor.policy_net, policy.action_net):
-        part.requires_grad_(steps > CRITIC_STEPS)
+        policy: Network = self.model.policy
+        for part in (policy.mlp_extractor.policy_net, policy.action_net):
+            part.requires_grad_(self.num_timesteps > CRITIC_STEPS)
 
 
 def _distribution(policy: Network, decisions: Demonstrations, rows: torch.Tensor) -> Any:

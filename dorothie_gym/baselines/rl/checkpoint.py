@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, TypeAlias, TypeVar
+from typing import Any, Final, TypeAlias
 
 import torch
 from stable_baselines3.common.vec_env import VecEnv
@@ -25,7 +25,6 @@ from dorothie_gym.baselines.rl.settings import (
     FINAL_RATE,
     ON_POLICY,
     Page,
-    RunSettings,
     TrainingSettings,
 )
 from dorothie_gym.baselines.rl.vector_env import AnyEnv
@@ -47,8 +46,6 @@ Model: TypeAlias = Any
 
 Network: TypeAlias = Any
 """Policy network of a `Model`, for the same reasons without a type."""
-
-Settings = TypeVar("Settings", bound=RunSettings)
 
 TENSORS: Final = "model.safetensors"
 """File of a model beside `model.json`."""
@@ -119,9 +116,7 @@ class LinearSchedule:
         return self._last + (self._first - self._last) * remaining
 
 
-def save_model(
-    model: Model, settings: RunSettings, folder: Path, seconds: float, fields: Mapping[str, object] | None = None
-) -> None:
+def save_model(model: Model, settings: TrainingSettings, folder: Path, seconds: float) -> None:
     """Writes a model with the state of its optimisers into a folder; an older one stays whole until it is replaced.
 
     Replay buffers are not saved.
@@ -131,13 +126,11 @@ def save_model(
         settings: settings of the training.
         folder: folder of the two files.
         seconds: duration of the training [s].
-        fields: further fields of `model.json`; `kind` replaces `KIND`.
     """
     parameters, tensors = parameters_of(model)
     page: Page = {
         "format": MODEL_FORMAT,
         "kind": KIND,
-        **(fields or {}),
         "settings": settings.as_json(),
         "seconds": round(seconds, 2),
         **parameters,
@@ -207,22 +200,21 @@ def _reading(path: Path) -> Iterator[None]:
             raise ModelFileError(f"{path}: cannot be read ({error.strerror})") from None
 
 
-def check_parameters(path: Path, model: Model, tensors: Mapping[str, torch.Tensor], prefix: str = "") -> None:
+def check_parameters(path: Path, model: Model, tensors: Mapping[str, torch.Tensor]) -> None:
     """Checks that tensors of a file are those that `parameters_of` returns for a model.
 
     Args:
         path: the file.
         model: model of the same settings.
         tensors: tensors by name.
-        prefix: what stands before the names in the file.
 
     Raises:
         InputFileError: a tensor is missing, unknown, or has another shape or type; the message names it.
     """
     groups = {**model.get_parameters(), "variables": dict(_variables(model))}
-    refuse_unknown(path, (prefix + name for name in tensors if name.split("/", 1)[0] not in groups))
+    refuse_unknown(path, (name for name in tensors if name.split("/", 1)[0] not in groups))
     for group, state in groups.items():
-        own, place = tensors_under(f"{group}/", tensors), f"{prefix}{group}/"
+        own, place = _tensors_under(f"{group}/", tensors), f"{group}/"
         if "param_groups" in state:
             optimiser = functools.reduce(getattr, group.split("."), model)
             rows = [parameter for each in optimiser.param_groups for parameter in each["params"]]
@@ -248,7 +240,7 @@ def set_parameters(model: Model, page: Page, tensors: Mapping[str, torch.Tensor]
     parameters = {
         name: _optimiser(name, page["optimisers"], tensors)
         if name in page["optimisers"]
-        else tensors_under(f"{name}/", tensors)
+        else _tensors_under(f"{name}/", tensors)
         for name in model.get_parameters()
     }
     model.set_parameters(parameters, exact_match=True, device="cpu")
@@ -269,19 +261,18 @@ def load_model(folder: str | Path) -> tuple[Model, TrainingSettings]:
     """
     folder = Path(folder)
     folder = folder.parent if folder.is_file() else folder
-    settings = read_settings(read_description(folder), TrainingSettings, folder)
+    settings = _read_settings(read_description(folder), folder)
     env = make_env_of_model(settings.env, settings.env_settings, folder)
-    model = make_model(for_playing(settings), env)
+    model = make_model(_for_playing(settings), env)
     restore(model, folder)
     return model, settings
 
 
-def read_settings(page: Page, kind: type[Settings], folder: Path) -> Settings:
+def _read_settings(page: Page, folder: Path) -> TrainingSettings:
     """Returns the settings in `model.json`.
 
     Args:
         page: content of the file.
-        kind: class of the settings.
         folder: folder of the model.
 
     Raises:
@@ -289,7 +280,7 @@ def read_settings(page: Page, kind: type[Settings], folder: Path) -> Settings:
             larger than the weights in the folder; or these are missing or damaged.
     """
     with raising(ModelFileError):
-        settings = checked(page.get("settings"), kind, folder / DESCRIPTION)
+        settings = checked(page.get("settings"), TrainingSettings, folder / DESCRIPTION)
     weights = folder / TENSORS
     with _reading(weights):
         stored = sum(math.prod(each.shape) for each in read_header(weights).tensors.values())
@@ -302,20 +293,12 @@ def read_settings(page: Page, kind: type[Settings], folder: Path) -> Settings:
     return settings
 
 
-def for_playing(settings: TrainingSettings) -> TrainingSettings:
+def _for_playing(settings: TrainingSettings) -> TrainingSettings:
     """Returns settings with the smallest buffers, for a model that does not learn."""
     parameters = dict(settings.parameters)
     smallest = {"n_steps": 2, "batch_size": 2} if settings.algorithm in ON_POLICY else {"buffer_size": 1}
     known = {name: value for name, value in smallest.items() if name in parameters or name == "buffer_size"}
     return replace(settings, parameters={**parameters, **known})
-
-
-def with_fitting_batches(settings: TrainingSettings, rows: int) -> TrainingSettings:
-    """Returns settings whose batch size divides the size of a rollout of a number of parallel environments."""
-    parameters = dict(settings.parameters)
-    if {"n_steps", "batch_size"} <= set(parameters):
-        parameters["batch_size"] = math.gcd(parameters["n_steps"] * rows, parameters["batch_size"])
-    return replace(settings, parameters=parameters)
 
 
 def _variables(model: Model) -> Iterator[tuple[str, torch.Tensor]]:
@@ -326,7 +309,7 @@ def _variables(model: Model) -> Iterator[tuple[str, torch.Tensor]]:
             yield name, value
 
 
-def tensors_under(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+def _tensors_under(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:
     """Returns the tensors whose names begin with a prefix, without it."""
     return {name[len(prefix) :]: value for name, value in tensors.items() if name.startswith(prefix)}
 
@@ -336,7 +319,7 @@ def _optimiser(
 ) -> dict[str, object]:  # fmt: skip
     """Returns the state of an optimiser, as torch's `state_dict` has it."""
     state: dict[int, dict[str, torch.Tensor]] = {}
-    for key, value in tensors_under(f"{name}/", tensors).items():
+    for key, value in _tensors_under(f"{name}/", tensors).items():
         index, quantity = key.split("/")
         state.setdefault(int(index), {})[quantity] = value
     return {"state": state, "param_groups": groups[name]}

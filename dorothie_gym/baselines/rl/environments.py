@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, SupportsFloat
 
 import gymnasium as gym
@@ -15,19 +16,30 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
 import dorothie_gym
+from dorothie_gym._registration import environments
 from dorothie_gym.baselines.rl.repeatable_batch import RepeatableVecEnv
 from dorothie_gym.baselines.rl.sb3_vec_env import unrelated_seeds
 from dorothie_gym.baselines.rl.settings import Arguments, Page, TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import AnyEnv, make_vector_env
 from dorothie_gym.errors import ModelFileError, SettingsError, short_repr
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.spaces.limits import UNBOUNDED
+from dorothie_gym.policies.policy_loader import find_player
+from dorothie_gym.spaces.limits import UNBOUNDED, SpaceLimits
 
 ENVIRONMENTS_OF_MODELS: Final = frozenset(
     f"dorothie_gym/{name}-v0"
     for name in ("Participant", "CoWizard", "AdWizard", "Navigation", "Navigation-continuous", "UfN", "RfN", "NfD")
 )
 """Ids of environments that the folder of a model may name."""
+
+ROLE_ENVIRONMENTS: Final[Mapping[str, Role]] = MappingProxyType(
+    {env.id: Role(env.kwargs["role"]) for env in environments() if "role" in env.kwargs}
+)
+"""Roles of the environments in which an agent plays one of the three, by id."""
+
+PARTNERS: Final = "partners"
+"""Argument of these environments: policies of the other roles."""
 
 TOWN: Final = "town"
 """Argument of environments; a list of several towns is one of batches only."""
@@ -42,7 +54,7 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
 
     Args:
         name: id of the environment.
-        settings: its arguments.
+        settings: its arguments; `partners` may name files of policies, too.
 
     Raises:
         SettingsError: there is no such environment, or it does not accept these arguments.
@@ -50,13 +62,34 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
     if ":" in name:
         raise SettingsError(f"env is {short_repr(name)}; it must be a registered id, without a module to import")
     try:
-        env: AnyEnv = gym.make(name, disable_env_checker=True, **each_town(settings or {})[0])
+        arguments = each_town(settings or {})[0]
+        env: AnyEnv = gym.make(name, disable_env_checker=True, **_with_partners(name, arguments))
     except (gym.error.Error, TypeError, ValueError) as error:
         raise SettingsError(f"env {name}: {error.__cause__ or error}") from error
     observed, acted = env.observation_space, env.action_space
     if isinstance(observed, spaces.Box) and len(observed.shape) in (1, 3) and isinstance(acted, _PLAIN):
         return env
     return SquashedObservation(dorothie_gym.flatten(env))
+
+
+def _with_partners(name: str, settings: Arguments) -> Arguments:
+    """Returns the arguments of an environment with the policies that play beside its agent, instead of their names.
+
+    Raises:
+        ValueError: there is no such policy, or it plays another role.
+    """
+    partners = settings.get(PARTNERS)
+    if name not in ROLE_ENVIRONMENTS or not isinstance(partners, Mapping):
+        return settings
+    spaces_only = gym.make(name, disable_env_checker=True, **{**settings, PARTNERS: {}})
+    limits: SpaceLimits = spaces_only.get_wrapper_attr("engine").limits
+    found = {
+        role: find_player(given, Role(role)).make(Role(role), limits)
+        if isinstance(given, str) and role in AGENT_ROLES
+        else given
+        for role, given in partners.items()
+    }
+    return {**settings, PARTNERS: found}
 
 
 def each_town(settings: Arguments) -> list[Arguments]:
@@ -91,14 +124,19 @@ def make_env_of_model(name: str, settings: Arguments | None, folder: Path) -> An
             f"{folder}: the model is one of the environment {short_repr(name)}; models of "
             f"{', '.join(sorted(ENVIRONMENTS_OF_MODELS))} can be opened"
         )
-    return make_env(name, settings)
+    others = {argument: value for argument, value in (settings or {}).items() if argument != PARTNERS}
+    return make_env(name, others)  # the partners of a training do not decide what its model observes and does
+
+
+def squashed(values: NDArray[np.generic]) -> Vector:
+    """Maps each number x to sign(x) log(1 + |x|), scaled to -1..1."""
+    wide = np.asarray(values, dtype=np.float64)
+    scaled = np.sign(wide) * np.log1p(np.abs(wide)) / math.log1p(UNBOUNDED)
+    return np.clip(scaled, -1.0, 1.0).astype(np.float32)
 
 
 class SquashedObservation(gym.ObservationWrapper[Vector, object, dict[str, NDArray[np.generic]]]):
-    """Maps each number x of a flat observation to sign(x) log(1 + |x|), scaled to -1..1.
-
-    Metres, ids and shares get similar magnitudes without statistics of them.
-    """
+    """Squashes the numbers of a flat observation: metres, ids and shares get similar magnitudes without statistics."""
 
     def __init__(self, env: AnyEnv) -> None:
         super().__init__(env)
@@ -108,9 +146,7 @@ class SquashedObservation(gym.ObservationWrapper[Vector, object, dict[str, NDArr
 
     def observation(self, observation: dict[str, NDArray[np.generic]]) -> Vector:
         """Returns the squashed vector."""
-        values = np.asarray(observation["observation"], dtype=np.float64)
-        squashed = np.sign(values) * np.log1p(np.abs(values)) / math.log1p(UNBOUNDED)
-        return np.clip(squashed, -1.0, 1.0).astype(np.float32)
+        return squashed(observation["observation"])
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Returns the mask of the wrapped environment, see `FlattenAction`."""

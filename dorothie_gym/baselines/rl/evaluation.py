@@ -1,11 +1,10 @@
-"""Greedy play of trained models: evaluation over seeded episodes, and the Co-Wizard in rollouts."""
+"""Evaluation of models over seeded episodes, by greedy play."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -13,14 +12,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
 from dorothie_gym.analysis.intervals import wilson_interval
-from dorothie_gym.baselines.rl.checkpoint import Model, load_model
+from dorothie_gym.baselines.rl.checkpoint import Model
 from dorothie_gym.baselines.rl.environments import EnvFactory, each_town, has_batch, make_batch, masks_of
-from dorothie_gym.baselines.rl.settings import NAVIGATION, TrainingSettings
+from dorothie_gym.baselines.rl.settings import TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import MakeEnv
-from dorothie_gym.errors import SettingsError
-from dorothie_gym.policies.navigation.navigation_policy import NavigationPolicy
-from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
-from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.policies.navigation.observation_vector import Vector
 
 FIRST_SEED: Final = 1_000_000
 """Seed of the first episode of an evaluation; training uses smaller seeds."""
@@ -200,43 +196,3 @@ def greedy_policy(model: Model, *, masked: bool) -> Act:
         return actions
 
     return act
-
-
-# --- Models of `train-rl` as Co-Wizards ------------------------------------------------------------------------------
-
-
-def make_player(path: Path, limits: SpaceLimits) -> NavigationPolicy:
-    """Returns a Co-Wizard that drives by the greedy policy of a model.
-
-    Args:
-        path: folder of the model, or a file in it.
-        limits: sizes of the spaces.
-
-    Raises:
-        ModelFileError: the files are missing or damaged.
-        SettingsError: the model was trained in another environment than `Navigation-v0`.
-    """
-    model, settings = load_model(path)
-    if settings.env != NAVIGATION:
-        raise SettingsError(
-            f"{path}: was trained in {settings.env}; only models trained in {NAVIGATION} can play the co_wizard"
-        )
-    if settings.sees:
-        raise SettingsError(
-            f"{path}: was trained on pictures, which the co_wizard of a rollout does not get; train with "
-            "--observation vector to play it"
-        )
-    seconds = settings.env_settings.get("max_seconds", MAX_SECONDS)
-    return NavigationPolicy(GreedyDriver(model, masked=settings.masked), limits, max_seconds=seconds)
-
-
-class GreedyDriver:
-    """Greedy policy of a model for single observations of `Navigation-v0`."""
-
-    def __init__(self, model: Model, *, masked: bool) -> None:
-        self._model, self._masked = model, masked
-
-    def __call__(self, observation: Vector, mask: NDArray[np.bool_]) -> int:
-        """Returns an action of `Navigation-v0`; masked algorithms respect the mask (18,)."""
-        keywords = {"action_masks": mask} if self._masked else {}
-        return int(self._model.predict(observation, deterministic=True, **keywords)[0])

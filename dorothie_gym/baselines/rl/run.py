@@ -1,20 +1,20 @@
-"""Resumable run of a training in a folder: the part that reinforcement learning and self-play share."""
+"""Files of a resumable run of a training in a folder."""
 
 from __future__ import annotations
 
 import json
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final, Generic, Self, TypeAlias, TypeVar
+from typing import Final, TypeAlias
 
 import torch
 from stable_baselines3.common.logger import Logger, configure
 
+from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics
 from dorothie_gym.baselines.rl.resumption import CHECKPOINT, Checkpoint, Tensors, read_checkpoint, write_checkpoint
-from dorothie_gym.baselines.rl.settings import Page, RunSettings
+from dorothie_gym.baselines.rl.settings import Page, TrainingSettings
 from dorothie_gym.errors import ModelFileError, one_line
 from dorothie_gym.files import write_atomically
 from dorothie_gym.input_files import checked, raising
@@ -34,25 +34,28 @@ CLONED: Final = "cloned.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunEvaluation(ABC):
-    """Evaluation after a number of steps and a duration of training [s]."""
+class TrainingEvaluation:
+    """Evaluation of a model over episodes, after a number of steps and a duration of training [s]."""
 
     steps: int
     seconds: float
+    outcome: EpisodeStatistics
 
-    @abstractmethod
     def as_json(self) -> Page:
         """Returns the evaluation in JSON types."""
+        return {"steps": self.steps, "seconds": self.seconds, **asdict(self.outcome)}
 
     @classmethod
-    @abstractmethod
-    def from_json(cls, page: Page) -> Self:
+    def from_json(cls, page: Page) -> TrainingEvaluation:
         """Reads the output of `as_json`."""
+        outcome = {name: value for name, value in page.items() if name not in ("steps", "seconds")}
+        return cls(
+            steps=int(page["steps"]), seconds=float(page["seconds"]),
+            outcome=checked(outcome, EpisodeStatistics, "evaluation"),
+        )  # fmt: skip
 
 
-Evaluation = TypeVar("Evaluation", bound=RunEvaluation)
-
-OnProgress: TypeAlias = Callable[[int, int, Evaluation | None], None]
+OnProgress: TypeAlias = Callable[[int, int, TrainingEvaluation | None], None]
 """Callback with the number of steps done, their total, and a new evaluation if there is one."""
 
 OnStage: TypeAlias = Callable[[str, int, int], None]
@@ -64,7 +67,7 @@ def ignore_stage(stage: str, done: int, total: int) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainingResult(Generic[Evaluation]):
+class TrainingResult:
     """Result of a training.
 
     Attributes:
@@ -76,13 +79,13 @@ class TrainingResult(Generic[Evaluation]):
     """
 
     folder: Path
-    rows: tuple[Evaluation, ...]
+    rows: tuple[TrainingEvaluation, ...]
     steps: int
     seconds: float
     finished: bool
 
 
-class Run(Generic[Evaluation]):
+class Run:
     """Run of a training in a folder.
 
     Attributes:
@@ -92,7 +95,7 @@ class Run(Generic[Evaluation]):
         seconds: duration of the training without evaluations [s].
     """
 
-    def __init__(self, folder: Path, on_progress: OnProgress[Evaluation] | None, on_stage: OnStage) -> None:
+    def __init__(self, folder: Path, on_progress: OnProgress | None, on_stage: OnStage) -> None:
         """Prepares a run and limits torch to one thread.
 
         Args:
@@ -101,21 +104,17 @@ class Run(Generic[Evaluation]):
             on_stage: callback for the progress of a warm start.
         """
         self.folder = folder
-        self.rows: list[Evaluation] = []
+        self.rows: list[TrainingEvaluation] = []
         self.steps, self.seconds = 0, 0.0
         self._on_progress = on_progress or (lambda done, total, row: None)
         self._on_stage = on_stage
         torch.set_num_threads(1)  # small networks: more threads only wait for each other
 
-    def _read_checkpoint(
-        self, settings: RunSettings, kind: type[Evaluation], model: Path
-    ) -> Checkpoint | None:  # fmt: skip
+    def _read_checkpoint(self, settings: TrainingSettings) -> Checkpoint | None:
         """Returns the checkpoint in the folder after reading rows and time from it; None if there is no run yet.
 
         Args:
             settings: settings of the run.
-            kind: class of the rows.
-            model: folder of a model of the run.
 
         Raises:
             SettingsError: the run there has other settings.
@@ -123,22 +122,22 @@ class Run(Generic[Evaluation]):
         """
         found = read_checkpoint(self.folder)
         if found is None:
-            if (model / DESCRIPTION).exists():
+            if (self.folder / DESCRIPTION).exists():
                 raise ModelFileError(
                     f"{self.folder}: has no {CHECKPOINT}, from which the training of the model there could go on; "
                     "choose another folder"
                 )
             return None
         with raising(ModelFileError):
-            settings.check_resumable(checked(found.page.get("settings"), type(settings), found.path), self.folder)
+            settings.check_resumable(checked(found.page.get("settings"), TrainingSettings, found.path), self.folder)
         try:
-            self.rows = [kind.from_json(row) for row in found.page["rows"]]
+            self.rows = [TrainingEvaluation.from_json(row) for row in found.page["rows"]]
             self.seconds, self.steps = float(found.page["seconds"]), int(found.page["steps"])
         except (KeyError, TypeError, ValueError) as error:
             raise ModelFileError(f"{found.path}: is no run of this version ({one_line(repr(error))})") from None
         return found
 
-    def _write_checkpoint(self, settings: RunSettings, steps: int, page: Page, tensors: Tensors) -> None:
+    def _write_checkpoint(self, settings: TrainingSettings, steps: int, page: Page, tensors: Tensors) -> None:
         """Writes the checkpoint after a number of steps; a run that goes on there writes all later files again."""
         rows = [row.as_json() for row in self.rows]
         own: Page = {"settings": settings.as_json(), "steps": steps, "seconds": self.seconds, "rows": rows}
@@ -163,7 +162,7 @@ class Run(Generic[Evaluation]):
     def _write_cloned(self, results: Mapping[str, object]) -> None:
         write_atomically(self.folder / CLONED, json.dumps(results, indent=1) + "\n")
 
-    def _result(self, *, finished: bool) -> TrainingResult[Evaluation]:
+    def _result(self, *, finished: bool) -> TrainingResult:
         return TrainingResult(
             folder=self.folder, rows=tuple(self.rows), steps=self.steps, seconds=self.seconds, finished=finished
         )

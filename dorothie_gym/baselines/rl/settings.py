@@ -1,17 +1,16 @@
-"""Settings of reinforcement learning and of self-play; tuned defaults are in data files."""
+"""Settings of reinforcement learning; tuned defaults are in data files."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib import resources
 from typing import Any, Final, Self, TypeAlias
 
 import yaml
 
 from dorothie_gym.errors import SettingsError, did_you_mean, short_repr
-from dorothie_gym.ontology.roles import Role
 
 Arguments: TypeAlias = Mapping[str, Any]
 """Keyword arguments of an environment or an algorithm, of any type; both check them."""
@@ -66,8 +65,8 @@ RESUMABLE: Final = ("steps", "evaluate_every", "episodes", "workers")
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunSettings:
-    """Settings that reinforcement learning and self-play share.
+class TrainingSettings:
+    """Settings of reinforcement learning.
 
     Attributes:
         steps: number of steps of all environments together.
@@ -79,6 +78,11 @@ class RunSettings:
         network: widths of the hidden layers.
         parameters: parameters of the algorithm, as stable-baselines3 names them; see `FINAL_RATE` and `FINAL_ENTROPY`.
         warm_start: folder of a corpus for behaviour cloning before the training; None for none.
+        algorithm: one of `ALGORITHMS`.
+        env: id of the environment.
+        env_settings: arguments of the environment.
+        fine_inputs: whether networks get each input in two scales, see `FineInputs`.
+        channels: channels of the convolutions for pictures, see `PictureFeatures`.
     """
 
     steps: int = 600_000
@@ -90,9 +94,32 @@ class RunSettings:
     network: tuple[int, ...] = (64, 64)
     parameters: Arguments = field(default_factory=dict)
     warm_start: str | None = None
+    algorithm: str
+    env: str
+    env_settings: Arguments = field(default_factory=dict)
+    fine_inputs: bool = False
+    channels: tuple[int, ...] = (32, 64, 64)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "network", tuple(self.network))
+        object.__setattr__(self, "channels", tuple(self.channels))
+        _check_algorithm(self.algorithm)
+        self._check_run()
+        if len(self.channels) != 3 or not all(type(n) is int and 1 <= n <= MAX_CHANNELS for n in self.channels):
+            raise SettingsError(
+                f"channels is {short_repr(self.channels)}; it must be three numbers in 1..{MAX_CHANNELS}"
+            )
+        if self.sees:
+            self._check_pictures()
+        if FINAL_ENTROPY in self.parameters:
+            self._check_entropy()
+        if self.warm_start is not None and (self.algorithm not in ON_POLICY or self.env != NAVIGATION):
+            raise SettingsError(
+                f"warm_start: {self.algorithm} on {self.env} cannot learn from a corpus; {', '.join(ON_POLICY)} "
+                f"on {NAVIGATION} can"
+            )
+
+    def _check_run(self) -> None:
         for name in ("steps", "environments", "evaluate_every", "episodes"):
             if not isinstance(getattr(self, name), int) or getattr(self, name) < 1:
                 raise SettingsError(f"{name} is {getattr(self, name)!r}; it must be a whole number of at least 1")
@@ -122,55 +149,6 @@ class RunSettings:
                     f"{folder}: a run with another {name} is there ({same[name]}, not {value}); "
                     "choose another folder, or resume with the same settings"
                 )
-
-
-def _check_parameters(parameters: Arguments) -> None:
-    """Raises `SettingsError` for a parameter of the algorithm that is larger than any memory."""
-    for name, value in parameters.items():
-        if not isinstance(value, bool | str | int | float | list | tuple | None):
-            raise SettingsError(f"parameters.{name} is {short_repr(value)}; it must be a number, text or list")
-        if isinstance(value, int | float) and not abs(value) <= MAX_PARAMETER:
-            raise SettingsError(f"parameters.{name} is {short_repr(value)}; it must be at most {MAX_PARAMETER:g}")
-
-
-# --- Reinforcement learning -------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrainingSettings(RunSettings):
-    """Settings of reinforcement learning.
-
-    Attributes:
-        algorithm: one of `ALGORITHMS`.
-        env: id of the environment.
-        env_settings: arguments of the environment.
-        fine_inputs: whether networks get each input in two scales, see `FineInputs`.
-        channels: channels of the convolutions for pictures, see `PictureFeatures`.
-    """
-
-    algorithm: str
-    env: str
-    env_settings: Arguments = field(default_factory=dict)
-    fine_inputs: bool = False
-    channels: tuple[int, ...] = (32, 64, 64)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "channels", tuple(self.channels))
-        _check_algorithm(self.algorithm)
-        super().__post_init__()
-        if len(self.channels) != 3 or not all(type(n) is int and 1 <= n <= MAX_CHANNELS for n in self.channels):
-            raise SettingsError(
-                f"channels is {short_repr(self.channels)}; it must be three numbers in 1..{MAX_CHANNELS}"
-            )
-        if self.sees:
-            self._check_pictures()
-        if FINAL_ENTROPY in self.parameters:
-            self._check_entropy()
-        if self.warm_start is not None and (self.algorithm not in ON_POLICY or self.env != NAVIGATION):
-            raise SettingsError(
-                f"warm_start: {self.algorithm} on {self.env} cannot learn from a corpus; {', '.join(ON_POLICY)} "
-                f"on {NAVIGATION} can"
-            )
 
     def _check_pictures(self) -> None:
         if self.algorithm not in ON_POLICY:
@@ -203,6 +181,15 @@ class TrainingSettings(RunSettings):
         return self.algorithm == "maskable_ppo"
 
 
+def _check_parameters(parameters: Arguments) -> None:
+    """Raises `SettingsError` for a parameter of the algorithm that is larger than any memory."""
+    for name, value in parameters.items():
+        if not isinstance(value, bool | str | int | float | list | tuple | None):
+            raise SettingsError(f"parameters.{name} is {short_repr(value)}; it must be a number, text or list")
+        if isinstance(value, int | float) and not abs(value) <= MAX_PARAMETER:
+            raise SettingsError(f"parameters.{name} is {short_repr(value)}; it must be at most {MAX_PARAMETER:g}")
+
+
 def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSettings:
     """Returns the tuned settings of an algorithm and an environment, with changes.
 
@@ -232,8 +219,8 @@ def tuned_settings(algorithm: str, env: str, **changes: object) -> TrainingSetti
 
 def _check_algorithm(name: str) -> None:
     if name not in ALGORITHMS:
-        known = (*ALGORITHMS, "selfplay")
-        raise SettingsError(f"algorithm is {name!r}; {did_you_mean(name, known)}it must be one of {', '.join(known)}")
+        hint = did_you_mean(name, tuple(ALGORITHMS))
+        raise SettingsError(f"algorithm is {name!r}; {hint}it must be one of {', '.join(ALGORITHMS)}")
 
 
 def _read_data(name: str) -> Page:
@@ -244,113 +231,3 @@ def _read_data(name: str) -> Page:
 
 def _given(changes: Arguments) -> Page:
     return {name: value for name, value in changes.items() if value is not None}
-
-
-# --- Self-play --------------------------------------------------------------------------------------------------------
-
-SELFPLAY: Final = "selfplay"
-"""Name of the algorithm at the command line, and kind of its models in `model.json`."""
-
-PARTNERS: Final = ("participant", "co_wizard")
-"""Settings of self-play: roles that a policy can play instead of a network that learns."""
-
-ENV_FIELDS: Final = ("town", "storyboard", "traffic", "max_seconds", "progress", *PARTNERS)
-"""Settings of self-play that are arguments of `SelfPlayEnv`."""
-
-PARTIAL_FIELDS: Final = ("past_environments", "coached_environments")
-"""Settings of self-play: numbers of environments in which not all roles learn."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SelfPlaySettings(RunSettings):
-    """Settings of self-play.
-
-    Attributes:
-        shared: whether one network plays all roles; otherwise each role has its own.
-        town, storyboard, traffic, max_seconds, progress: see `SelfPlayEnv`.
-        participant, co_wizard: name or path of the policy that plays the role in all sessions; None for a network that
-            learns. With both, only the Ad-Wizard learns.
-        coached_environments: number of environments in which Co-Wizard and participant take turns to learn while the
-            other roles are scripted. Agents that learn only from each other have to invent a language, which may
-            differ from that of the corpus (Lowe et al. 2020, "On the interaction between supervision and self-play in
-            emergent communication").
-        past_environments: number of environments in which a past checkpoint plays the Ad-Wizard and does not learn.
-    """
-
-    environments: int = 16
-    evaluate_every: int = 100_000
-    episodes: int = 20
-    network: tuple[int, ...] = (128, 128)
-    shared: bool = False
-    town: str = "brookside"
-    storyboard: str | None = None
-    traffic: str = "light"
-    max_seconds: float = 600.0
-    progress: float = 0.02
-    participant: str | None = None
-    co_wizard: str | None = None
-    coached_environments: int = 0
-    past_environments: int = 0
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.shared, bool):
-            raise SettingsError(f"shared is {self.shared!r}; it must be true or false")
-        for name in PARTNERS:
-            if not isinstance(getattr(self, name), str | None):
-                raise SettingsError(f"{name} is {getattr(self, name)!r}; it must be the name or path of a policy")
-        super().__post_init__()
-        left = self.environments - 1
-        for name in PARTIAL_FIELDS:
-            value = getattr(self, name)
-            if not isinstance(value, int) or not 0 <= value <= left:
-                raise SettingsError(f"{name} is {value!r}; it must be in 0..{left}: all roles learn in at least one")
-            left -= value
-        if self.partners and self.coached_environments:
-            raise SettingsError(
-                f"coached_environments is {self.coached_environments}; it must be 0 where a policy plays "
-                f"{' and '.join(self.partners)}"
-            )
-
-    @property
-    def partners(self) -> Mapping[Role, str]:
-        """Names or paths of the policies that play roles in all sessions."""
-        found = {Role(name): getattr(self, name) for name in PARTNERS}
-        return {role: name for role, name in found.items() if name is not None}
-
-    @property
-    def env_settings(self) -> Page:
-        """Arguments of `SelfPlayEnv`."""
-        return {name: getattr(self, name) for name in ENV_FIELDS}
-
-    def learner(self, seed: int = 0) -> TrainingSettings:
-        """Returns the settings of a learner; `seed` is that of its network."""
-        return TrainingSettings(
-            algorithm="maskable_ppo", env=SELFPLAY, seed=seed, network=self.network, parameters=self.parameters,
-            steps=self.steps, environments=self.environments, workers=self.workers, episodes=self.episodes,
-            evaluate_every=self.evaluate_every,
-        )  # fmt: skip
-
-
-def selfplay_settings(given: Arguments | None = None, **changes: object) -> SelfPlaySettings:
-    """Returns the default settings with changes.
-
-    Args:
-        given: settings of the user: `shared`, `PARTIAL_FIELDS` and `ENV_FIELDS`.
-        changes: other fields; None leaves a field as it is.
-
-    Raises:
-        SettingsError: there is no such field, or it is out of its range.
-    """
-    given = given or {}
-    settable = ("shared", *PARTIAL_FIELDS, *ENV_FIELDS)
-    unknown = [name for name in given if name not in settable]
-    if unknown:
-        raise SettingsError(f"selfplay has no {unknown[0]!r}; the settings are {', '.join(settable)}")
-    tuned = _read_data(SELFPLAY)
-    found = {**tuned, **_given(changes), **given}
-    for name in set(PARTIAL_FIELDS) - set(given):  # in proportion, where there are fewer environments
-        found[name] = tuned[name] * min(found["environments"], tuned["environments"]) // tuned["environments"]
-    if "coached_environments" not in given and any(found.get(name) is not None for name in PARTNERS):
-        found["coached_environments"] = 0  # nobody is coached where a role does not learn
-    assert set(found) <= {each.name for each in fields(SelfPlaySettings)}
-    return SelfPlaySettings(**found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
@@ -15,8 +15,8 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from dorothie_gym.baselines.learning_curves import draw_reward_curve
 from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, CriticWarmUp, clone, read_demonstrations
 from dorothie_gym.baselines.rl.checkpoint import LinearSchedule, Model, make_model, save_model
-from dorothie_gym.baselines.rl.environments import make_training_env
-from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics, evaluate_settings, greedy_policy
+from dorothie_gym.baselines.rl.environments import ROLE_ENVIRONMENTS, make_training_env
+from dorothie_gym.baselines.rl.evaluation import evaluate_settings, greedy_policy
 from dorothie_gym.baselines.rl.resumption import restore_state, state_of
 from dorothie_gym.baselines.rl.run import (
     BEST,
@@ -24,12 +24,12 @@ from dorothie_gym.baselines.rl.run import (
     OnProgress,
     OnStage,
     Run,
-    RunEvaluation,
+    TrainingEvaluation,
     TrainingResult,
     ignore_stage,
 )
-from dorothie_gym.baselines.rl.settings import FINAL_ENTROPY, Page, TrainingSettings
-from dorothie_gym.input_files import checked
+from dorothie_gym.baselines.rl.settings import FINAL_ENTROPY, TrainingSettings
+from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
 from dorothie_gym.recording.corpus import Fold
 
@@ -46,32 +46,17 @@ LOGGED_EPISODES: Final = 4
 """Number of episodes between TensorBoard records of off-policy algorithms."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrainingEvaluation(RunEvaluation):
-    """Evaluation of a model over episodes."""
+def best_of(rows: Sequence[TrainingEvaluation], settings: TrainingSettings) -> TrainingEvaluation | None:
+    """Returns the evaluation with the highest success rate; of equal ones that with the highest reward.
 
-    outcome: EpisodeStatistics
-
-    def as_json(self) -> Page:
-        """Returns the evaluation in JSON types."""
-        return {"steps": self.steps, "seconds": self.seconds, **asdict(self.outcome)}
-
-    @classmethod
-    def from_json(cls, page: Page) -> TrainingEvaluation:
-        """Reads the output of `as_json`."""
-        outcome = {name: value for name, value in page.items() if name not in ("steps", "seconds")}
-        return cls(
-            steps=int(page["steps"]), seconds=float(page["seconds"]),
-            outcome=checked(outcome, EpisodeStatistics, "evaluation"),
-        )  # fmt: skip
+    An Ad-Wizard has no success of its own: that of a session is its opponents', and its best evaluation is the one with
+    the highest reward.
+    """
+    adversarial = ROLE_ENVIRONMENTS.get(settings.env) is Role.AD_WIZARD
+    return max(rows, key=lambda row: (0.0 if adversarial else row.outcome.success, row.outcome.reward), default=None)
 
 
-def best_of(rows: Sequence[TrainingEvaluation]) -> TrainingEvaluation | None:
-    """Returns the evaluation with the highest success rate; of equal ones that with the highest reward."""
-    return max(rows, key=lambda row: (row.outcome.success, row.outcome.reward), default=None)
-
-
-class Training(Run[TrainingEvaluation]):
+class Training(Run):
     """Training of a model; `run` trains until all steps are done or Ctrl-C is pressed.
 
     Attributes:
@@ -84,7 +69,7 @@ class Training(Run[TrainingEvaluation]):
         self,
         settings: TrainingSettings,
         folder: Path,
-        on_progress: OnProgress[TrainingEvaluation] | None = None,
+        on_progress: OnProgress | None = None,
         ray: str | None = None,
         on_stage: OnStage = ignore_stage,
         device: str = "cpu",
@@ -108,7 +93,7 @@ class Training(Run[TrainingEvaluation]):
         super().__init__(folder, on_progress, on_stage)
         self.settings = settings
         self.cloned: CloningResult | None = None
-        begun = self._read_checkpoint(settings, TrainingEvaluation, folder)
+        begun = self._read_checkpoint(settings)
         folder.mkdir(parents=True, exist_ok=True)
         self._checkpoint_after = 0.0  # time of `time.perf_counter`
         self._vector = make_training_env(settings, ray)
@@ -123,7 +108,7 @@ class Training(Run[TrainingEvaluation]):
             self._vector.close()
             raise
 
-    def run(self) -> TrainingResult[TrainingEvaluation]:
+    def run(self) -> TrainingResult:
         """Trains.
 
         Returns:
@@ -187,7 +172,7 @@ class Training(Run[TrainingEvaluation]):
             self.model.logger.record(f"eval/{name}", getattr(outcome, name))
         self.model.logger.dump(row.steps)
         save_model(self.model, settings, self.folder, self.seconds)
-        if best_of(self.rows) is row:
+        if best_of(self.rows, settings) is row:
             save_model(self.model, settings, self.folder / BEST, self.seconds)
         self._write_rows()
         self._draw_curve()

@@ -38,12 +38,6 @@ class PlacedBody(Protocol):
     key: int
 
 
-class MovingBody(PlacedBody, Protocol):
-    """A record of a vehicle or pedestrian."""
-
-    speed: float
-
-
 class SizedBody(PlacedBody, Protocol):
     """A record of a vehicle, prop or perceived body: its outline, too."""
 

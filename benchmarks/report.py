@@ -1,0 +1,444 @@
+"""Summaries of measurements: headline, notes and rows for tables, and the chart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from benchmarks.timing import Figures
+from dorothie_gym.engine.camera_config import CameraOutput
+from dorothie_gym.rendering.charts import GRID, INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.rendering.palette import CAR, LIGHT_RED, ROAD
+from dorothie_gym.sim.config import FRAME_RATE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurement:
+    """A measured speed or time.
+
+    Attributes:
+        label: name of the measured program.
+        value: median of the repetitions, in the unit of the report.
+        spread: interquartile range divided by the median, or None if it is unknown.
+        best: best repetition, or None.
+        reference: whether it is a reference and not of this package.
+    """
+
+    label: str
+    value: float
+    spread: float | None = None
+    best: float | None = None
+    reference: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mark:
+    """Value on the scale of a report that the rows are compared with."""
+
+    label: str
+    value: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Summary of a measurement.
+
+    Attributes:
+        title: subject of the measurement.
+        setting: town and traffic.
+        headline: main result.
+        unit: unit of all rows.
+        rows: references first.
+        mark: line across the chart, or None.
+        notes: further results, one line each.
+        machine: machine and versions.
+        logarithmic: whether the chart needs a logarithmic scale.
+    """
+
+    title: str
+    setting: str
+    headline: str
+    unit: str
+    rows: tuple[Measurement, ...]
+    mark: Mark | None = None
+    notes: tuple[str, ...] = ()
+    machine: str
+    logarithmic: bool = True
+
+
+def world_report(figures: Figures) -> Report:
+    """Returns the summary of `world.measure`."""
+    traffic = f"{_count(figures['vehicles'], 'vehicle')} ({_count(figures['cyclists'], 'cyclist')} among them)"
+    others = f"{_count(figures['pedestrians'], 'pedestrian')}, {_count(figures['props'], 'prop')}"
+    stock = figures["stock_substeps_per_second"]
+    return Report(
+        title="World with traffic, pedestrians, lights and props",
+        setting=f"{figures['town']}: {figures['lanes']} lanes, {traffic}, {others}; one core",
+        headline=f"{number(figures['ratio'])} times highway-env's own road on the same map, "
+        f"{number(figures['substeps_per_second'] / FRAME_RATE)} times real time",
+        unit="substeps per second",
+        rows=(
+            Measurement(
+                label=f"highway-env's road\n{_count(figures['vehicles'], 'IDM vehicle')}, no other actors",
+                value=stock, spread=figures["stock_spread"], best=figures["stock_best"], reference=True,
+            ),
+            Measurement(
+                label="dorothie_gym's world\ntraffic, people, lights, yielding, props",
+                value=figures["substeps_per_second"], spread=figures["spread"], best=figures["best"],
+            ),
+        ),
+        mark=Mark(label="real time", value=FRAME_RATE),
+        notes=(f"memory of one more world in the same town: {figures['bytes_per_world'] / 1024:.0f} KiB",),
+        machine=machine_line(figures["machine"]),
+    )  # fmt: skip
+
+
+def env_report(figures: Figures) -> Report:
+    """Returns the summary of `env.measure`."""
+    simulated = figures["simulated_seconds_per_second"]
+    rows = [
+        Measurement(
+            label="highway-env\nintersection-v0", value=figures["stock_simulated_seconds_per_second"],
+            spread=figures["stock_spread"], reference=True,
+        )
+    ]  # fmt: skip
+    sumo = figures["sumo_substeps_per_second"]
+    if sumo is not None:
+        label = "SUMO\nvehicles on a grid as large"
+        rows.append(Measurement(label=label, value=sumo / FRAME_RATE, spread=figures["sumo_spread"], reference=True))
+    step_share = simulated / figures["steps_per_second"]
+    rows.append(
+        Measurement(
+            label="DuoWizardEnv\nthree agents, full observations", value=simulated, spread=figures["spread"],
+            best=figures["best"] * step_share,
+        )
+    )  # fmt: skip
+    scaling = figures["two_processes_scaling"]
+    notes = [
+        f"{number(figures['steps_per_second'])} steps per second of {figures['substeps_per_step']} substeps; "
+        f"intersection-v0: {number(figures['stock_steps_per_second'])}",
+        "two processes were not measured on a single core"
+        if scaling is None
+        else f"throughput of two processes: {scaling:.2f} times that of one",
+    ]
+    if figures["sumo_missing"] is not None:
+        notes.append(figures["sumo_missing"])
+    return Report(
+        title="Environment of three agents",
+        setting=f"{figures['town']}: {figures['lanes']} lanes, {_count(figures['vehicles'], 'vehicle')}, "
+        f"{_count(figures['pedestrians'], 'pedestrian')}; one core",
+        headline=f"{number(figures['ratio'])} times as much simulated time as intersection-v0",
+        unit="simulated seconds per second",
+        rows=tuple(rows),
+        mark=Mark(label="real time", value=1.0),
+        notes=tuple(notes),
+        machine=machine_line(figures["machine"]),
+    )
+
+
+def vector_report(figures: Figures) -> Report:
+    """Returns the summary of `vector.measure`."""
+    threads = _count(figures["threads"], "thread")
+    notes = [f"processors available to the threads: {figures['processors']:.2f}"]
+    if "vector_steps_per_second" in figures:
+        vector, sync, processes = (number(figures[f"{mode}_steps_per_second"]) for mode in ("vector", "sync", "async"))
+        notes.append(
+            f"Navigation-v0, all environments: {vector} steps per second in one batch, {sync} by SyncVectorEnv, "
+            f"{processes} by AsyncVectorEnv"
+        )
+    return Report(
+        title="Batch of worlds",
+        setting=f"{figures['town']}: {_count(figures['worlds'], 'world')} "
+        f"with {_count(figures['vehicles'], 'vehicle')} and {_count(figures['pedestrians'], 'pedestrian')} each",
+        headline=f"throughput of {threads}: {figures['scaling']:.2f} times that of one",
+        unit="substeps per second, all worlds",
+        rows=(
+            Measurement(label="one thread", value=figures["substeps_per_second_one_thread"], reference=True),
+            Measurement(label=threads, value=figures["substeps_per_second"]),
+        ),
+        notes=tuple(notes),
+        machine=machine_line(figures["machine"]),
+        logarithmic=False,
+    )
+
+
+def import_report(figures: Figures) -> Report:
+    """Returns the summary of `importing.measure`."""
+    seconds, stock = figures["seconds"], figures["highway_env_seconds"]
+    return Report(
+        title="Import and first environment",
+        setting=f"{figures['town']}; new processes, warm caches",
+        headline=f"import and first environment take {figures['ratio']:.2f} times as long as importing highway-env",
+        unit="seconds",
+        rows=(
+            Measurement(label="import highway_env", value=stock, spread=figures["highway_env_spread"], reference=True),
+            Measurement(label="import dorothie_gym", value=seconds["package"], spread=figures["package_spread"]),
+            Measurement(label="... and first environment,\nmade and reset", value=seconds["first_environment"],
+                spread=figures["spread"]),
+            Measurement(label="... and its first step", value=seconds["first_step"]),
+        ),
+        machine=machine_line(figures["machine"]),
+        logarithmic=False,
+    )  # fmt: skip
+
+
+def rl_report(figures: Figures) -> Report:
+    """Returns the summary of `baselines.rl.throughput.measure`."""
+    names = {"environment": "environments", "policy": "action selection", "learner": "learning"}
+    shares = ", ".join(f"{names[name]} {100 * share:.0f} %" for name, share in figures["shares"].items())
+    rows = [
+        Measurement(
+            label=f"training with {figures['algorithm']}\nend to end", value=figures["end_to_end_steps_per_second"]
+        )
+    ]
+    notes = [f"training: {shares}"]
+    setting = f"{_count(figures['environments'], 'environment')}, network {figures['network']}"
+    if figures["observation"] != "vector":
+        setting += ", pictures"
+    if figures["batch_steps_per_second"] is not None:
+        rows = [
+            Measurement(label="its physics alone", value=figures["kernel_steps_per_second"]),
+            Measurement(
+                label=f"batch of {figures['batch']}\non {_count(figures['threads'], 'thread')}",
+                value=figures["batch_steps_per_second"],
+            ),
+            *rows,
+            Measurement(label="one environment", value=figures["single_steps_per_second"]),
+            Measurement(
+                label="intersection-v0\nof highway-env", value=figures["stock_steps_per_second"], reference=True
+            ),
+        ]  # fmt: skip
+        if figures["metadrive_steps_per_second"] is not None:
+            rows.append(Measurement(label="MetaDrive", value=figures["metadrive_steps_per_second"], reference=True))
+        parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in figures["step_shares"].items())
+        notes.append(f"a step of the batch: {parts}; {figures['of_kernel']:.0%} of the rate of its physics")
+        notes.append(f"memory: {figures['bytes_per_environment'] / 1024:.0f} KB an environment")
+        setting += f"; {figures['town']}, {figures['traffic']} traffic, {figures['exceptions']:g} exceptions"
+    return Report(
+        title=f"Training {figures['algorithm']} on {figures['env']}",
+        setting=setting,
+        headline=f"{number(figures['end_to_end_steps_per_second'])} environment steps per second, end to end",
+        unit="environment steps per second",
+        rows=tuple(rows),
+        notes=tuple(notes),
+        machine=machine_line(figures["machine"]),
+    )
+
+
+def camera_report(figures: Figures) -> Report:
+    """Returns the summary of `camera.measure`."""
+    rows = []
+    if figures["metadrive"] is not None:
+        value = 1000.0 / figures["metadrive"]["milliseconds"]
+        rows.append(Measurement(label="MetaDrive, images\n480 x 320", value=value, reference=True))
+    if figures["opengl"] is not None:
+        value = 1000.0 / figures["opengl"]["milliseconds"]
+        rows.append(Measurement(label="OpenGL, plain triangles\n480 x 320", value=value, reference=True))
+    for row in figures["rows"]:
+        parts = "everything" if len(row["outputs"]) == len(CameraOutput) else ", ".join(row["outputs"])
+        smooth = "" if row["antialias"] else ", not smoothed"
+        label = f"{row['width']} x {row['height']}, {parts}{smooth}\n{number(row['milliseconds'])} ms"
+        rows.append(Measurement(label=f"{label}, p99 {number(row['milliseconds_p99'])}", value=_rate(row)))
+    first = figures["rows"][0]
+    cold = figures["cold_picture_seconds"]
+    notes = [
+        f"first picture: {number(figures['first_picture_seconds'])} s from caches"
+        + ("" if cold is None else f", {number(cold)} s without"),
+        f"memory: town {figures['town_bytes'] / 1e6:.1f} MB, camera {figures['camera_bytes'] / 1e6:.1f} MB",
+        f"p99: along a drive of {_count(figures['drive_pictures'], 'picture')}",
+    ]
+    if figures["opengl"] is not None:
+        notes.append(f"OpenGL: {figures['opengl']['renderer']}, without textures, shadows and bodies")
+    if figures["metadrive"] is None:
+        notes.append("MetaDrive or its assets are not installed")
+    return Report(
+        title="First-person camera",
+        setting=f"{figures['town']}: {_count(figures['vehicles'], 'vehicle')}, "
+        f"{_count(figures['pedestrians'], 'pedestrian')}, mean over {_count(figures['places'], 'place')}; one core",
+        headline=f"{number(_rate(first))} pictures of {first['width']} x {first['height']} per second",
+        unit="pictures per second",
+        rows=tuple(rows),
+        notes=tuple(notes),
+        machine=machine_line(figures["machine"]),
+    )
+
+
+def speech_report(figures: Figures) -> Report:
+    """Returns the summary of `speech.measure`."""
+    conditions = (("wer_clean", "without noise"), ("wer_20db", "pink noise, 20 dB"), ("wer_10db", "pink noise, 10 dB"))
+    rows = [Measurement(label=label, value=100.0 * figures[name]) for name, label in conditions]
+    return Report(
+        title="Speech",
+        setting=f"{_count(figures['spans'], 'span')} of {_count(figures['sessions'], 'session')}, "
+        f"{figures['synthesizer']} and {figures['recognizer']}; one core",
+        headline=f"word error rate {figures['wer_clean']:.1%} without noise",
+        unit="word errors [percent]",
+        rows=tuple(rows),
+        notes=(
+            f"slot values understood: F1 {figures['slots_f1']:.3f}, names {figures['names']:.1%}",
+            f"moves understood: {figures['moves']:.1%}, and {figures['moves_written']:.1%} from the written words",
+            f"recognition: {number(figures['recognition_rtf'])} s per second of audio",
+            f"synthesis: {number(figures['synthesis_milliseconds'])} ms per span",
+        ),
+        machine=machine_line(figures["machine"]),
+        logarithmic=False,
+    )
+
+
+def _rate(row: Figures) -> float:
+    return float(1000.0 / row["milliseconds"])
+
+
+def train_report(figures: Figures) -> Report:
+    """Returns the summary of `baselines.bench.measure`."""
+    threads = _count(figures["threads"], "thread")
+    giga = figures["flops_per_second"] / 1e9
+    return Report(
+        title="TOTO at the published size",
+        setting=f"{figures['parameters'] / 1e6:.0f} million parameters, batches of {figures['batch_size']} points, "
+        f"up to {figures['tokens']} tokens each; {threads}, float32",
+        headline=f"training: {number(figures['ratio'])} times the published loop, "
+        f"{figures['matrix_share']:.0%} of the machine's matrix rate",
+        unit="points per second",
+        rows=(
+            Measurement(
+                label="published loop, training\none point at a time", value=figures["published_points_per_second"],
+                spread=figures["published_spread"], best=figures["published_best"], reference=True,
+            ),
+            Measurement(
+                label="TOTO, training", value=figures["points_per_second"], spread=figures["spread"],
+                best=figures["best"],
+            ),
+            Measurement(
+                label="published loop, inference", value=figures["published_inference_points_per_second"],
+                reference=True,
+            ),
+            Measurement(label="TOTO, inference", value=figures["inference_points_per_second"]),
+        ),
+        notes=(
+            f"inference: {number(figures['inference_ratio'])} times the published loop",
+            f"{number(figures['flops_per_point'] / 1e9)} billion operations per point in training: {number(giga)} "
+            f"billion per second, of {number(figures['matrix_flops_per_second'] / 1e9)} in products of large matrices",
+            f"the published model has {figures['published_parameters'] / 1e6:.0f} million parameters",
+        ),
+        machine=f"{machine_line(figures['machine'])}, torch {figures['torch']}",
+    )  # fmt: skip
+
+
+def machine_line(machine: Figures) -> str:
+    """Returns the machine and versions of a measurement in one line."""
+    return (
+        f"{machine['processor']}, {_count(machine['cores'], 'core')}, {machine['system']}; Python {machine['python']}, "
+        f"numba {machine['numba']}, numpy {machine['numpy']}, highway-env {machine['highway_env']}"
+    )
+
+
+def number(value: float) -> str:
+    """Returns a number with three digits, or rounded to the unit: "0.062", "3.39", "128,571"."""
+    if value >= 100.0:
+        return f"{value:,.0f}"
+    return f"{value:.3g}"
+
+
+def _count(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+# --- Chart ------------------------------------------------------------------------------------------------------------
+
+CHART_WIDTH: Final = 9.0
+"""Width of the chart [inches]."""
+
+CHART_DPI: Final = 150
+"""Resolution of the chart."""
+
+_ROW_HEIGHT, _MARGINS = 0.72, 1.95
+_FONT = "DejaVu Sans"
+_LONGEST_SUBJECT = 115  # characters in a line of 9 points
+
+
+def draw(report: Report, path: Path) -> None:
+    """Draws a report into a PNG file.
+
+    Args:
+        report: the report.
+        path: file to write.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    # imported here: matplotlib is slow to import
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with rc_context({"font.family": _FONT}):
+        rows, notes = _ROW_HEIGHT * len(report.rows), 0.2 * len(report.notes)
+        height = rows + _MARGINS + notes
+        figure = Figure(figsize=(CHART_WIDTH, height), dpi=CHART_DPI, facecolor=SHEET)
+        FigureCanvasAgg(figure)
+        _write_texts(figure, report, height)
+        axes = figure.add_axes(
+            (0.29, (0.83 + 0.2 * len(report.notes)) / height, 0.66, _ROW_HEIGHT * len(report.rows) / height)
+        )
+        _draw_rows(axes, report)
+        figure.savefig(path, format="png")
+
+
+def _write_texts(figure: Figure, report: Report, height: float) -> None:
+    """Writes headline, title and setting above the bars, notes and machine below them."""
+
+    def write(inches: float, text: str, size: float, colour: str, weight: str = "normal") -> None:
+        figure.text(0.03, inches / height, text, va="baseline", fontsize=size, color=colour, weight=weight)
+
+    write(height - 0.42, report.headline[0].upper() + report.headline[1:], 13.5, INK, "bold")
+    subject = f"{report.title} · {report.setting}"
+    write(height - 0.72, subject, min(9.0, 9.0 * _LONGEST_SUBJECT / len(subject)), SOFT)
+    for k, note in enumerate(reversed(report.notes)):
+        write(0.36 + 0.2 * k, note, 8.5, INK)
+    write(0.14, report.machine, 7, SOFT)
+
+
+def _draw_rows(axes: Axes, report: Report) -> None:
+    values = [row.value for row in report.rows]
+    known = [*values, report.mark.value] if report.mark else values
+    places = range(len(values))
+    if report.logarithmic:
+        axes.set_xscale("log")
+        left, right = min(known) / 3.0, max(known) * 12.0
+    else:
+        left, right = 0.0, max(known) * 1.25
+    axes.set_xlim(left, right)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.10g}")
+    colours = [hexadecimal(ROAD if row.reference else CAR) for row in report.rows]
+    if report.logarithmic:  # dots, because the length of a bar would mean nothing: the axis has no zero
+        axes.hlines(list(places), left, right, color=GRID, linewidth=1.0, zorder=1)
+        axes.scatter(values, list(places), s=110, color=colours, zorder=3)
+    else:
+        axes.barh(places, values, height=0.56, color=colours, zorder=2)
+    gap = 10 if report.logarithmic else 6
+    for k, row in enumerate(report.rows):
+        axes.annotate(
+            number(row.value), (row.value, k), xytext=(gap, 0), textcoords="offset points", va="center", fontsize=11,
+            weight="bold", color=colours[k], zorder=4, bbox={"facecolor": SHEET, "edgecolor": "none", "pad": 1.5},
+        )  # fmt: skip
+    if report.mark is not None:
+        axes.axvline(report.mark.value, color=hexadecimal(LIGHT_RED), linewidth=1.4, linestyle=(0, (4, 3)), zorder=3)
+        axes.annotate(
+            report.mark.label, (report.mark.value, 1.0), xycoords=("data", "axes fraction"), xytext=(4, 3),
+            textcoords="offset points", fontsize=8.5, color=hexadecimal(LIGHT_RED),
+        )  # fmt: skip
+    axes.set_yticks(list(places), [row.label for row in report.rows], fontsize=9, color=INK)
+    axes.set_ylim(len(values) - 0.5, -0.5)
+    axes.set_xlabel(report.unit + (" (logarithmic)" if report.logarithmic else ""), fontsize=8.5, color=SOFT)
+    axes.tick_params(axis="x", labelsize=8, colors=SOFT, which="both", length=0)
+    axes.tick_params(axis="y", length=0)
+    axes.grid(axis="x", color="white", linewidth=1.0, zorder=0)
+    axes.set_facecolor(SHEET)
+    for side in axes.spines.values():
+        side.set_visible(False)
