@@ -1,8 +1,7 @@
-"""Sessions of every kind have equal bits with the abilities of other processors, in fresh processes and caches."""
+"""Sessions of every kind have the frozen bits with the abilities of other processors, in fresh processes and caches."""
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import platform
@@ -15,6 +14,7 @@ import pytest
 
 from dorothie_gym.compilation import compiled_folder
 from dorothie_gym.user_cache import CACHE_VARIABLE
+from tests.portability.digests import frozen
 from tests.portability.parts import part_names
 
 ROOT = Path(__file__).parents[2]
@@ -54,23 +54,12 @@ def digests(cache: Path, **variables: str) -> dict[str, dict[str, str]]:
     return found
 
 
-@pytest.fixture
-def reference(tmp_path: Path) -> dict[str, dict[str, str]]:
-    """Digests on this processor as it is, computed once for all workers."""
-    kept = Path(os.environ[CACHE_VARIABLE]) / "digests.json"
-    with kept.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not kept.exists():
-            kept.write_text(json.dumps(digests(tmp_path / "reference")))
-    found: dict[str, dict[str, str]] = json.loads(kept.read_text())
-    return found
-
-
 @pytest.mark.long
 @pytest.mark.timeout(1800)  # machine code for any processor is compiled once
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the settings name abilities of x86-64")
 @pytest.mark.parametrize("name", SETTINGS)
-def test_all_sessions_are_equal(name: str, reference: dict[str, dict[str, str]], tmp_path: Path) -> None:
+def test_all_sessions_are_equal(name: str, tmp_path: Path) -> None:
+    kept = frozen()["parts"]
     found = digests(tmp_path / "cache", **SETTINGS[name])
     assert set(found) <= set(part_names(*PARTS)) and len({part.split("/")[0] for part in found}) >= 8
-    assert {part for part in reference if reference[part] != found[part]} == set()
+    assert {part for part in found if found[part] != kept[part]} == set()
