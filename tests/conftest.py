@@ -36,7 +36,7 @@ UNCOMPILED = frozenset(
 SESSIONS = frozenset(
     [
         "benchmark", "console", "engine", "recording", "rendering", "rollout", "studies", "test_cli_console.py",
-        "test_cli_study.py", "test_routing.py",
+        "test_cli_floods.py", "test_cli_study.py", "test_routing.py",
     ]
 )  # fmt: skip
 """Folders and files whose tests step sessions; those of all others may step batches, too."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from typing import Any, Self
 
-import uvicorn
+from dorothie_gym.console.web_server import web_server
 
 
 class ServedApplication:
-    """Application that uvicorn serves while the context is open.
+    """Application that is served as by the commands while the context is open.
 
     Attributes:
         port: of the server.
@@ -18,15 +19,16 @@ class ServedApplication:
     port: int
 
     def __init__(self, application: Any, port: int = 0, **options: Any) -> None:
-        self.server = uvicorn.Server(uvicorn.Config(application, port=port, log_level="warning", **options))
-        self.thread = threading.Thread(target=self.server.run, daemon=True)
+        self.server = web_server(application, **options)
+        self.listener = socket.create_server(("127.0.0.1", port))
+        self.port = self.listener.getsockname()[1]
+        self.thread = threading.Thread(target=self.server.run, args=([self.listener],), daemon=True)
 
     def __enter__(self) -> Self:
         self.thread.start()
         while not self.server.started:
             assert self.thread.is_alive()
             threading.Event().wait(0.02)
-        self.port = self.server.servers[0].sockets[0].getsockname()[1]
         return self
 
     def __exit__(self, *error: object) -> None:

@@ -10,19 +10,19 @@ from typing import Any, Final, TypeAlias
 
 import msgspec
 from starlette.applications import Starlette
-from starlette.middleware import Middleware
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import FileResponse, RedirectResponse, Response
-from starlette.routing import Mount, Route
-from starlette.staticfiles import StaticFiles
+from starlette.responses import RedirectResponse, Response
+from starlette.routing import Route
 
 from dorothie_gym.annotation.log import Action, Edit, StaleError
 from dorothie_gym.annotation.requests import MAX_BODY, Adopt, Mark, RequestError, Step, decode
 from dorothie_gym.annotation.rows import change_of, utterance_id
 from dorothie_gym.annotation.vocabulary import vocabulary
 from dorothie_gym.annotation.workplace import Seat, SeatKind, Workplace, digest_of
+from dorothie_gym.console.kept_files import KeptFiles
+from dorothie_gym.console.protocols import recognise
 from dorothie_gym.console.server import STATIC as CONSOLE_STATIC
-from dorothie_gym.console.server import SecurityHeaders, is_same_origin
+from dorothie_gym.console.server import is_same_origin, protection
 from dorothie_gym.console.town_page import town_page
 from dorothie_gym.errors import DorothieGymError
 from dorothie_gym.recording.file_names import MAX_FRAME
@@ -68,9 +68,7 @@ class AnnotationServer:
 
     def app(self) -> Starlette:
         """Returns the application."""
-
-        async def index(request: Request) -> Response:
-            return FileResponse(STATIC / "annotate.html")
+        files = KeptFiles(STATIC)
 
         async def root(request: Request) -> Response:
             return RedirectResponse("/annotate")
@@ -78,7 +76,7 @@ class AnnotationServer:
         session = "/api/sessions/{number}"
         routes = [
             Route("/", root),
-            Route("/annotate", index),
+            files.page("/annotate", "annotate.html"),
             self._route("/api/seat", self._greet),
             self._route(session, self._session),
             self._route(f"{session}/town", self._town),
@@ -92,10 +90,10 @@ class AnnotationServer:
             self._route(f"{session}/versions", self._versions),
             self._route(f"{session}/history", self._history),
             self._route(f"{session}/adopt", self._adopt, "POST"),
-            Mount("/static", StaticFiles(directory=CONSOLE_STATIC)),
-            Mount("/annotation", StaticFiles(directory=STATIC)),
+            KeptFiles(CONSOLE_STATIC).route("/static"),
+            files.route("/annotation"),
         ]
-        return Starlette(routes=routes, middleware=[Middleware(SecurityHeaders)])
+        return Starlette(routes=routes, middleware=protection())
 
     def _route(self, path: str, handler: Handler, method: str = "GET") -> Route:
         async def answer(request: Request) -> Response:
@@ -127,6 +125,7 @@ class AnnotationServer:
         seat = self.workplace.seats.get(digest_of(token.strip())) if scheme.lower() == "bearer" else None
         if seat is None:
             raise RefusedError(401, "this link leads to no seat; ask for your link again")
+        recognise(request)
         budget, seen = self._budgets.get(seat.digest, (BURST, time.monotonic()))
         now = time.monotonic()
         budget = min(BURST, budget + RATE * (now - seen))

@@ -72,7 +72,7 @@ def annotate(
         if None in links.values():
             stdout().print("Links given before still work; --new-links replaces them.", soft_wrap=True)
         stdout().print("Marks are saved at once. Ctrl-C ends the server.", soft_wrap=True)
-    serve(AnnotationServer(workplace).app(), listener)
+    serve(AnnotationServer(workplace).app(), listener, host)
 
 
 def _people(annotators: Sequence[str], adjudicator: str | None) -> list[tuple[str, SeatKind]]:

@@ -95,7 +95,7 @@ def console(
         _print_links(links, out)
     with reporting_errors():
         served = Console([room])
-    serve(served.app(), listener)
+    serve(served.app(), listener, host)
 
 
 def _config(

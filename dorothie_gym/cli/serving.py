@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import socket
+import sys
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +22,10 @@ LOCAL = "127.0.0.1"
 
 PORT = 8023
 """Usual port."""
+
+SWITCH_INTERVAL = 0.0005
+"""Time after which a thread that computes lets another one run [s]. The thread of the connections waits so long after
+each call of the system while a session computes: with the usual 5 ms, ten connections delay a picture by 50 ms."""
 
 Host = Annotated[str, typer.Option(help="Address to listen at; by default only this machine reaches it.")]
 Port = Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes a free one.")]
@@ -51,20 +58,16 @@ def address(host: str, port: int) -> str:
     return f"http://{f'[{host}]' if ':' in host else host}:{port}"
 
 
-def serve(app: Starlette, listener: socket.socket) -> None:
-    """Serves an application until Ctrl-C."""
-    import uvicorn
+def serve(app: Starlette, listener: socket.socket, host: str) -> None:
+    """Serves an application until Ctrl-C.
 
-    from dorothie_gym.console.messages import MAX_BYTES
+    Args:
+        app: the application.
+        listener: socket that listens.
+        host: name or address that was given with `--host`.
+    """
+    from dorothie_gym.console.web_server import web_server
 
-    config = uvicorn.Config(
-        app,
-        log_level="warning",
-        access_log=False,
-        ws="websockets-sansio",
-        ws_max_size=2 * MAX_BYTES,
-        ws_per_message_deflate=False,
-        server_header=False,
-        timeout_graceful_shutdown=2,
-    )
-    uvicorn.Server(config).run(sockets=[listener])
+    atexit.register(gc.freeze)  # a last search for garbage would take as long as a session has objects
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    web_server(app, host_names=[host]).run(sockets=[listener])

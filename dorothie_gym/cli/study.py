@@ -116,7 +116,7 @@ def run(
             logging.getLogger("dorothie_gym.studies").setLevel(logging.INFO)
             _print_links(found, link, out)
             stdout().print(f"Experimenter (works once): {experimenter}", soft_wrap=True)
-        serve(server.app(), listener)
+        serve(server.app(), listener, host)
 
 
 def _print_links(found: Study, link: str, out: Path) -> None:

@@ -17,19 +17,22 @@ from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import FileResponse, RedirectResponse, Response
-from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
-from starlette.staticfiles import StaticFiles
+from starlette.responses import RedirectResponse, Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from dorothie_gym.console.connection import CloseCode, Closing, Connection, encode
+from dorothie_gym.console.hosts import ForeignHosts
+from dorothie_gym.console.kept_files import KeptFiles
 from dorothie_gym.console.messages import Join, MessageError, decode_message
 from dorothie_gym.console.pace import run_room
+from dorothie_gym.console.protocols import recognise
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.seat import Seat
 from dorothie_gym.console.spoken_turns import SpokenTurns
 from dorothie_gym.console.town_page import town_page
+from dorothie_gym.dialogue.grammar import load_grammar
 
 logger = logging.getLogger(__name__)
 
@@ -38,8 +41,11 @@ STATIC: Final = Path(__file__).parent / "static"
 JOIN_SECONDS: Final = 10.0
 """Time for the first message of a connection [s]."""
 
-MOST_CONNECTIONS: Final = 500
-"""Most open websockets; more are refused."""
+MOST_JOINING: Final = 400
+"""Most websockets that have not joined yet; when there are more, the one that has waited longest is closed."""
+
+MOST_WATCHING: Final = 500
+"""Most websockets at seats that watch; a seat of a role has one at most, and always has room."""
 
 THREADS: Final = 4
 """Threads for the ticks of all rooms; they share one core, as Python code holds a lock."""
@@ -70,7 +76,8 @@ class Console:
 
     Attributes:
         rooms: rooms that are open.
-        connections: number of open websockets.
+        joining: times of the websockets that have not joined yet, the oldest first.
+        connections: number of websockets that have joined a seat.
 
     Raises:
         SpeechError: people can speak, and the extra `speech` is not installed.
@@ -79,6 +86,7 @@ class Console:
     def __init__(self, rooms: Sequence[Room] = (), *, suspends: bool = False, speech: bool = False) -> None:
         self.rooms = list(rooms)
         self.connections = 0
+        self.joining: dict[asyncio.Timeout, None] = {}
         self._suspends = suspends
         self._tasks: dict[Room, asyncio.Task[None]] = {}
         self._threads: tuple[ThreadPoolExecutor, ThreadPoolExecutor] | None = None
@@ -125,13 +133,11 @@ class Console:
                 yield
 
         routes = [Route("/", root), *self.routes()]
-        return Starlette(routes=routes, lifespan=lifespan, middleware=[Middleware(SecurityHeaders)])
+        return Starlette(routes=routes, lifespan=lifespan, middleware=protection())
 
     def routes(self) -> list[BaseRoute]:
         """Returns the routes of seats, maps, static files and the websocket."""
-
-        async def index(request: Request) -> Response:
-            return FileResponse(STATIC / "index.html")
+        files = KeptFiles(STATIC)
 
         async def town(request: Request) -> Response:
             page = await asyncio.to_thread(self.town_page, request.path_params["name"])
@@ -144,15 +150,16 @@ class Console:
 
         return [
             *([] if self._speech is None else self._speech.routes()),
-            Route("/seat", index),
+            files.page("/seat", "index.html"),
             Route("/towns/{name}.json", town),
             WebSocketRoute("/ws", websocket),
-            Mount("/static", StaticFiles(directory=STATIC)),
+            files.route("/static"),
         ]
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Plays the sessions as long as the block lasts."""
+        load_grammar()  # otherwise the first thing that a script says keeps its session waiting
         with (
             ThreadPoolExecutor(THREADS, thread_name_prefix="tick") as threads,
             ThreadPoolExecutor(1, thread_name_prefix="scene") as builders,
@@ -198,6 +205,11 @@ class SecurityHeaders:
         await self._app(scope, receive, send_with_headers if scope["type"] == "http" else send)
 
 
+def protection() -> list[Middleware]:
+    """Returns what protects the pages of every server: headers, and the refusal of foreign host names."""
+    return [Middleware(SecurityHeaders), Middleware(ForeignHosts)]
+
+
 # --- websocket --------------------------------------------------------------------------------------------------------
 
 
@@ -212,26 +224,26 @@ def is_same_origin(connection: HTTPConnection) -> bool:
 
 async def _serve(console: Console, socket: WebSocket) -> None:
     """Serves one websocket from its first message to its end."""
-    if not is_same_origin(socket) or console.connections >= MOST_CONNECTIONS:
+    if not is_same_origin(socket):
         await socket.close(CloseCode.REFUSED)
         return
     await socket.accept()
-    console.connections += 1
     try:
         found = await _join(console, socket)
         if found is not None:
-            await _talk(*found, socket)
+            await _sit(console, *found, socket)
     except WebSocketDisconnect:
         logger.debug("a connection ended before it had a seat")
-    finally:
-        console.connections -= 1
 
 
 async def _join(console: Console, socket: WebSocket) -> tuple[Room, Seat] | None:
     """Returns room and seat of the first message, or closes the websocket."""
+    text = await _first_text(console, socket)
+    if text is None:
+        return None
     try:
-        message = decode_message(await asyncio.wait_for(_text(socket), JOIN_SECONDS))
-    except (MessageError, TimeoutError):
+        message = decode_message(text)
+    except MessageError:
         await socket.close(CloseCode.REFUSED)
         return None
     found = console.find(message.token) if isinstance(message, Join) else None
@@ -241,6 +253,40 @@ async def _join(console: Console, socket: WebSocket) -> tuple[Room, Seat] | None
         await socket.close(CloseCode.FAILED)
         return None
     return found
+
+
+async def _first_text(console: Console, socket: WebSocket) -> str | None:
+    """Returns the first text, or closes the websocket if it does not come in time, or gives way to newer ones."""
+    loop = asyncio.get_running_loop()
+    while len(console.joining) >= MOST_JOINING:
+        oldest = next(iter(console.joining))
+        del console.joining[oldest]
+        if not oldest.expired():
+            oldest.reschedule(loop.time())
+    text, time = None, asyncio.timeout(JOIN_SECONDS)
+    try:
+        async with time:
+            console.joining[time] = None
+            text = await _text(socket)
+    except TimeoutError:
+        gives_way = time not in console.joining
+        await socket.close(CloseCode.TOO_SLOW if gives_way else CloseCode.REFUSED)
+    finally:
+        console.joining.pop(time, None)
+    return text
+
+
+async def _sit(console: Console, room: Room, seat: Seat, socket: WebSocket) -> None:
+    """Talks to a browser that has joined, if there is room for it."""
+    if seat.role is None and console.connections >= MOST_WATCHING:
+        await socket.close(CloseCode.TOO_SLOW)
+        return
+    recognise(socket)
+    console.connections += 1
+    try:
+        await _talk(room, seat, socket)
+    finally:
+        console.connections -= 1
 
 
 async def _talk(room: Room, seat: Seat, socket: WebSocket) -> None:

@@ -18,6 +18,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from dorothie_gym.audio import SAMPLE_RATE, encode_flac, encode_wav
+from dorothie_gym.console.protocols import recognise
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.seat import Seat
 from dorothie_gym.ontology.roles import Role
@@ -100,6 +101,7 @@ class SpokenTurns:
         found = self._find(token) if kind.lower() == "bearer" else None
         if found is None or found[1].role not in PITCHES:
             raise HTTPException(403, "no seat that talks has this secret")
+        recognise(request)
         return found
 
 

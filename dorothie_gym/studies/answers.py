@@ -35,16 +35,29 @@ def refusal(status: int, reason: str, retry: int | None = None) -> Response:
     return refused
 
 
+def cookie_name(request: Request, name: str) -> str:
+    """Returns the name of a cookie with the port that the browser has used, as browsers share cookies among ports.
+
+    Args:
+        request: the request; a host without a port, such as that of a proxy, has no other server.
+        name: name without the port.
+    """
+    port = request.headers.get("host", "").rpartition(":")[2]
+    return f"{name}_{port}" if port.isascii() and port.isdigit() and len(port) < 6 else name
+
+
 def set_secret(to: Response, request: Request, name: str, secret: str, seconds: int | None, path: str = "/") -> None:
     """Adds a cookie with a secret that scripts of pages cannot read and pages of other hosts do not send.
 
     Args:
         to: the answer.
-        request: the request, whose scheme says whether the cookie needs TLS.
-        name: name of the cookie.
+        request: the request, whose page says whether the cookie needs TLS.
+        name: name of the cookie, without the port.
         secret: its value.
         seconds: how long browsers keep it [s]; None: until they are closed.
         path: beginning of the paths to which it is sent.
     """
-    secure = request.url.scheme == "https"
-    to.set_cookie(name, secret, max_age=seconds, path=path, httponly=True, samesite="strict", secure=secure)
+    secure = request.url.scheme == "https" or request.headers.get("origin", "").startswith("https:")
+    to.set_cookie(
+        cookie_name(request, name), secret, max_age=seconds, path=path, httponly=True, samesite="strict", secure=secure
+    )

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import Response
 from starlette.routing import Route
 
+from dorothie_gym.console.kept_files import KeptFiles
 from dorothie_gym.console.seat import EXPERIMENTER, RoomState
 from dorothie_gym.studies import requests as r
-from dorothie_gym.studies.answers import answer, refusal, set_secret
+from dorothie_gym.studies.answers import answer, cookie_name, refusal, set_secret
 from dorothie_gym.studies.entrance import Entrance
 from dorothie_gym.studies.open_rooms import OpenRoom
 from dorothie_gym.studies.progress import Progress
@@ -27,9 +28,6 @@ COOKIE: Final = "dorothie_experimenter"
 
 PATH: Final = "/study/experimenter"
 """Beginning of the paths of the experimenter's requests, to which alone the cookie is sent."""
-
-MAX_BYTES: Final = 16 * 1024
-"""Largest body of a request [bytes]."""
 
 Handler = Callable[[Request], Awaitable[Response]]
 
@@ -57,12 +55,8 @@ class Experimenter:
         Args:
             guarded: refuses requests of other pages, too many ones, and malformed ones.
         """
-
-        async def page(request: Request) -> Response:
-            return FileResponse(STATIC / "experimenter.html")
-
         return [
-            Route("/experimenter", page),
+            KeptFiles(STATIC).page("/experimenter", "experimenter.html"),
             Route(f"{PATH}/enter", guarded(self._enter), methods=["POST"]),
             Route(f"{PATH}/overview", guarded(self._overview), methods=["POST"]),
             Route(f"{PATH}/readmit", guarded(self._readmit), methods=["POST"]),
@@ -70,11 +64,11 @@ class Experimenter:
 
     def is_known(self, request: Request) -> bool:
         """Returns whether a request comes from the browser that the link has admitted."""
-        given = request.cookies.get(COOKIE)
+        given = request.cookies.get(cookie_name(request, COOKIE))
         return bool(given) and self._browser is not None and secrets.compare_digest(digest(str(given)), self._browser)
 
     async def _enter(self, request: Request) -> Response:
-        body = await r.read_body(request, r.Enter, MAX_BYTES)
+        body = r.read_body(request, r.Enter)
         if self.is_known(request):
             return answer(self.overview())
         if not self._unused or not secrets.compare_digest(digest(body.token), digest(self.token)):
@@ -89,12 +83,12 @@ class Experimenter:
         return entered
 
     async def _overview(self, request: Request) -> Response:
-        await r.read_body(request, r.Overview, MAX_BYTES)
+        r.read_body(request, r.Overview)
         return answer(self.overview()) if self.is_known(request) else refusal(401, "Open the link of the experimenter.")
 
     async def _readmit(self, request: Request) -> Response:
         """Answers with the token of a link with which a person goes on in another browser, once."""
-        body = await r.read_body(request, r.Readmit, MAX_BYTES)
+        body = r.read_body(request, r.Readmit)
         if not self.is_known(request):
             return refusal(401, "Open the link of the experimenter.")
         token = self._entrance.readmit(body.participant.strip())

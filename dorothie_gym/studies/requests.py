@@ -101,16 +101,15 @@ class Withdraw(Body, frozen=True):
 _T = TypeVar("_T", bound=Body)
 
 
-async def read_body(request: Request, kind: type[_T], limit: int) -> _T:
-    """Returns the body of a request.
+async def receive_body(request: Request, limit: int) -> None:
+    """Receives the body of a request for `read_body`.
 
     Args:
         request: the request.
-        kind: type of the body.
         limit: largest size [bytes]; no more is read.
 
     Raises:
-        BodyError: it is too large, not sent as JSON, or malformed.
+        BodyError: it is too large, not sent as JSON, or not complete.
     """
     if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
         raise BodyError(415, "The body must be JSON.")
@@ -122,7 +121,20 @@ async def read_body(request: Request, kind: type[_T], limit: int) -> _T:
                 raise BodyError(413, "The request is too large.")
     except ClientDisconnect:
         raise BodyError(400, "The request was not complete.") from None
+    request.state.body = bytes(content)
+
+
+def read_body(request: Request, kind: type[_T]) -> _T:
+    """Returns the body of a request that was received.
+
+    Args:
+        request: the request.
+        kind: type of the body.
+
+    Raises:
+        BodyError: it is malformed.
+    """
     try:
-        return msgspec.json.decode(bytes(content), type=kind)
+        return msgspec.json.decode(request.state.body, type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         raise BodyError(400, "The request is malformed.") from None

@@ -12,16 +12,17 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from starlette.applications import Starlette
-from starlette.middleware import Middleware
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
-from starlette.routing import Mount, Route
-from starlette.staticfiles import StaticFiles
+from starlette.responses import Response
+from starlette.routing import Route
 
+from dorothie_gym.console.kept_files import KeptFiles
+from dorothie_gym.console.protocols import recognise
 from dorothie_gym.console.rate_limit import TokenBucket
-from dorothie_gym.console.server import Console, SecurityHeaders, is_same_origin
+from dorothie_gym.console.server import Console, is_same_origin, protection
+from dorothie_gym.console.visitors import network_of
 from dorothie_gym.studies import requests as r
-from dorothie_gym.studies.answers import answer, refusal, set_secret
+from dorothie_gym.studies.answers import answer, cookie_name, refusal, set_secret
 from dorothie_gym.studies.database import StorageError
 from dorothie_gym.studies.entrance import Entrance
 from dorothie_gym.studies.experimenter import Experimenter
@@ -43,7 +44,7 @@ _T = TypeVar("_T", bound=r.Body)
 STATIC: Final = Path(__file__).parent / "static"
 
 COOKIE: Final = "dorothie_study"
-"""Cookie with the secret of a participant's browser; scripts of pages cannot read it."""
+"""Cookie with the secret of a participant's browser (see `answers.cookie_name`); scripts of pages cannot read it."""
 
 COOKIE_SECONDS: Final = 14 * 86400
 
@@ -111,9 +112,7 @@ class StudyServer:
 
     def app(self) -> Starlette:
         """Returns the application, which plays the study while it runs."""
-
-        async def page(request: Request) -> Response:
-            return FileResponse(STATIC / "study.html")
+        files = KeptFiles(STATIC)
 
         @contextlib.asynccontextmanager
         async def lifespan(app: Starlette) -> AsyncIterator[None]:
@@ -133,13 +132,13 @@ class StudyServer:
             "proceed": self._proceed, "wait": self._wait, "withdraw": self._withdraw,
         }  # fmt: skip
         routes = [
-            Route("/", page),
+            files.page("/", "study.html"),
             *(Route(f"/study/{name}", self._guarded(run), methods=["POST"]) for name, run in actions.items()),
             *self.experimenter.routes(self._guarded),
-            Mount("/study-static", StaticFiles(directory=STATIC)),
+            files.route("/study-static"),
             *self.console.routes(),
         ]
-        return Starlette(routes=routes, lifespan=lifespan, middleware=[Middleware(SecurityHeaders)])
+        return Starlette(routes=routes, lifespan=lifespan, middleware=protection())
 
     async def _supervise(self) -> None:
         """Pairs people, notes the ends of sessions, and deletes people who did not decide to take part."""
@@ -174,9 +173,13 @@ class StudyServer:
                 return refusal(403, "This page belongs to another server.")
             person = self._person(request)
             known = person.id if person else "experimenter" if self.experimenter.is_known(request) else None
-            if not self._admits(known or (request.client.host if request.client else ""), known is not None):
-                return refusal(429, "Many requests are coming in. Please wait a moment.", RETRY_SECONDS)
+            if known is not None:
+                recognise(request)
+            address = network_of(request.client.host if request.client else None)
             try:
+                await r.receive_body(request, MAX_BYTES)  # those that never end would count for others at an address
+                if not self._admits(known or address, known is not None):
+                    return refusal(429, "Many requests are coming in. Please wait a moment.", RETRY_SECONDS)
                 return await run(request)
             except r.BodyError as error:
                 return refusal(error.status, str(error))
@@ -198,14 +201,14 @@ class StudyServer:
         return bucket.admits(time.monotonic())
 
     def _person(self, request: Request) -> Participant | None:
-        secret = request.cookies.get(COOKIE)
+        secret = request.cookies.get(cookie_name(request, COOKIE))
         name = None if not secret else self._records.find_secret(secret)
         return None if name is None or name in self._withdrawing else self._records.participant(name)
 
-    async def _read(self, request: Request, kind: type[_T]) -> tuple[Participant, _T]:
+    def _read(self, request: Request, kind: type[_T]) -> tuple[Participant, _T]:
         """Returns the participant and the body of a request."""
-        body = await r.read_body(request, kind, MAX_BYTES)
-        person = self._person(request)  # after the body has come, which may take long
+        body = r.read_body(request, kind)
+        person = self._person(request)  # again, as the body may have taken long to come
         if person is None:
             raise _NobodyError
         self._presence.see(person.id)
@@ -218,7 +221,7 @@ class StudyServer:
         return answer(entrance_view(self.progress) if found is None else participant_view(self.progress, found))
 
     async def _join(self, request: Request) -> Response:
-        body = await r.read_body(request, r.Join, MAX_BYTES)
+        body = r.read_body(request, r.Join)
         person, given = self._person(request), (body.parameters, body.invitation)
         if person is not None and not self.entrance.is_other_person(person.id, *given):
             return self._view(person)
@@ -235,7 +238,7 @@ class StudyServer:
 
     async def _news(self, request: Request) -> Response:
         """Answers with the view of a participant as soon as it differs from the one that the browser has."""
-        person, body = await self._read(request, r.News)
+        person, body = self._read(request, r.News)
         if time.time() - person.seen > 60.0:
             self._records.see(person.id)
         end = time.monotonic() + NEWS_SECONDS
@@ -253,27 +256,27 @@ class StudyServer:
                     return news
 
     async def _consent(self, request: Request) -> Response:
-        person, body = await self._read(request, r.Consent)
+        person, body = self._read(request, r.Consent)
         if body.agreed is None:
             self.progress.decline(person)
-            return _farewell(self.progress.study.texts.declined, again=True)
+            return _farewell(request, self.progress.study.texts.declined, again=True)
         self.progress.consent(person, body.agreed)
         return self._view(person)
 
     async def _answers(self, request: Request) -> Response:
-        person, body = await self._read(request, r.Answers)
+        person, body = self._read(request, r.Answers)
         self.progress.answer(person, body.stage, body.answers)
         return self._view(person)
 
     async def _proceed(self, request: Request) -> Response:
-        person, body = await self._read(request, r.Proceed)
+        person, body = self._read(request, r.Proceed)
         if body.role is not None and body.role is not person.role:
             raise RefusedError("Your role has just changed. Please read the new instructions.")
         self.progress.proceed(person, body.stage)
         return self._view(person)
 
     async def _wait(self, request: Request) -> Response:
-        person, body = await self._read(request, r.Wait)
+        person, body = self._read(request, r.Wait)
         if body.on:
             self.progress.waiting.wait_on(person)
         else:
@@ -281,7 +284,7 @@ class StudyServer:
         return self._view(person)
 
     async def _withdraw(self, request: Request) -> Response:
-        person, body = await self._read(request, r.Withdraw)
+        person, body = self._read(request, r.Withdraw)
         if not body.sure:
             raise RefusedError("Please confirm that you want to withdraw.")
         self._withdrawing.add(person.id)
@@ -291,7 +294,7 @@ class StudyServer:
             self._withdrawing.discard(person.id)
         self._presence.tell()
         study = self.progress.study
-        return _farewell(study.texts.withdrawn if clean else _NOT_YET.format(study.contact))
+        return _farewell(request, study.texts.withdrawn if clean else _NOT_YET.format(study.contact))
 
 
 _NOT_YET: Final = (
@@ -304,8 +307,8 @@ class _NobodyError(Exception):
     """A request needs a participant and has none."""
 
 
-def _farewell(text: str, *, again: bool = False) -> Response:
+def _farewell(request: Request, text: str, *, again: bool = False) -> Response:
     """Answers a person whose data have been deleted; `again` says whether the page offers to begin anew."""
     gone = answer({"gone": text, "again": again})
-    gone.delete_cookie(COOKIE, httponly=True, samesite="strict")
+    gone.delete_cookie(cookie_name(request, COOKIE), httponly=True, samesite="strict")
     return gone

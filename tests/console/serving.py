@@ -11,7 +11,6 @@ from typing import Any
 
 import websockets.sync.client as sockets
 
-from dorothie_gym.console.messages import MAX_BYTES
 from dorothie_gym.console.room import Room
 from dorothie_gym.console.server import Console
 from tests.served_application import ServedApplication
@@ -20,9 +19,9 @@ from tests.served_application import ServedApplication
 class Served(ServedApplication):
     """Console that runs on a free port in a thread."""
 
-    def __init__(self, room: Room) -> None:
+    def __init__(self, room: Room, **options: Any) -> None:
         self.room, self.console = room, Console([room])
-        super().__init__(self.console.app(), ws="websockets-sansio", ws_max_size=2 * MAX_BYTES)
+        super().__init__(self.console.app(), **options)
 
     def get(self, path: str) -> tuple[int, Any, bytes]:
         try:

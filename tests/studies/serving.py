@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -12,10 +13,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import uvicorn
 import websockets.sync.client as sockets
 
-from dorothie_gym.console.messages import MAX_BYTES
+from dorothie_gym.console.web_server import WebServer, web_server
 from dorothie_gym.studies.folder import running_study
 from dorothie_gym.studies.server import StudyServer
 
@@ -27,7 +27,7 @@ class ServedStudy:
         self.file, self.data = file, data
         self.port = 0
         self.study: StudyServer | None = None
-        self._server: uvicorn.Server | None = None
+        self._server: WebServer | None = None
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -35,12 +35,10 @@ class ServedStudy:
         try:
             with running_study(self.file, self.data) as (study, records):  # SQLite belongs to one thread
                 self.study = StudyServer(study, self.file.parent, records)
-                config = uvicorn.Config(
-                    self.study.app(), port=self.port, log_level="warning", ws="websockets-sansio",
-                    ws_max_size=2 * MAX_BYTES, timeout_graceful_shutdown=1,
-                )  # fmt: skip
-                self._server = uvicorn.Server(config)
-                self._server.run()
+                self._server = web_server(self.study.app(), timeout_graceful_shutdown=1)
+                listener = socket.create_server(("127.0.0.1", self.port))
+                self.port = listener.getsockname()[1]
+                self._server.run([listener])
         except BaseException as error:
             self._failure = error
             raise
@@ -50,7 +48,6 @@ class ServedStudy:
         while self._server is None or not self._server.started:
             assert self._thread.is_alive(), self._failure
             time.sleep(0.02)
-        self.port = self._server.servers[0].sockets[0].getsockname()[1]
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -68,11 +65,21 @@ class Client:
     """Person without a browser, who sends the requests of the page."""
 
     def __init__(self, port: int) -> None:
-        self.port, self.cookie, self.tag = port, "", ""
+        self._port, self.cookie, self.tag = port, "", ""
         self.view: dict[str, Any] = {}
         self.answer: dict[str, Any] = {}
         self.received = b""
         self.headers: dict[str, str] = {}
+
+    @property
+    def port(self) -> int:
+        """Port of the server; a cookie that has it in its name is for the next server if that is another one."""
+        return self._port
+
+    @port.setter
+    def port(self, port: int) -> None:
+        self.cookie = self.cookie.replace(f"_{self._port}=", f"_{port}=")
+        self._port = port
 
     def send(self, method: str, path: str, body: bytes | None = None, headers: dict[str, str] | None = None) -> Any:
         """Returns status, headers and content of an answer."""

@@ -50,7 +50,7 @@ def test_the_link_admits_one_browser_and_nobody_else(tmp_path: Path) -> None:
         participant = Client(served.port)
         participant.do("join")
         assert participant.post("experimenter/overview") == 401
-        assert first.cookie.startswith("dorothie_experimenter=") and token not in first.cookie
+        assert first.cookie.startswith(f"dorothie_experimenter_{first.port}=") and token not in first.cookie
         first.cookie = f"{first.cookie}x"
         assert first.post("experimenter/overview") == 401
         status, headers, _ = first.send("GET", "/experimenter")

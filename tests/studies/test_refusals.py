@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import random
 import socket
@@ -43,10 +44,11 @@ def person(served: ServedStudy, monkeypatch: pytest.MonkeyPatch) -> Client:
 def test_strangers_and_wrong_cookies_learn_nothing(served: ServedStudy, person: Client) -> None:
     for cookie in (
         "",
-        "dorothie_study=",
-        "dorothie_study=nonsense",
+        f"dorothie_study_{served.port}=",
+        f"dorothie_study_{served.port}=nonsense",
+        f"dorothie_study={person.cookie.partition('=')[2]}",
         f"other={person.cookie}",
-        "dorothie_study=\xff\xfe",
+        f"dorothie_study_{served.port}=\xff\xfe",
     ):
         stranger = Client(served.port)
         stranger.cookie = cookie
@@ -123,6 +125,44 @@ def test_answers_forbid_foreign_content_and_are_not_stored(person: Client) -> No
     assert {"HttpOnly", "SameSite=strict"} <= set(headers["Set-Cookie"].split("; "))
 
 
+def test_two_studies_on_one_machine_do_not_take_each_others_cookies(tmp_path: Path) -> None:
+    with (
+        ServedStudy(write_study(tmp_path, SOLO), tmp_path / "one") as one,
+        ServedStudy(write_study(tmp_path, SOLO), tmp_path / "two") as two,
+    ):
+        people = Client(one.port), Client(two.port)
+        for person in people:
+            person.do("join")
+        names = {person.cookie.partition("=")[0] for person in people}
+        assert names == {f"dorothie_study_{one.port}", f"dorothie_study_{two.port}"}
+        both = "; ".join(person.cookie for person in people)  # browsers send the cookies of all ports
+        for person in people:
+            person.cookie = both
+            person.do("news")
+
+
+def test_pages_of_a_foreign_name_that_points_to_the_server_may_not_join(served: ServedStudy) -> None:
+    for host, status in ((f"rebound.example.com:{served.port}", 403), (f"127.0.0.1:{served.port}", 200)):
+        stranger = Client(served.port)
+        headers = {**JSON, "Host": host, "Origin": f"http://{host}"}
+        assert stranger.send("POST", "/study/join", b"{}", headers)[0] == status
+
+
+def test_forwarded_addresses_are_believed_from_configured_proxies_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for proxy, believed in (("", False), ("127.0.0.1", True)):
+        monkeypatch.setenv("FORWARDED_ALLOW_IPS", proxy)
+        with ServedStudy(write_study(tmp_path, SOLO), tmp_path / f"data{proxy}") as served:
+            for forwarded in ("203.0.113.5", "2001:db8::1", "2001:db8::2", "x" * 5000):
+                person = Client(served.port)
+                person.headers = {"X-Forwarded-For": forwarded}
+                person.do("join")
+            assert served.study is not None
+            addresses = {"203.0.113.5", "2001:db8::/64", ""} if believed else {"127.0.0.1"}
+            assert set(served.study._buckets) == addresses
+
+
 def test_floods_are_refused(served: ServedStudy, person: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dorothie_gym.studies.server.REQUESTS", (REQUESTS[0], 0.0))  # also on a slow machine
     person.do("consent", {"agreed": [True, True]})
@@ -135,6 +175,19 @@ def test_entries_of_one_address_are_limited(tmp_path: Path, monkeypatch: pytest.
     with ServedStudy(write_study(tmp_path, SOLO), tmp_path / "data") as served:
         statuses = [Client(served.port).post("join") for _ in range(int(ENTRIES[0]) + 40)]
         assert statuses[0] == 200 and statuses[-1] == 429
+
+
+def test_requests_that_never_end_do_not_count_for_others_at_their_address(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dorothie_gym.studies.server.ENTRIES", (5, 0.0))
+    head = b"POST /study/join HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n{"
+    with ServedStudy(write_study(tmp_path, SOLO), tmp_path / "data") as served, contextlib.ExitStack() as stack:
+        for _ in range(20):
+            stack.enter_context(socket.create_connection(("127.0.0.1", served.port))).sendall(head)
+        for _ in range(5):
+            Client(served.port).do("join")
+        assert Client(served.port).post("join") == 429
 
 
 VALUES = [None, True, 0, -1, 2**70, 1.5, "", "a" * 5000, "\x00", "../..", [], {}, [[]] * 40, {"a": {"a": {}}}]
