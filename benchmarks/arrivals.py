@@ -16,7 +16,7 @@ import heapq
 import json
 import tempfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -29,7 +29,7 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.studies.assignment import Assigner, Candidate, changed_role, match, needed_role
 from dorothie_gym.studies.stages import Stage
 from dorothie_gym.studies.study_file import read_study
-from dorothie_gym.studies.waiting_room import CERTAINTY, GONE_SECONDS
+from dorothie_gym.studies.waiting_room import CERTAINTY, GONE_SECONDS, MOVABLE
 
 PAGES: Final = {
     Stage.CONSENT: (30.0, 120.0), Stage.BEFORE: (40.0, 150.0), Stage.INSTRUCTIONS: (40.0, 120.0),
@@ -70,6 +70,7 @@ class Visitor:
         role: role; None before.
         ticket: number by which roles were given formerly.
         done: whether the person plays, or has waited in vain.
+        turn: number of changes of the role; entries that were planned before one do not happen.
     """
 
     number: int
@@ -79,6 +80,7 @@ class Visitor:
     role: Role | None = None
     ticket: int | None = None
     done: bool = False
+    turn: int = 0
 
     def is_there(self, now: float, patience: float) -> bool:
         """Returns whether the person counts as present, who has left for less than `patience` [s]."""
@@ -92,7 +94,7 @@ class Outcome:
     Attributes:
         played: people who played.
         in_vain: people who waited in vain.
-        changed: changes of a role during the instructions.
+        changed: changes of a role before the waiting room.
         conditions: groups of each condition.
         imbalance: largest difference between the conditions when a group began.
     """
@@ -130,14 +132,13 @@ class Arrivals:
         self.visitors: list[Visitor] = []
         self._order, self._events = count(), list[tuple[float, int, Callable[[float], None]]]()
         drawn, now = np.random.default_rng(seed), 0.0
+        self._again = np.random.default_rng([seed, 1])
         for number in range(people):
             times = [drawn.uniform(*PAGES[stage]) for stage in PAGES]
             leaves = now + drawn.uniform(0.0, sum(times)) if drawn.random() < drop_out else np.inf
             visitor = Visitor(number, leaves)
             self.visitors.append(visitor)
-            ends = now + np.cumsum(times)
-            for stage, end in zip([*list(PAGES)[1:], Stage.LOBBY], ends, strict=True):
-                self._at(end, lambda at, visitor=visitor, stage=stage: self._enter(visitor, stage, at))  # type: ignore[misc]
+            self._plan(visitor, now, times)
             if np.isfinite(leaves):
                 self._at(leaves + GONE_SECONDS + 0.1, self._mend)
             now += drawn.exponential(every)
@@ -151,6 +152,12 @@ class Arrivals:
 
     def _at(self, now: float, happen: Callable[[float], None]) -> None:
         heapq.heappush(self._events, (now, next(self._order), happen))
+
+    def _plan(self, visitor: Visitor, now: float, times: Sequence[float]) -> None:
+        """Plans when a person enters the waiting room, and the last pages before it, after times at the pages [s]."""
+        turn, ends = visitor.turn, now + np.cumsum(times)
+        for stage, end in zip([*PAGES, Stage.LOBBY][-len(times) :], ends, strict=True):
+            self._at(end, lambda at, stage=stage: visitor.turn == turn and self._enter(visitor, stage, at))  # type: ignore[misc]
 
     def _enter(self, visitor: Visitor, stage: Stage, now: float) -> None:
         if visitor.done or now >= visitor.leaves:
@@ -178,7 +185,7 @@ class Arrivals:
         return [
             Candidate(
                 name=str(each.number), role=each.role or Role.PARTICIPANT, certainty=CERTAINTY[each.stage],
-                movable=each.stage is Stage.INSTRUCTIONS,
+                movable=each.stage in MOVABLE,
             )
             for each in found
         ]  # fmt: skip
@@ -186,7 +193,9 @@ class Arrivals:
     def _mend(self, now: float) -> None:
         change = changed_role(self.assigner, self._there(now), self.taken) if self.way == "package" else None
         if change is not None:
-            self.visitors[int(change[0].name)].role = change[1]
+            visitor = self.visitors[int(change[0].name)]
+            visitor.role, visitor.stage, visitor.since, visitor.turn = change[1], MOVABLE[0], now, visitor.turn + 1
+            self._plan(visitor, now, [self._again.uniform(*PAGES[stage]) for stage in MOVABLE])
             self.outcome.changed += 1
 
     def _pair(self, now: float) -> None:
@@ -212,9 +221,16 @@ class Arrivals:
             self.outcome.in_vain += 1
 
 
-def measure(way: str, studies: int, **settings: Any) -> dict[str, float]:
-    """Returns means over simulated studies: share who waited in vain, changes of a role, largest imbalance."""
-    outcomes = [Arrivals(way, seed=seed, **settings).run() for seed in range(studies)]
+def measure(way: str, studies: int, *, seed: int = 0, **settings: Any) -> dict[str, float]:
+    """Returns means over simulated studies: share who waited in vain, changes of a role, largest imbalance.
+
+    Args:
+        way: one of `WAYS`.
+        studies: number of studies.
+        seed: seed of the first one; each further one has the next number.
+        **settings: see `Arrivals`.
+    """
+    outcomes = [Arrivals(way, seed=seed + k, **settings).run() for k in range(studies)]
     return {
         "in_vain": round(float(np.mean([each.share_in_vain for each in outcomes])), 4),
         "changed": round(float(np.mean([each.changed for each in outcomes])), 2),
@@ -226,12 +242,15 @@ def main() -> None:
     """Prints the figures of each way."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--studies", type=int, default=100, help="number of simulated studies")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="seed of the first study; each further one has the next one"
+    )
     parser.add_argument("--people", type=int, default=200)
     parser.add_argument("--every", type=float, default=90.0, help="mean time between two arrivals [s]")
     parser.add_argument("--drop-out", type=float, default=0.3)
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
-    settings = {"people": asked.people, "every": asked.every, "drop_out": asked.drop_out}
+    settings = {"seed": asked.seed, "people": asked.people, "every": asked.every, "drop_out": asked.drop_out}
     found = {way: measure(way, asked.studies, **settings) for way in WAYS}
     if asked.json:
         print(json.dumps(found))

@@ -12,7 +12,7 @@ from msgspec import Meta, Struct
 from dorothie_gym.annotation.log_file import check_place
 from dorothie_gym.annotation.workplace import Seat, SeatKind
 from dorothie_gym.errors import AnnotationError, one_line
-from dorothie_gym.files import write_atomically
+from dorothie_gym.files import make_folder, write_atomically
 from dorothie_gym.input_files import MAX_SMALL_JSON, raising, read_file
 from dorothie_gym.recording.file_names import ANNOTATIONS_FOLDER
 
@@ -97,5 +97,5 @@ def keep_links(root: Path, seats: Sequence[Seat], *, renew: bool = False) -> Non
     check_place(path)
     if links == before:
         return
-    path.parent.mkdir(exist_ok=True)
+    make_folder(path.parent)
     write_atomically(path, msgspec.json.encode(LinksPage(LINKS_VERSION, links)) + b"\n", shared=True, mode=0o600)

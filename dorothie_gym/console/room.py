@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import secrets
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -32,6 +33,8 @@ from dorothie_gym.recording.events import EndReason
 from dorothie_gym.recording.seat_log import SeatEvent, SeatEventKind
 from dorothie_gym.rollout.replay import recorded_actions
 from dorothie_gym.spaces.actions import ActionMapping
+
+logger = logging.getLogger(__name__)
 
 
 class Room:
@@ -164,9 +167,12 @@ class Room:
 
     def fail(self) -> list[Outgoing]:
         """Gives the session up after an error of the program; its record stays as it was at the last decision."""
-        if self.record is not None:
-            self.record.close()
         self.state, self.failed = RoomState.OVER, True
+        if self.record is not None:
+            try:
+                self.record.close()
+            except OSError as error:  # the disk is full, say: people must learn all the same that the session is over
+                logger.warning("the record of a session that failed could not be closed: %s", error)
         return [Outgoing(each, code=CloseCode.FAILED) for seat in self._all() for each in seat.connections]
 
     def shut_down(self) -> list[Outgoing]:

@@ -103,8 +103,10 @@ class RoomRecord:
         """Closes the record of a session that is not over; it stays incomplete."""
         with self._open:
             self._closed = True
-        self._writer.close()
-        self._log.close()
+        try:
+            self._writer.close()
+        finally:
+            self._log.close()
 
 
 def free_folder(parent: Path, name: str) -> Path:

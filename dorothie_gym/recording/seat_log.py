@@ -133,9 +133,11 @@ class SeatLogWriter:
 
     def close(self) -> None:
         """Closes the file, which is then on the disk; may be called again."""
-        if not self._file.closed:
-            os.fsync(self._file.fileno())
-        self._file.close()
+        try:
+            if not self._file.closed:
+                os.fsync(self._file.fileno())
+        finally:
+            self._file.close()
 
     def __enter__(self) -> Self:
         return self

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -191,10 +192,10 @@ class SessionWriter:
 
     def close(self) -> None:
         """Closes the files; an unfinished session stays incomplete. May be called again."""
-        self._events.close()
-        self._journal.close()
-        if self._decisions is not None:
-            self._decisions.close()
+        with contextlib.ExitStack() as closing:  # all of them, also on a disk that fails
+            for file in (self._events, self._journal, self._decisions):
+                if file is not None:
+                    closing.callback(file.close)
 
     def __enter__(self) -> Self:
         return self

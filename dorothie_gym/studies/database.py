@@ -20,6 +20,9 @@ from dorothie_gym.errors import SessionError
 BUSY_SECONDS: Final = 10.0
 """Time that a command waits for the server, or the server for a command [s]."""
 
+LOCK_FILE: Final = "run.lock"
+"""Empty file by which one process at a time has a study folder."""
+
 
 _PRAGMAS: Final = (
     "journal_mode=DELETE", "synchronous=FULL", "secure_delete=ON", "foreign_keys=ON", "temp_store=MEMORY",
@@ -132,7 +135,7 @@ class RunLock:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._connection = sqlite3.connect(folder / "run.lock", timeout=0.0, isolation_level=None)
+        self._connection = sqlite3.connect(folder / LOCK_FILE, timeout=0.0, isolation_level=None)
         try:
             self._connection.execute("BEGIN EXCLUSIVE")
         except sqlite3.OperationalError:

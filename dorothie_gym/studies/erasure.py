@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
+from dorothie_gym.files import sync
 from dorothie_gym.studies.database import StorageError
 from dorothie_gym.studies.record_types import SESSIONS_FOLDER
 from dorothie_gym.studies.records import WITHDRAWN, StudyRecords
@@ -124,11 +125,7 @@ def _forget_platform_ids(records: StudyRecords) -> None:
 
 def _note_removal(records: StudyRecords, session: str) -> None:
     """Notes that nothing of a session is left, once this is durable."""
-    folder = os.open(records.folder / SESSIONS_FOLDER, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    sync(records.folder / SESSIONS_FOLDER)
     records.erased(session)
 
 

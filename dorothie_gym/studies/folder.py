@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.files import write_atomically
-from dorothie_gym.studies.database import RunLock
+from dorothie_gym.files import PART, write_atomically
+from dorothie_gym.studies.database import LOCK_FILE, RunLock
 from dorothie_gym.studies.record_types import DATABASE_FILE, STUDY_FILE
 from dorothie_gym.studies.records import StudyRecords
 from dorothie_gym.studies.study import Study
@@ -17,6 +17,9 @@ from dorothie_gym.studies.study_file import MAX_STUDY, read_study
 
 FIXED: Final = ("conditions", "scenarios", "questionnaires", "assignment", "session")
 """Parts of a study that may not change while data are collected."""
+
+_BEGUN: Final = (LOCK_FILE, STUDY_FILE + PART)
+"""Files in the folder of a server that died before it had copied the study file."""
 
 
 @contextlib.contextmanager
@@ -33,19 +36,19 @@ def running_study(file: Path, folder: Path) -> Iterator[tuple[Study, StudyRecord
     """
     study = read_study(file)
     copy = folder / STUDY_FILE
-    if folder.exists() and not copy.exists() and any(folder.iterdir()):
+    if folder.exists() and not copy.exists() and any(each.name not in _BEGUN for each in folder.iterdir()):
         raise SessionError(f"{folder}: holds something else than a study; choose a new or an empty folder")
-    with open_study(folder, create=True) as records:
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with contextlib.closing(RunLock(folder)):
         _keep(study, file, copy)
-        yield study, records
+        with contextlib.closing(StudyRecords(folder)) as records:
+            yield study, records
 
 
 @contextlib.contextmanager
-def open_study(folder: Path, *, create: bool = False) -> Iterator[StudyRecords]:
+def open_study(folder: Path) -> Iterator[StudyRecords]:
     """Yields the records of a study for changes, while no server runs; errors as of `running_study`."""
-    if not create:
-        check_folder(folder)
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    check_folder(folder)
     with contextlib.closing(RunLock(folder)), contextlib.closing(StudyRecords(folder)) as records:
         yield records
 

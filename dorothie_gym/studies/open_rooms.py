@@ -150,8 +150,9 @@ class OpenRooms:
             if row is not None and place.resumes and room.record is not None:
                 self._records.set_folder(row.id, room.record.folder.name)
                 remove_attempts(self._records, row.id, keep=room.record.folder.name)
-        place.ready.set()
-        self._changed()
+        finally:  # also if none of this could be noted
+            place.ready.set()
+            self._changed()
 
     def token(self, place: OpenRoom, name: str) -> str | None:
         """Returns the token of a participant's seat; None while the room is being built."""

@@ -124,8 +124,8 @@ class StudyRecords:
     def find_platform_id(self, key: str, value: str) -> str | None:
         """Returns the id of the participant whose link had a parameter; None if there is none."""
         query = "SELECT participant FROM parameters WHERE name = ? AND value = ?"
-        name: str | None = self.recruitment.value(query, key, value)
-        return name if name is not None and self.participant(name) is not None else None
+        names = [row["participant"] for row in self.recruitment.rows(query, key, value)]
+        return next((name for name in names if self.participant(name) is not None), None)  # an entry may have failed
 
     def find_visit(self, visit: str) -> str | None:
         """Returns the id of the participant at the consent whom a tab has brought; None if there is none."""

@@ -9,7 +9,7 @@ from typing import Final
 from dorothie_gym.studies.assignment import Assigner, Candidate, changed_role, match, needed_role
 from dorothie_gym.studies.open_rooms import OpenRooms
 from dorothie_gym.studies.presence import Presence
-from dorothie_gym.studies.record_types import Group, Participant
+from dorothie_gym.studies.record_types import Group, Participant, SessionRow
 from dorothie_gym.studies.records import StudyRecords
 from dorothie_gym.studies.stages import Outcome, RefusedError, Stage, check_stage, next_stage
 from dorothie_gym.studies.study import Study
@@ -21,6 +21,9 @@ GONE_SECONDS: Final = 20.0
 
 CERTAINTY: Final = {Stage.LOBBY: 1.0, Stage.TUTORIAL: 0.93, Stage.INSTRUCTIONS: 0.85}
 """Share of people at the stages before a session who come to it, if 30 % of all drop out (`benchmarks/arrivals.py`)."""
+
+MOVABLE: Final = (Stage.INSTRUCTIONS, Stage.TUTORIAL)
+"""Stages at which a role can change: the person then reads the new instructions, and practises in the new role."""
 
 
 class WaitingRoom:
@@ -89,7 +92,7 @@ class WaitingRoom:
             self._records.set_role(person.id, role)
 
     def mend_roles(self) -> bool:
-        """Changes the role of somebody who reads the instructions, if otherwise others wait in vain.
+        """Changes the role of somebody who reads the instructions or practises, if otherwise others wait in vain.
 
         Returns:
             Whether a role has changed.
@@ -102,10 +105,13 @@ class WaitingRoom:
         if change is None:
             return False
         person, role = change
-        logger.info("a person who reads the instructions gets another role, as the partner has left")
+        logger.info("a person who is not yet in the waiting room gets another role, as the partner has left")
         with self._records.transaction():
             self._records.set_role(person.name, role)
             self._records.set_stage(person.name, Stage.INSTRUCTIONS)
+        tutorial = self._rooms.tutorial_of(person.name)
+        if tutorial is not None:
+            self._rooms.close(tutorial)  # it is one of the other role
         return True
 
     def _there(self) -> list[Candidate]:
@@ -116,7 +122,7 @@ class WaitingRoom:
         found.sort(key=lambda each: (order.index(each.stage), self._waiting_since.get(each.id, now)))
         return [
             Candidate(
-                name=each.id, role=each.role, certainty=CERTAINTY[each.stage], movable=each.stage is Stage.INSTRUCTIONS
+                name=each.id, role=each.role, certainty=CERTAINTY[each.stage], movable=each.stage in MOVABLE
             )
             for each in found
             if each.role is not None
@@ -131,7 +137,9 @@ class WaitingRoom:
         begun = False
         for slot, members in match(self._assigner, fresh, self._records.taken_slots()):
             with self._records.transaction():
-                self._begin(self._records.add_group(slot, members), 0)
+                group = self._records.add_group(slot, members)
+                row = self._begin(group, 0)
+            self._rooms.open_session(row, group.members)  # not before the group is stored
             begun = True
         later = [self._records.group_of(person.id) for person in waiting if person.position > 0]
         for group in {group.id: group for group in later if group is not None}.values():
@@ -142,7 +150,7 @@ class WaitingRoom:
                     self._records.set_stage(person.id, stage, outcome=Outcome.INTERRUPTED)
                 begun = True
             elif len(ready) == len(group.members) and len({person.position for person in ready}) == 1:
-                self._begin(group, ready[0].position)
+                self._rooms.open_session(self._begin(group, ready[0].position), group.members)
                 begun = True
         return begun
 
@@ -154,10 +162,10 @@ class WaitingRoom:
         self._waiting_since = {name: self._waiting_since.get(name, now) for name in lobby}
         return sorted(lobby.values(), key=lambda person: self._waiting_since[person.id])
 
-    def _begin(self, group: Group, position: int) -> None:
+    def _begin(self, group: Group, position: int) -> SessionRow:
         row = self._records.sessions(group.id)[position]
         with self._records.transaction():
             for name in group.members.values():
                 self._records.set_stage(name, Stage.SESSION, position=position)
         logger.info("session %s begins: condition %s", row.id, row.condition)
-        self._rooms.open_session(row, group.members)
+        return row

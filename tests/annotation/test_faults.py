@@ -5,21 +5,13 @@
 
 from __future__ import annotations
 
-import http.client
-import json
 import os
 import random
 import signal
-import subprocess
 import sys
-import threading
 import time
-import urllib.request
-from collections.abc import Iterator
-from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -28,26 +20,14 @@ from dorothie_gym.annotation.log import Action, AnnotationLog, log_path
 from dorothie_gym.annotation.marks import Annotation
 from dorothie_gym.annotation.rows import change_of
 from dorothie_gym.annotation.workplace import SeatKind
-from dorothie_gym.ontology import DialogueMove
 from tests.annotation.builders import recorded
+from tests.annotation.killing import kill_again_and_again
 from tests.annotation.marking import ANNA, content_of, mark_on_and_on, random_edit, workplace
-
-resource = pytest.importorskip("resource", reason="limits the size of files, which Windows cannot")
+from tests.full_disk import full_disk
 
 WRITES = [(1, 40), pytest.param(2, 400, marks=pytest.mark.long)]
 KILLS = [(1, 4), pytest.param(2, 25, marks=pytest.mark.long), pytest.param(3, 300, marks=pytest.mark.slow)]
 SERVER_KILLS = [pytest.param(1, 3, marks=pytest.mark.long), pytest.param(2, 40, marks=pytest.mark.slow)]
-
-
-@contextmanager
-def full_disk(size: int) -> Iterator[None]:
-    """Lets writes beyond a size of the file fail, within a write, too [bytes]."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.mark.parametrize(("seed", "count"), WRITES)
@@ -138,75 +118,9 @@ def test_killed_processes_lose_no_acknowledged_edit(
 # --- Servers ----------------------------------------------------------------------------------------------------------
 
 
-class Annotator:
-    """Person at a server that is killed and started again; keeps the link of the first start."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.token, self.base = folder, "", 0
-        self.waiting: dict[str, object] | None = None
-        self.moves = [move.label for move in DialogueMove]
-
-    @contextmanager
-    def server(self) -> Iterator[subprocess.Popen[str]]:
-        command = [sys.executable, "-m", "dorothie_gym.cli", "annotate", "one", "--port", "0", "--json"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=self.folder, env=os.environ) as process:
-            try:
-                assert process.stdout is not None
-                found = json.loads(process.stdout.readline())
-                self.address = found["address"].replace("/annotate", "/api/")
-                if link := found["links"]["annotator"]:
-                    assert not self.token, "the link of the first start goes on working"
-                    self.token = link.split("#")[1]
-                yield process
-            finally:
-                process.kill()
-
-    def ask(self, path: str, body: object = None) -> dict[str, Any]:
-        request = urllib.request.Request(
-            self.address + path,
-            data=None if body is None else json.dumps(body).encode(),
-            headers={"Authorization": f"Bearer {self.token}"},
-        )
-        with urllib.request.urlopen(request, timeout=30) as answer:
-            found: dict[str, Any] = json.load(answer)
-            return found
-
-    def mark(self) -> None:
-        """Sends the edit that waits, or else the next one."""
-        again = self.waiting is not None
-        if self.waiting is None:
-            row = {"speaker": "participant", "utterance": 0, "spans": [{"words": 4, "move": self.next_move(1)}]}
-            self.waiting = {"base": self.base, "label": "x", "change": {"utterances": [row]}}
-        self.base = self.ask("sessions/0/mark", {**self.waiting, "again": again})["edit"]
-        self.waiting = None
-
-    def next_move(self, further: int = 0) -> str:
-        return self.moves[(self.base + further) % len(self.moves)]
-
-
 @pytest.mark.parametrize(("seed", "count"), SERVER_KILLS)
 def test_killed_servers_go_on_with_the_same_link_and_all_edits(
     seed: int, count: int, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    rng = random.Random(seed + request.config.getoption("--malformed-seed"))
-    _, text = recorded(tmp_path / "one")
-    person = Annotator(tmp_path)
-    for _ in range(count):
-        with person.server() as process:
-            killer = threading.Timer(rng.random(), process.kill)
-            killer.start()
-            try:
-                while True:
-                    person.mark()
-            except (OSError, http.client.HTTPException):  # the server is gone
-                pass
-            killer.join()
-    with person.server():
-        if person.waiting is not None:
-            person.mark()
-        state = person.ask("sessions/0/marks")
-    log = AnnotationLog(text, tmp_path / "one", "annotator")
-    assert state["edit"] == log.edits == person.base > 0
-    labels = [line.change.utterances[0].spans[0].move for line in log.lines if line.action is Action.MARK]
-    assert labels == [person.moves[edit % len(person.moves)] for edit in range(1, person.base + 1)]
-    assert log.lines[0].action is Action.START
+    found = kill_again_and_again(tmp_path, times=count, seed=seed + request.config.getoption("--malformed-seed"))
+    assert found["kills"] == count and found["edits"] > 0

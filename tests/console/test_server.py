@@ -18,6 +18,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from dorothie_gym.console.connection import CloseCode
 from dorothie_gym.console.messages import MAX_BYTES
+from dorothie_gym.console.resuming import Resumed
+from dorothie_gym.console.room import RoomState
 from dorothie_gym.recording import Session
 from dorothie_gym.rollout.replay import resimulate
 from tests.console.people import Table
@@ -151,3 +153,17 @@ def test_an_error_of_the_program_ends_its_room_only(
     assert "a session of the console failed" in caplog.text
     (folder,) = tmp_path.iterdir()
     assert not Session.load(folder).complete, "it can go on"
+
+
+def test_a_disk_that_is_full_ends_the_session_for_its_people_and_it_can_go_on(tmp_path: Path) -> None:
+    from tests.full_disk import full_disk  # skips the test where the system has no such limits
+
+    table = Table("co_wizard=human", folder=tmp_path)
+    with Served(table.room) as running, running.connect(table.room.seats["co_wizard"].token) as socket:
+        for _ in range(5):
+            socket.recv(timeout=5)
+        with full_disk():
+            assert closing_code(socket) == CloseCode.FAILED
+        assert table.room.failed and table.room.state is RoomState.OVER
+    (folder,) = tmp_path.iterdir()
+    assert len(Resumed.load(folder).session.trajectory) > 0

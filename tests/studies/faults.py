@@ -49,6 +49,10 @@ class Faults:
         self.writes = 0
         self._act, self._strikes = act, strikes
 
+    def strike_after(self, further: int) -> None:
+        """Lets one write fail, which is so many writes away."""
+        self._strikes = (self.writes + further).__eq__
+
     def write(self, *, database: bool) -> None:
         self.writes += 1
         if self._strikes(self.writes):

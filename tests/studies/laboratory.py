@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import time
 from typing import Any
 
 from tests.chromium import WAIT
@@ -80,3 +82,36 @@ def to_code(page: Any) -> None:
     at(page, "debriefing")
     page.click("text=Continue")
     page.wait_for_selector("text=FINISHED")
+
+
+class Browsers:
+    """Browsers of people, each with cookies of its own; mistakes of the pages' scripts fail the test."""
+
+    def __init__(self, launched: Any, served: ServedStudy) -> None:
+        self.launched, self.served = launched, served
+        self.errors: list[str] = []
+
+    def tab(self, link: str = "/", context: Any = None) -> Any:
+        page = (context or self.launched.new_context()).new_page()
+        page.set_default_timeout(WAIT)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.goto(f"{self.served.address}{link}")
+        return page
+
+
+def until(page: Any, reached: str) -> None:
+    """Waits for an expression of the page; its policy forbids Playwright's own way."""
+    from playwright.sync_api import Error
+
+    end = time.monotonic() + 40.0
+    while True:
+        with contextlib.suppress(Error):  # the page is being loaded
+            if page.evaluate(reached):
+                return
+        assert time.monotonic() < end, reached
+        page.wait_for_timeout(100)
+
+
+def number(page: Any) -> str:
+    """The number of the person in the study, as the bar shows it."""
+    return str(page.inner_text("#bar .number"))

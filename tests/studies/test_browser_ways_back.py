@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,9 +11,9 @@ import pytest
 pytest.importorskip("playwright.sync_api", reason="needs playwright")
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
-from tests.chromium import IN_CHROMIUM, WAIT, chromium
+from tests.chromium import IN_CHROMIUM, chromium
 from tests.studies.content import SOLO, STUDY, write_study
-from tests.studies.laboratory import at
+from tests.studies.laboratory import Browsers, at, number, until
 from tests.studies.serving import ServedStudy
 from tests.studies.test_server import remains
 
@@ -34,21 +32,6 @@ TEXTS = {
     },
 }
 LINK = "/?PROLIFIC_PID=platform-one"
-
-
-class Browsers:
-    """Browsers of people, each with cookies of its own; mistakes of the pages' scripts fail the test."""
-
-    def __init__(self, launched: Any, served: ServedStudy) -> None:
-        self.launched, self.served = launched, served
-        self.errors: list[str] = []
-
-    def tab(self, link: str = "/", context: Any = None) -> Any:
-        page = (context or self.launched.new_context()).new_page()
-        page.set_default_timeout(WAIT)
-        page.on("pageerror", lambda error: self.errors.append(str(error)))
-        page.goto(f"{self.served.address}{link}")
-        return page
 
 
 @pytest.fixture(scope="module")
@@ -72,23 +55,6 @@ def agree(page: Any) -> None:
     for box in page.query_selector_all(".statement input"):
         box.check()
     page.click("text=I take part")
-
-
-def until(page: Any, reached: str) -> None:
-    """Waits for an expression of the page; its policy forbids Playwright's own way."""
-    from playwright.sync_api import Error
-
-    end = time.monotonic() + 40.0
-    while True:
-        with contextlib.suppress(Error):  # the page is being loaded
-            if page.evaluate(reached):
-                return
-        assert time.monotonic() < end, reached
-        page.wait_for_timeout(100)
-
-
-def number(page: Any) -> str:
-    return str(page.inner_text("#bar .number"))
 
 
 def test_the_link_as_it_is_printed_admits_each_browser(browsers: Browsers) -> None:

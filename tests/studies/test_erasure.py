@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -18,6 +17,7 @@ import pytest
 from dorothie_gym.studies.database import StorageError
 from dorothie_gym.studies.erasure import erase, find_traces, finish_erasures, is_unfinished, remove_attempts
 from dorothie_gym.studies.records import StudyRecords
+from tests.full_disk import full_disk
 from tests.studies.faults import TRACES, Faults, fail, prepare, remains, striking
 
 
@@ -72,19 +72,16 @@ def test_an_erasure_that_is_killed_at_any_write_is_finished_by_the_next_start(tm
 
 def test_a_full_disk_leaves_a_person_whole_or_erased(tmp_path: Path) -> None:
     name, erased = prepare(tmp_path / "whole"), list[int]()
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     for limit in (0, 512, 4096, 8192, 16384, 40960, 65536, 1 << 20):
         copy = tmp_path / f"full-{limit}"
         shutil.copytree(tmp_path / "whole", copy)
         with contextlib.closing(StudyRecords(copy)) as records:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))  # SQLite gets the error of the system
             try:
-                erase(records, name)
+                with full_disk(limit):  # SQLite gets the error of the system
+                    erase(records, name)
                 erased.append(limit)
             except StorageError as error:
                 assert "check the space on the disk" in str(error)
-            finally:
-                resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
             assert (records.participant(name) is None) == (limit in erased)
             erase(records, name)
         assert remains(copy, name) == [], limit
@@ -99,8 +96,7 @@ def store_two(records: StudyRecords) -> None:
 def test_a_transaction_that_cannot_be_stored_does_not_swallow_the_next_one(tmp_path: Path) -> None:
     faults = Faults(fail, lambda number: False)
     with striking(faults), contextlib.closing(StudyRecords(tmp_path / "data")) as records:
-        faults._strikes = lambda number: number == faults.writes and number == last + 3  # its COMMIT
-        last = faults.writes
+        faults.strike_after(3)  # its COMMIT
         with pytest.raises(StorageError):
             store_two(records)
         records.erase_later(["third"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import time
 from pathlib import Path
 
@@ -202,8 +203,9 @@ def test_all_conditions_are_played_in_turn(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_person_who_reads_the_instructions_gets_the_role_of_a_partner_who_left(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("practises", [False, True])
+def test_a_person_who_reads_the_instructions_or_practises_gets_the_role_of_a_partner_who_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, practises: bool
 ) -> None:
     monkeypatch.setattr("dorothie_gym.studies.waiting_room.GONE_SECONDS", 3.0)
     with ServedStudy(write_study(tmp_path, STUDY), tmp_path / "data") as served:
@@ -216,8 +218,14 @@ def test_a_person_who_reads_the_instructions_gets_the_role_of_a_partner_who_left
             one.do("news")
         assert two.view["part"] == three.view["part"] != four.view["part"], "a partner, a substitute, and the next one"
         before = four.view["part"]
+        if practises:
+            four.do("proceed", {"stage": "instructions"})
+            while not four.view["token"]:
+                for each in (one, two, three, four):
+                    each.tag = ""
+                    each.do("news")
         end = time.monotonic() + 30.0
-        while four.view["part"] == before:  # the second and the third have closed their pages
+        while four.view.get("part", before) == before:  # the second and the third have closed their pages
             assert time.monotonic() < end
             for each in (one, four):
                 each.tag = ""
@@ -225,7 +233,10 @@ def test_a_person_who_reads_the_instructions_gets_the_role_of_a_partner_who_left
             time.sleep(0.2)
         assert four.stage == "instructions" and four.view["text"] == STUDY["texts"]["instructions"][four.view["part"]]
         assert four.post("proceed", {"stage": "instructions", "role": before}) == 409, "it was not read yet"
-        four.do("proceed", {"stage": "instructions", "role": four.view["part"]})
+        role = four.view["part"]
+        four.do("proceed", {"stage": "instructions", "role": role})
+        with four.sit() as there:
+            assert json.loads(there.recv(timeout=10))["seat"] == role, "the practice drive is one of the new role"
         four.do("proceed", {"stage": "tutorial"})
         seat(one, four)
 

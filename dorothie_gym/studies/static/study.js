@@ -7,7 +7,7 @@ import { prose } from './prose.js';
 
 const RETRY = 2000;  // [ms]
 const main = document.getElementById('main'), bar = document.getElementById('bar');
-let tag = '', shown = '', seated = false, asking = null, acting = null, over = false, contact = '', joined = 0, role = '';
+let tag = '', shown = '', seated = false, asking = null, acting = null, over = false, contact = '', joined = 0;
 
 // --- server ----------------------------------------------------------------------------------------------------------
 
@@ -172,10 +172,11 @@ const STAGES = {
   after_session: view => questions(view, 'About this drive'),
   after: view => questions(view, 'At the end'),
   instructions(view) {
-    const changed = role && role !== view.part;  // a partner has left, and somebody else would wait in vain
-    role = view.part;
+    const roles = kept.get('roles') ?? [];
+    if (roles.at(-1) !== view.part) kept.set('roles', [...roles, view.part]);
+    const changed = kept.get('roles').length > 1;  // a partner has left, and somebody else would wait in vain
     page(view, changed ? 'New instructions' : 'Instructions', changed ? h('p', { class: 'changed', text: 'Your role has changed, as somebody has left. Please read these instructions; those before do not hold any more.' }) : null,
-      prose(view.text), next('Continue', proceed('instructions', { role })));
+      prose(view.text), next('Continue', proceed('instructions', { role: view.part })));
   },
   tutorial(view) {
     const go = button('Start the practice drive', { class: 'primary', run: () => seat(view, [button('End practice', { class: 'soft', run: proceed('tutorial') })]) });
