@@ -18,6 +18,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any, Final
@@ -157,10 +158,10 @@ class Arrivals:
         """Plans when a person enters the waiting room, and the last pages before it, after times at the pages [s]."""
         turn, ends = visitor.turn, now + np.cumsum(times)
         for stage, end in zip([*PAGES, Stage.LOBBY][-len(times) :], ends, strict=True):
-            self._at(end, lambda at, stage=stage: visitor.turn == turn and self._enter(visitor, stage, at))  # type: ignore[misc]
+            self._at(end, partial(self._enter, visitor, stage, turn))
 
-    def _enter(self, visitor: Visitor, stage: Stage, now: float) -> None:
-        if visitor.done or now >= visitor.leaves:
+    def _enter(self, visitor: Visitor, stage: Stage, turn: int, now: float) -> None:
+        if visitor.turn != turn or visitor.done or now >= visitor.leaves:
             return
         if stage is Stage.BEFORE and self.way == "at consent":
             self._give_formerly(visitor, now)

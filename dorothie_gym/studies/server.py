@@ -156,6 +156,10 @@ class StudyServer:
                     changed = True
                 changed = self.progress.waiting.pair() or changed
                 changed = self.progress.waiting.mend_roles() or changed
+            except StorageError as error:
+                logger.error("the study could not be stored; it tries again: %s", error)
+                await asyncio.sleep(5.0)
+                continue
             except Exception:
                 logger.exception("the study could not go on; it tries again")
                 await asyncio.sleep(5.0)
@@ -171,12 +175,12 @@ class StudyServer:
         async def handle(request: Request) -> Response:
             if not is_same_origin(request):
                 return refusal(403, "This page belongs to another server.")
-            person = self._person(request)
-            known = person.id if person else "experimenter" if self.experimenter.is_known(request) else None
-            if known is not None:
-                recognise(request)
             address = network_of(request.client.host if request.client else None)
             try:
+                person = self._person(request)
+                known = person.id if person else "experimenter" if self.experimenter.is_known(request) else None
+                if known is not None:
+                    recognise(request)
                 await r.receive_body(request, MAX_BYTES)  # those that never end would count for others at an address
                 if not self._admits(known or address, known is not None):
                     return refusal(429, "Many requests are coming in. Please wait a moment.", RETRY_SECONDS)
