@@ -10,9 +10,9 @@ from typing import Annotated
 
 import typer
 
-from dorothie_gym.analysis.talk import TalkChecks, checks
-from dorothie_gym.analysis.talk.session_world import SessionWorld
-from dorothie_gym.analysis.talk.truth import is_true
+from dorothie_gym.analysis.truth_checks import TalkChecks, checks
+from dorothie_gym.analysis.truth_checks.session_world import SessionWorld
+from dorothie_gym.analysis.truth_checks.truth import is_true
 from dorothie_gym.dialogue import Predicate
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import Role

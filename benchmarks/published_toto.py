@@ -23,7 +23,7 @@ from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction, Role
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
 from dorothie_gym.recording import Session, Task
-from dorothie_gym.recording.points import DecisionPoint, InferencePoint, Point, PointView, history_angle
+from dorothie_gym.recording.prediction_points import DecisionPoint, InferencePoint, Point, PointView, history_angle
 
 TOKEN_WIDTH: Final = 770
 LANES, ROADS, JUNCTIONS = 486, 259, 34

@@ -19,7 +19,7 @@ from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
 from dorothie_gym.benchmark.features import Columns, build, points
 from dorothie_gym.processors import available_processors
 from dorothie_gym.recording import Corpus, Session
-from dorothie_gym.recording.points import Point, task_points
+from dorothie_gym.recording.prediction_points import Point, task_points
 
 _POINTS: Final = 512
 """Points of the corpus that are looked at."""

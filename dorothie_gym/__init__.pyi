@@ -10,7 +10,7 @@ from .engine.scenario import Scenario as Scenario
 from .engine.scenario import draw_scenario as draw_scenario
 from .envs.duo_wizard_v0 import DuoWizardEnv as DuoWizardEnv
 from .envs.duo_wizard_vector_env import DuoWizardVectorEnv as DuoWizardVectorEnv
-from .envs.navigation_config import NavigationWeights as NavigationWeights
+from .envs.navigation.config import NavigationWeights as NavigationWeights
 from .envs.navigation_continuous_v0 import NavigationContinuousEnv as NavigationContinuousEnv
 from .envs.navigation_v0 import NavigationEnv as NavigationEnv
 from .envs.nfd_v0 import NfDEnv as NfDEnv

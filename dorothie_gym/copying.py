@@ -3,7 +3,8 @@
 `copy.deepcopy` and `pickle` copy every environment exactly, because the classes inside follow two rules:
 
 - An instance that never changes (a town, a path, an utterance) is `shared` by all copies.
-- What was only looked up (a view on the arrays of a world) is dropped from a copy, which looks it up again (`Lookups`).
+- What was only looked up (a view on the arrays of a world) is dropped from a copy, which looks it up again
+  (`CachedViews`).
 
 A `State` holds what changes in one object. It is cheaper than a copy, and any number of sessions can continue from it.
 """
@@ -43,18 +44,18 @@ def _itself(value: T, memo: dict[int, object]) -> T:
     return value
 
 
-class Lookups:
+class CachedViews:
     """Base class of objects that keep looked up values, such as views on arrays that another object owns.
 
     A copied view would show other memory than the array that is copied beside it. So copies begin without.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ()
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ()
     """Attributes that hold looked up values; without them, the next use looks the values up."""
 
     def __getstate__(self) -> dict[str, object]:
         values = self.__dict__.copy()
-        for name in self.LOOKED_UP:
+        for name in self.CACHED_VIEWS:
             values.pop(name, None)
         return values
 
@@ -165,7 +166,7 @@ class Unchanged(Generic[T]):
 class Restorable:
     """Base class of what can go back to a state of its own, or of another one made with the same arguments."""
 
-    CHANGES: ClassVar[Sequence[str]] = ()
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ()
     """Attributes that hold what changes."""
 
     def clone_state(self) -> State:
@@ -192,7 +193,7 @@ class Restorable:
 
     def mutable_values(self) -> dict[str, object]:
         """Returns what changes, by name."""
-        return {name: getattr(self, name) for name in self.CHANGES}
+        return {name: getattr(self, name) for name in self.MUTABLE_ATTRIBUTES}
 
     def apply_values(self, values: dict[str, object]) -> None:
         """Applies the values that `mutable_values` has returned."""

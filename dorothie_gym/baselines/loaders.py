@@ -12,7 +12,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.spaces.limits import SpaceLimits
 
 if TYPE_CHECKING:
-    from dorothie_gym.baselines.acting.policy import BenchmarkCoWizard
+    from dorothie_gym.baselines.benchmark_co_wizard.policy import BenchmarkCoWizard
     from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard
     from dorothie_gym.baselines.participant.policy import LearnedParticipant
     from dorothie_gym.policies.policy import AnyPolicy
@@ -31,8 +31,8 @@ def load_benchmark_model(path: Path, role: Role, limits: SpaceLimits) -> Benchma
     """
     if role is not Role.CO_WIZARD:
         raise ValueError(f"{path}: benchmark models play the Co-Wizard, not the {role}")
-    from dorothie_gym.baselines.acting.inference import BenchmarkModel
-    from dorothie_gym.baselines.acting.policy import BenchmarkCoWizard
+    from dorothie_gym.baselines.benchmark_co_wizard.inference import BenchmarkModel
+    from dorothie_gym.baselines.benchmark_co_wizard.policy import BenchmarkCoWizard
 
     return BenchmarkCoWizard(BenchmarkModel.load(path.resolve()), limits)
 

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from dorothie_gym.baselines.dataset import Dataset, Objects
 from dorothie_gym.baselines.encoders.pretrained import find_transformers, has_minilm, load_pretrained, minilm_folder
-from dorothie_gym.baselines.encoders.sound import FRAMES
+from dorothie_gym.baselines.encoders.sound import MEL_FRAMES
 from dorothie_gym.baselines.junction_reader.model import JunctionReader, reader_config
 from dorothie_gym.baselines.sound_inputs import Sound
 from dorothie_gym.baselines.toto.config import ABLATIONS, Channel, TOTOConfig
@@ -230,7 +230,7 @@ def make_model(row: ModelEntry, size: str, material: Dataset, seed: int, *, stri
     if row.queries:
         config = replace(config, detector=material.detector.query_shape)
     if row.sound == "log-mel":
-        config = replace(config, sound_frames=FRAMES)
+        config = replace(config, sound_frames=MEL_FRAMES)
     elif row.sound is not None:
         config = replace(config, sound_width=material.sounds(row.sound).dim)
     return build_model(row, config, material)
@@ -252,7 +252,7 @@ def build_model(row: ModelEntry, config: TOTOConfig, material: Dataset, spread: 
     return TOTO(config, towns, texts)
 
 
-def retell(model: TOTO, material: Dataset) -> None:
+def refresh_text_tables(model: TOTO, material: Dataset) -> None:
     """Replaces the texts of a model by those of another dataset."""
     config = model.config
     if config.text == "frozen":

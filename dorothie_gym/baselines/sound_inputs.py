@@ -14,7 +14,7 @@ from torch import Tensor
 from dorothie_gym.audio import read_audio
 from dorothie_gym.baselines.encoders.encoder import SpeechEncoder
 from dorothie_gym.baselines.encoders.pretrained import HubertEncoder
-from dorothie_gym.baselines.encoders.sound import BANDS, FRAMES, SpeechEmbeddingEncoder, mel_table
+from dorothie_gym.baselines.encoders.sound import BANDS, MEL_FRAMES, SpeechEmbeddingEncoder, mel_table
 from dorothie_gym.benchmark.features.columns import Columns
 from dorothie_gym.benchmark.features.point_table import PointTable
 from dorothie_gym.errors import EncoderError, SessionError
@@ -46,7 +46,7 @@ class SoundInputs:
     def __init__(self, corpus: Path, sound: Sound, hubert: Path | None = None):
         self._corpus = corpus
         self._encoder: SpeechEncoder | None = None if sound == "log-mel" else _encoder(sound, hubert)
-        self.id = f"log-mel-1-{FRAMES}x{BANDS}" if self._encoder is None else self._encoder.id
+        self.id = f"log-mel-1-{MEL_FRAMES}x{BANDS}" if self._encoder is None else self._encoder.id
         self.dim = BANDS if self._encoder is None else self._encoder.dim
 
     def at(self, columns: Columns, tables: Sequence[PointTable]) -> Tensor:
@@ -65,7 +65,7 @@ class SoundInputs:
         """
         names = {entry.name: entry for entry in Corpus.load(self._corpus).entries}
         count = sum(map(len, tables))
-        shape = (FRAMES, BANDS) if self._encoder is None else (self.dim,)
+        shape = (MEL_FRAMES, BANDS) if self._encoder is None else (self.dim,)
         found = np.zeros((count, *shape), dtype=np.float16 if self._encoder is None else np.float32)
         start, heard = 0, 0
         for table in tables:

@@ -26,7 +26,7 @@ from dorothie_gym.benchmark.predictions import (
 )
 from dorothie_gym.errors import SessionError
 from dorothie_gym.recording.corpus import Corpus, CorpusEntry, Fold
-from dorothie_gym.recording.points import at_tenths, nfd_points, rfn_points, ufn_points, unpointed_events
+from dorothie_gym.recording.prediction_points import at_tenths, nfd_points, rfn_points, ufn_points, unpointed_events
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.visibility import Task
 

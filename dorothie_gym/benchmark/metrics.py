@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, Predictions, act_labels, action_labels
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS, VECTOR_SLOTS
-from dorothie_gym.recording.points import ANGLE_TOLERANCE, DecisionPoint, InferencePoint
+from dorothie_gym.recording.prediction_points import ANGLE_TOLERANCE, DecisionPoint, InferencePoint
 from dorothie_gym.recording.visibility import Task
 
 PointT = TypeVar("PointT", InferencePoint, DecisionPoint)

@@ -16,7 +16,7 @@ from dorothie_gym.files import replacing
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
 from dorothie_gym.ontology.slots import SlotValue
-from dorothie_gym.recording.points import DecisionPoint, InferencePoint
+from dorothie_gym.recording.prediction_points import DecisionPoint, InferencePoint
 from dorothie_gym.recording.visibility import Task
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from dorothie_gym.benchmark.predictions import ActPredictions, Predictions, Task
 from dorothie_gym.errors import PredictionError
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
-from dorothie_gym.recording.points import Point
+from dorothie_gym.recording.prediction_points import Point
 from dorothie_gym.recording.visibility import Task
 
 NEARBY_POINTS: Final = 3

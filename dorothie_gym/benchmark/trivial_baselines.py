@@ -21,7 +21,7 @@ from dorothie_gym.benchmark.predictions import (
 )
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
-from dorothie_gym.recording.points import DecisionPoint, InferencePoint
+from dorothie_gym.recording.prediction_points import DecisionPoint, InferencePoint
 from dorothie_gym.recording.visibility import Task
 
 

@@ -20,7 +20,7 @@ from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.session_pictures import camera_of
 from dorothie_gym.camera.visibility import PERCEPTION_CAMERA, is_body_seen, is_landmark_recognised
 from dorothie_gym.compilation.records import RecordArray, empty_records, plain
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.engine.observations import write_landmarks
 from dorothie_gym.engine.pictures import OBSERVERS
 from dorothie_gym.engine.scenario import Scenario
@@ -33,7 +33,7 @@ from dorothie_gym.spaces.observations import Observation
 from dorothie_gym.tasks.storyboard import Landmark
 
 
-class CameraPerception(Lookups):
+class CameraPerception(CachedViews):
     """What the camera on the car of a session shows of bodies and landmarks.
 
     Attributes:
@@ -41,7 +41,7 @@ class CameraPerception(Lookups):
         recognised: indices of the landmarks that have been recognised so far, in the order of the first time.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_camera", "_eye", "_seen")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_camera", "_eye", "_seen")
 
     def __init__(self, world: World, scenario: Scenario) -> None:
         """Takes the first look.

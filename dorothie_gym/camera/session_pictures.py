@@ -11,7 +11,7 @@ from dorothie_gym.camera.first_person_camera import CameraFrame
 from dorothie_gym.camera.scene_cache import town_scene
 from dorothie_gym.camera.session_camera import SessionCamera
 from dorothie_gym.camera.town_scene import SessionScene
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.pictures import FIELDS, OBSERVERS
@@ -33,13 +33,13 @@ def windscreen_camera(town: Town, scenario: Scenario, config: EnvConfig, size: t
     return camera_of(town, scenario, replace(own, width=size[0], height=size[1], outputs=(CameraOutput.RGB,)))
 
 
-class SessionPictures(Lookups):
+class SessionPictures(CachedViews):
     """Pictures of a session; each is drawn when it is first asked for.
 
     Pictures follow from the state of the world: copies of a session draw their own.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_camera", "_taken")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_camera", "_taken")
 
     _taken: tuple[int, CameraFrame] | None = None
 

@@ -284,7 +284,7 @@ def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
 
 
 def _talk(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.analysis.talk.checks import talk_checks_of
+    from dorothie_gym.analysis.truth_checks.checks import talk_checks_of
 
     with session_progress(quiet=as_json) as on_session:
         found = talk_checks_of(corpus, on_session)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import ClassVar, TypeAlias
 
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.engine.session_views import SessionViews
 from dorothie_gym.engine.view_arrays import Mask
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
@@ -27,7 +27,7 @@ ALWAYS_FEASIBLE = (
 """Exceptions that are feasible at any time for some arguments."""
 
 
-class ActionMasks(Lookups):
+class ActionMasks(CachedViews):
     """Action masks of a session.
 
     Fields are masked independently, so an action inside the mask may still be refused for a combination of its fields.
@@ -35,7 +35,7 @@ class ActionMasks(Lookups):
     (`view_steps`); those of exceptions are written when the props or the task have changed, the others once.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_exceptions",)
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_exceptions",)
 
     def __init__(self, views: SessionViews, task: TaskState) -> None:
         """Writes what stays the same in the session.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation import direct
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.engine.beliefs import BeliefTracker
 from dorothie_gym.engine.scenario import Scenario
@@ -52,14 +52,14 @@ class DeliveredMessages:
     speaking: Mapping[Role, float]
 
 
-class ObservationBuilder(Lookups):
+class ObservationBuilder(CachedViews):
     """Builds the observations of a session, for the roles that are asked for.
 
     Compiled code writes what changes at every decision (`view_steps`). Constant values are written once, and rarely
     changing ones when they change.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_tables",)
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_tables",)
 
     def __init__(self, views: SessionViews, scenario: Scenario, task: TaskState, beliefs: BeliefTracker) -> None:
         """Writes what stays the same in the session.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.pictures import FIELDS, picture_spaces
 from dorothie_gym.engine.scenario import Scenario
@@ -34,7 +34,7 @@ from dorothie_gym.tasks.storyboard import StoryboardTemplate
 _observe_share = direct(observe_share)
 
 
-class SessionBatch(Lookups):
+class SessionBatch(CachedViews):
     """Sessions of one town, each of an engine of its own, whose worlds and observations are rows of arrays.
 
     Attributes:
@@ -45,7 +45,7 @@ class SessionBatch(Lookups):
         pictures: (sessions, ...) fields of the observations that the cameras of all sessions give.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_worlds",)
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_worlds",)
 
     def __init__(
         self, town: Town, storyboard: str | Path | StoryboardTemplate | None, *, config: EnvConfig,

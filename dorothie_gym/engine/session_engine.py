@@ -71,7 +71,7 @@ class SessionEngine(Restorable):
         limits: sizes of the spaces.
     """
 
-    CHANGES: ClassVar[Sequence[str]] = ("_session", "_seeds")
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ("_session", "_seeds")
 
     def __init__(
         self,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from dorothie_gym.compilation import direct
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.engine.view_arrays import RoleArrays, turn_options
 from dorothie_gym.engine.view_steps import Wanted, observe_share
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
@@ -20,7 +20,7 @@ _FLAGS = dict(zip(AGENT_ROLES, map(int, (Wanted.PARTICIPANT, Wanted.CO_WIZARD, W
 _MASKS = int(Wanted.MASKS)
 
 
-class SessionViews(Lookups):
+class SessionViews(CachedViews):
     """Row of a session in the arrays of observations and masks, which compiled code fills in.
 
     Attributes:
@@ -29,7 +29,7 @@ class SessionViews(Lookups):
         row: number of the row.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_call", "_called_with")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_call", "_called_with")
 
     _called_with: WorldArrays | None = None
 

@@ -11,7 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.copying import Lookups, shared
+from dorothie_gym.copying import CachedViews, shared
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
@@ -107,7 +107,7 @@ def _named(kind: type[_Named], arrays: Arrays) -> _Named:
 # --- All rows ---------------------------------------------------------------------------------------------------------
 
 
-class RoleArrays(Lookups):
+class RoleArrays(CachedViews):
     """Observations and action masks of some sessions, by role: arrays with a row for each session, and their texts.
 
     Attributes:
@@ -117,7 +117,7 @@ class RoleArrays(Lookups):
         unmasked: names of the action fields without a mask.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("written",)
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("written",)
 
     def __init__(self, limits: SpaceLimits, observe_acts: bool, rows: int = 1) -> None:
         """Makes rows of zeros.

@@ -28,7 +28,7 @@ from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.threads import turns_of
 from dorothie_gym.sim.batch.worlds import alone, step_share
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
-from dorothie_gym.sim.ego.briefing import note_props
+from dorothie_gym.sim.ego.decision_setup import note_props
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.pedestrians.footways import closest_walk
 from dorothie_gym.sim.sensing.perception import look_around

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from dorothie_gym.copying import Restorable
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_batch import SessionBatch
-from dorothie_gym.envs.driving_batch import DrivingBatch
-from dorothie_gym.envs.navigation_config import NavigationConfig
+from dorothie_gym.envs.navigation.batch import DrivingBatch
+from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.processors import available_processors

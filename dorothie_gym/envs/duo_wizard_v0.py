@@ -83,7 +83,7 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
     """
 
     metadata = _METADATA
-    CHANGES: ClassVar[Sequence[str]] = ("agents",)
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ("agents",)
 
     def __init__(
         self,

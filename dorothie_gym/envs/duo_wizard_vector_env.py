@@ -73,7 +73,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
 
     metadata: dict[str, object] = {**BatchedEnv.metadata, "name": "duo_wizard_v0"}  # noqa: RUF012
 
-    CHANGES: ClassVar[Sequence[str]] = ("_over",)
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ("_over",)
 
     def __init__(
         self,

@@ -18,7 +18,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.ontology.spellings import parse_landmark, parse_street
 from dorothie_gym.recording.events import MoveRecord
-from dorothie_gym.recording.points import WAY_LENGTH, PointView, history_angle
+from dorothie_gym.recording.prediction_points import WAY_LENGTH, PointView, history_angle
 from dorothie_gym.recording.recorded_perception import ObjectKind, last_perceived
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.visibility import Task

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from dorothie_gym.action_values import real_numbers
 from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.scenario import ResetOptions
-from dorothie_gym.envs.driving_cameras import DriverObservation, driver_space
-from dorothie_gym.envs.driving_env import DrivingEnv
-from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
-from dorothie_gym.envs.pedals import CONTINUOUS_FIELD_SPECS, CONTINUOUS_FIELDS
+from dorothie_gym.envs.navigation.cameras import DriverObservation, driver_space
+from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.navigation.continuous_control import CONTINUOUS_FIELD_SPECS, CONTINUOUS_FIELDS
+from dorothie_gym.envs.navigation.env import DrivingEnv
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.town import Town

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from dorothie_gym.action_values import whole_number
 from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.engine.scenario import ResetOptions
-from dorothie_gym.envs.driving_cameras import DriverObservation, driver_space
-from dorothie_gym.envs.driving_env import DrivingEnv
-from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.navigation.cameras import DriverObservation, driver_space
+from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.navigation.env import DrivingEnv
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.navigation.actions import ACTIONS

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from dorothie_gym.action_values import as_array
 from dorothie_gym.engine.camera_config import CameraConfig
 from dorothie_gym.envs.batched_env import Towns
-from dorothie_gym.envs.driving_batch import DrivingBatch
-from dorothie_gym.envs.driving_cameras import driver_space
-from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
-from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.navigation.batch import DrivingBatch
+from dorothie_gym.envs.navigation.cameras import driver_space
+from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
 from dorothie_gym.errors import short_repr
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
@@ -54,7 +54,7 @@ class NavigationVectorEnv(DrivingVectorEnv):
     - v0: first version.
     """
 
-    CHANGES: ClassVar[Sequence[str]] = (*DrivingVectorEnv.CHANGES, "_masks")
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = (*DrivingVectorEnv.MUTABLE_ATTRIBUTES, "_masks")
 
     def __init__(
         self,

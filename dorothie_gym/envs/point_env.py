@@ -26,7 +26,7 @@ from dorothie_gym.envs.history_space import (
 from dorothie_gym.input_files import settings_of
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import LABELS
-from dorothie_gym.recording.points import (
+from dorothie_gym.recording.prediction_points import (
     ANGLE_TOLERANCE,
     DecisionPoint,
     InferencePoint,
@@ -161,7 +161,7 @@ class PointEnv(Restorable, gym.Env[Observation, ActionDict]):
     """
 
     metadata = _METADATA
-    CHANGES: ClassVar[Sequence[str]] = ("_points", "_point", "_np_random", "_np_random_seed")
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ("_points", "_point", "_np_random", "_np_random_seed")
 
     def __init__(self, task: Task, limits: SpaceLimits | None, render_mode: str | None) -> None:
         if render_mode not in (None, "ansi"):

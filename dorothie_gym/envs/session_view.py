@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym import camera, rendering  # lazy: most sessions are never drawn
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.render_view import RenderView, checked_view
@@ -32,7 +32,7 @@ METADATA: Final[dict[str, object]] = metadata_at(2.0)
 """Metadata of the environments with two decisions per second."""
 
 
-class SessionView(Lookups):
+class SessionView(CachedViews):
     """Draws sessions in one render mode; the renderer is created with the first frame.
 
     Args:
@@ -45,7 +45,7 @@ class SessionView(Lookups):
         ValueError: the render mode or view is unknown.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_renderer", "_camera", "_window")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_renderer", "_camera", "_window")
 
     _renderer: rendering.SessionRenderer | None = None
     _camera: tuple[LiveSession, camera.SessionCamera] | None = None

@@ -68,7 +68,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
     """
 
     metadata = METADATA
-    CHANGES: ClassVar[Sequence[str]] = ("_np_random", "_np_random_seed")
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ("_np_random", "_np_random_seed")
 
     def __init__(
         self,

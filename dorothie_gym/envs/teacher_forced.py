@@ -20,14 +20,14 @@ from dorothie_gym.benchmark.metrics import (
     SlotScorePaper,
 )
 from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.engine.scenario import ResetOptions, check_options
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.recording.corpus import Corpus, CorpusEntry, Fold
-from dorothie_gym.recording.points import DecisionPoint, InferencePoint, Point, task_points
+from dorothie_gym.recording.prediction_points import DecisionPoint, InferencePoint, Point, task_points
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.visibility import Task
 from dorothie_gym.spaces.actions import ActionMapping, StepInfo
@@ -85,7 +85,7 @@ class TeacherForcedEnv(PointEnv):
     """
 
     of_task: ClassVar[Task]
-    CHANGES: ClassVar[Sequence[str]] = (*PointEnv.CHANGES, "_session", "_town", "_done")
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = (*PointEnv.MUTABLE_ATTRIBUTES, "_session", "_town", "_done")
 
     def __init__(
         self,
@@ -148,7 +148,7 @@ class TeacherForcedEnv(PointEnv):
         return {"metrics": found}
 
 
-class _Library(Lookups):
+class _Library(CachedViews):
     """Sessions of a split, read on demand.
 
     Args:
@@ -159,7 +159,7 @@ class _Library(Lookups):
         strict: as of `TeacherForcedEnv`.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("read",)
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("read",)
 
     def __init__(
         self, corpus: Corpus | Path | str | Sequence[Session], split: str, task: Task, limits: SpaceLimits, strict: bool

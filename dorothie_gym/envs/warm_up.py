@@ -6,7 +6,7 @@ import numpy as np
 
 from dorothie_gym.compilation.dispatcher import CompiledFunction
 from dorothie_gym.engine.warm_up import TOWN, Progress, reporting
-from dorothie_gym.envs.driving_steps import act_share, guide_share
+from dorothie_gym.envs.navigation.steps import act_share, guide_share
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
 
 

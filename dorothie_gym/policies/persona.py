@@ -13,7 +13,7 @@ import numpy as np
 
 from dorothie_gym import portable_math as pm
 from dorothie_gym.errors import did_you_mean
-from dorothie_gym.policies.delivery import Delivery
+from dorothie_gym.policies.speech_timing import Delivery
 
 
 class Directions(enum.StrEnum):

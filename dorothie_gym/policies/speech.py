@@ -21,10 +21,10 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import SlotValue
-from dorothie_gym.policies.delivery import Delivery
 from dorothie_gym.policies.mood import Happening, Mood
 from dorothie_gym.policies.persona import Persona
 from dorothie_gym.policies.policy import DECISION_INTERVAL, DecisionClock, replace
+from dorothie_gym.policies.speech_timing import Delivery
 from dorothie_gym.spaces.actions import Speech
 
 LONGEST_BREATH = 3

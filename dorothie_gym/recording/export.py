@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from dorothie_gym.files import replacing
 from dorothie_gym.ontology.dialogue_acts import VECTOR_SLOTS
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.recording.points import PointView, history_angle, nfd_points
+from dorothie_gym.recording.prediction_points import PointView, history_angle, nfd_points
 from dorothie_gym.recording.session import Session
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from dorothie_gym import portable_arrays as pn
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.rendering import palette
-from dorothie_gym.rendering.figures import (
+from dorothie_gym.rendering.scene import Pin, Scene
+from dorothie_gym.rendering.sprites import (
     PIN_LENGTH,
     Canvas,
     draw_actor,
@@ -26,7 +27,6 @@ from dorothie_gym.rendering.figures import (
     draw_waypoints,
     pin_direction,
 )
-from dorothie_gym.rendering.scene import Pin, Scene
 from dorothie_gym.rendering.text import font
 from dorothie_gym.rendering.town_map import MapPainter, draw_scale_bar
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.bodies import Bodies, Pedestrian, Prop, TrafficVehicle
 from dorothie_gym.sim.population import (
@@ -31,7 +31,7 @@ MORE = 8
 """Rows by which the arrays grow when all are taken."""
 
 
-class Actors(Lookups):
+class Actors(CachedViews):
     """Traffic, pedestrians and props of a world.
 
     Attributes:
@@ -39,7 +39,7 @@ class Actors(Lookups):
         town_arrays: arrays of the town.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_bodies", "_present_of", "_present")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_bodies", "_present_of", "_present")
 
     _present_of: WorldArrays | None = None
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork
@@ -64,10 +64,10 @@ class WorldEvent:
     data: Mapping[str, object] = field(default_factory=dict)
 
 
-class WorldEventLog(Lookups):
+class WorldEventLog(CachedViews):
     """Events of the ego, read from the lists that the compiled loops keep of them."""
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_counts_of", "_own_counts")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_counts_of", "_own_counts")
 
     _counts_of: WorldArrays | None = None
 

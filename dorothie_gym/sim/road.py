@@ -15,7 +15,7 @@ from highway_env.vehicle.objects import Landmark, RoadObject
 from numpy.typing import NDArray
 
 from dorothie_gym import portable_math as pm
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.bodies import Bodies, TrafficVehicle
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
@@ -31,7 +31,7 @@ from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.respawn import new_key, put_on_lane
 
 
-class TownRoad(Lookups, Road):
+class TownRoad(CachedViews, Road):
     """A highway-env road on which heights count and neighbours are found across lane ends.
 
     Vehicles and objects are highway-env's. One may carry a `height` [m] of its own, else it has that of its lane.
@@ -40,7 +40,7 @@ class TownRoad(Lookups, Road):
         time: simulated time [s], counted by `step`.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_chains", "_zones")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_chains", "_zones")
 
     def __init__(
         self,

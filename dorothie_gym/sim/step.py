@@ -11,7 +11,7 @@ from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.collisions import collide
-from dorothie_gym.sim.ego.briefing import prepare
+from dorothie_gym.sim.ego.decision_setup import prepare
 from dorothie_gym.sim.ego.manoeuvres import note_place
 from dorothie_gym.sim.ego.motion_control import guide
 from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near

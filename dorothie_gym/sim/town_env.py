@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from dorothie_gym import portable_arrays as pn
 from dorothie_gym.action_values import real_numbers, whole_number
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import Lookups, Restorable
+from dorothie_gym.copying import CachedViews, Restorable
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.model import Array
@@ -210,10 +210,10 @@ def parts_of(kind: ObservationType) -> list[ObservationType]:
     return [kind, *(found for part in parts for found in parts_of(part))]
 
 
-class Grayscale(Lookups, GrayscaleObservation):
+class Grayscale(CachedViews, GrayscaleObservation):
     """highway-env's `GrayscaleObservation`, whose viewer is made again in copies."""
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("viewer",)
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("viewer",)
 
     def __getstate__(self) -> dict[str, object]:
         return {**super().__getstate__(), "_viewed": self.viewer.config}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import Lookups, Restorable
+from dorothie_gym.copying import CachedViews, Restorable
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
@@ -20,7 +20,7 @@ from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.batch.threads import turns_of
 from dorothie_gym.sim.batch.worlds import alone, step_share
 from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
-from dorothie_gym.sim.ego.briefing import note_props
+from dorothie_gym.sim.ego.decision_setup import note_props
 from dorothie_gym.sim.ego.ego_controller import EgoController
 from dorothie_gym.sim.ego.obstacles import Hazard, PerceivedBody
 from dorothie_gym.sim.ego.planner import LocalPlanner
@@ -34,7 +34,7 @@ from dorothie_gym.sim.sensing.visibility import Visibility
 from dorothie_gym.sim.state.codes import NO_SPACE
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
-from dorothie_gym.sim.traffic.parameters import FRAMES
+from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
 from dorothie_gym.sim.weather import Weather, Wind
 from dorothie_gym.sim.world_start import OwnArrays, WorldSeeds, start_world
 
@@ -48,11 +48,11 @@ CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
 
 
 def parts_of(frames: int) -> list[int]:
-    """Returns the frames of the parts in which a step is played: the log of the ego has room for `FRAMES`."""
-    return [min(FRAMES, frames - first) for first in range(0, max(frames, 1), FRAMES)]
+    """Returns the frames of the parts in which a step is played: the log of the ego has room for `MAX_SUBSTEPS`."""
+    return [min(MAX_SUBSTEPS, frames - first) for first in range(0, max(frames, 1), MAX_SUBSTEPS)]
 
 
-class World(Lookups, Restorable):
+class World(CachedViews, Restorable):
     """A town in which the ego drives among others.
 
     All that moves is stepped by compiled loops (`sim.step`); this class writes their input and reads their results.
@@ -75,7 +75,7 @@ class World(Lookups, Restorable):
         reports: events of the ego, and the numbers of its infractions.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_record_of", "_own_record", "_batch_of", "_batch", "_scratch")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_record_of", "_own_record", "_batch_of", "_batch", "_scratch")
 
     _record_of: WorldArrays | None = None
     _batch_of: WorldArrays | None = None
@@ -154,7 +154,7 @@ class World(Lookups, Restorable):
         return self.end_step(traces)
 
     def _run(self, frames: int) -> None:
-        """Steps all bodies as a batch of one by no more than `FRAMES` substeps."""
+        """Steps all bodies as a batch of one by no more than `MAX_SUBSTEPS` substeps."""
         turns, inputs, answers = self._scratch
         answers[0] = NO_SPACE
         while True:

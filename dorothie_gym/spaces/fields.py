@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import DTypeLike, NDArray
 
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.spaces.limits import TEXT_CHARACTERS, UNBOUNDED
 from dorothie_gym.spaces.shared_text import SharedText
 
@@ -173,14 +173,14 @@ Arrays: TypeAlias = dict[str, NDArray[Any]]
 """Arrays of several types, by name."""
 
 
-class FieldBuffer(Lookups):
+class FieldBuffer(CachedViews):
     """Arrays of fixed types and shapes in one block of memory, with a leading axis of rows.
 
     A copy of the block costs as much as the copy of one array. The caller owns the copy; later changes of the buffer do
     not reach it.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("arrays",)
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("arrays",)
 
     def __init__(self, fields: Mapping[str, tuple[DTypeLike, Shape]], rows: int = 1) -> None:
         """Allocates arrays of zeros.

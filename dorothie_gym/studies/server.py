@@ -190,7 +190,7 @@ class StudyServer:
             except StorageError as error:
                 logger.warning("a request of the page could not be stored: %s", error)
                 return refusal(503, "This could not be stored. Please wait a moment.", RETRY_SECONDS)
-            except _NobodyError:
+            except NotSignedInError:
                 return refusal(401, f"You do not take part here any more. Contact: {self.progress.study.contact}")
             except (RefusedError, AnswerError) as error:
                 return refusal(409, str(error))
@@ -214,7 +214,7 @@ class StudyServer:
         body = r.read_body(request, kind)
         person = self._person(request)  # again, as the body may have taken long to come
         if person is None:
-            raise _NobodyError
+            raise NotSignedInError
         self._presence.see(person.id)
         return person, body
 
@@ -237,7 +237,7 @@ class StudyServer:
     def _known(self, name: str) -> Participant:
         found = self._records.participant(name)
         if found is None:
-            raise _NobodyError
+            raise NotSignedInError
         return found
 
     async def _news(self, request: Request) -> Response:
@@ -307,7 +307,7 @@ _NOT_YET: Final = (
 )
 
 
-class _NobodyError(Exception):
+class NotSignedInError(Exception):
     """A request needs a participant and has none."""
 
 

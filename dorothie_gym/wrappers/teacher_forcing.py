@@ -19,7 +19,7 @@ from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
 from dorothie_gym.recording.events import Event
-from dorothie_gym.recording.points import Point, task_points
+from dorothie_gym.recording.prediction_points import Point, task_points
 from dorothie_gym.recording.session import Session
 from dorothie_gym.recording.surroundings import Rows, SceneTable, Surroundings, light_rows, weather_rows
 from dorothie_gym.recording.trajectory import trajectory_of

@@ -1,6 +1,6 @@
 import pytest
 
-from dorothie_gym.analysis.talk.loops import has_loop
+from dorothie_gym.analysis.truth_checks.loops import has_loop
 from dorothie_gym.dialogue import Predicate, Proposition
 from dorothie_gym.ontology import ActionValue, DialogueMove, GoalStatus, LandmarkName
 from tests.analysis.builders import drive, human

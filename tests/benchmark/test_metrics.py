@@ -40,7 +40,7 @@ from dorothie_gym.ontology import (
     decode_slots,
 )
 from dorothie_gym.recording import DecisionPoint, InferencePoint, ufn_points
-from dorothie_gym.recording.points import nfd_points
+from dorothie_gym.recording.prediction_points import nfd_points
 from tests.recording.builders import physical, session, utterance
 
 

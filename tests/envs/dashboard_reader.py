@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.dashboard import AHEAD, FAR, FASTEST, NEAR, PANEL, PASSED, Readings, draw_dashboard
+from dorothie_gym.envs.navigation.dashboard import AHEAD, FAR, FASTEST, NEAR, PANEL, PASSED, Readings, draw_dashboard
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies.navigation import NavigationAction
 from dorothie_gym.policies.navigation.junction_exits import SECTORS

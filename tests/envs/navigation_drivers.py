@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from dorothie_gym.envs.navigation.continuous_control import AHEAD, CONTINUOUS_FIELDS
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
-from dorothie_gym.envs.pedals import AHEAD, CONTINUOUS_FIELDS
 from dorothie_gym.ontology import ActionValue
 from dorothie_gym.policies.navigation import NavigationAction, layout
 

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from dorothie_gym.envs.dashboard import (
+from dorothie_gym.envs.navigation.dashboard import (
     GOAL_COLOUR,
     HEIGHT,
     PANEL,

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.envs.episode import LEFT_ROAD_DISTANCE, TERMS, Ending, EpisodeArrays, episode_arrays, judge
-from dorothie_gym.envs.navigation_config import NavigationConfig, NavigationWeights
+from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights
+from dorothie_gym.envs.navigation.episode import LEFT_ROAD_DISTANCE, TERMS, Ending, EpisodeArrays, episode_arrays, judge
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.state.codes import Breach
 from dorothie_gym.sim.state.town_arrays import empty_town

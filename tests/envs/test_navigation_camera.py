@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode
 
 from dorothie_gym import CameraConfig
 from dorothie_gym.engine.camera_config import CameraOutput
-from dorothie_gym.envs.navigation_config import SMALL_CAMERA
+from dorothie_gym.envs.navigation.config import SMALL_CAMERA
 from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv

@@ -9,7 +9,7 @@ import pytest
 
 from dorothie_gym.engine.config import RewardWeights
 from dorothie_gym.engine.scenario import draw_scenario
-from dorothie_gym.envs.navigation_config import NavigationWeights
+from dorothie_gym.envs.navigation.config import NavigationWeights
 from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import DialogueMove

@@ -11,7 +11,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from dorothie_gym.engine.observations import LazyObservations
-from dorothie_gym.envs.driving_vector_env import DrivingVectorEnv
+from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_continuous_vector_env import NavigationContinuousVectorEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv

@@ -9,7 +9,7 @@ from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition,
 from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import DialogueMove, ObjectClass, Role
 from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
-from dorothie_gym.policies.co_wizard.judgement import seconds_to_goal
+from dorothie_gym.policies.co_wizard.proposition_truth import seconds_to_goal
 from dorothie_gym.policies.policy import replace as changed
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.travel_time import travel_time

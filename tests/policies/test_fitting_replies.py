@@ -13,7 +13,7 @@ from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, GoalSt
 from dorothie_gym.policies.co_wizard.answers import answer_yes_no
 from dorothie_gym.policies.co_wizard.goals import postpone
 from dorothie_gym.policies.co_wizard.initiative import take_initiative
-from dorothie_gym.policies.co_wizard.judgement import believes
+from dorothie_gym.policies.co_wizard.proposition_truth import believes
 from dorothie_gym.policies.participant.hints import hint, is_in_mind
 from dorothie_gym.policies.participant.messages import message_remark
 from dorothie_gym.policies.participant.replies import listen

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from dorothie_gym.analysis.talk.session_world import SessionWorld
-from dorothie_gym.analysis.talk.truth import is_true
+from dorothie_gym.analysis.truth_checks.session_world import SessionWorld
+from dorothie_gym.analysis.truth_checks.truth import is_true
 from dorothie_gym.dialogue import Direction, Predicate, Proposition
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import LandmarkName, Role, StreetName

@@ -2,8 +2,8 @@ import numpy as np
 
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition, draw_style
 from dorothie_gym.ontology import DialogueMove, LandmarkName, ObjectClass, Role
-from dorothie_gym.policies.delivery import Delivery
 from dorothie_gym.policies.speech import SpeechState, intend, remark
+from dorothie_gym.policies.speech_timing import Delivery
 
 RNG = np.random.default_rng(0)
 

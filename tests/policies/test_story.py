@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.analysis.talk.checks import mentions_story
+from dorothie_gym.analysis.truth_checks.checks import mentions_story
 from dorothie_gym.dialogue import Predicate
 from dorothie_gym.ontology import DialogueMove, Role
 from dorothie_gym.recording import Session

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from dorothie_gym.baselines.acting.inference import BenchmarkModel
+from dorothie_gym.baselines.benchmark_co_wizard.inference import BenchmarkModel
 from dorothie_gym.baselines.checkpoints import restore
 from dorothie_gym.baselines.dataset import TEST, Dataset
 from dorothie_gym.baselines.experiment import Experiment, task_predictions

@@ -13,11 +13,11 @@ from dorothie_gym.maps import load_town, town_names
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, Role
 from dorothie_gym.rendering import MapPainter, palette
 from dorothie_gym.rendering.aerial import AerialView
-from dorothie_gym.rendering.figures import PIN_LENGTH, pin_direction
 from dorothie_gym.rendering.frames import PICTURE_SIZE, SceneRenderer
 from dorothie_gym.rendering.map_sheet import site_key
 from dorothie_gym.rendering.scene import ExceptionMark, Scene, SpokenLine
 from dorothie_gym.rendering.session_scene import scene_of
+from dorothie_gym.rendering.sprites import PIN_LENGTH, pin_direction
 from dorothie_gym.spaces import AdWizardAction, noop
 from tests.rendering.test_frames import count, scene, town  # noqa: F401  # fixtures
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from dorothie_gym.analysis.exception_attribution import MEETING_DISTANCE
-from dorothie_gym.analysis.talk.checks import TalkChecks, check_session
-from dorothie_gym.analysis.talk.perceivable import BLIND_WAY, WITHIN, perceived_at
-from dorothie_gym.analysis.talk.session_world import SessionWorld
+from dorothie_gym.analysis.truth_checks.checks import TalkChecks, check_session
+from dorothie_gym.analysis.truth_checks.perceivable import BLIND_WAY, WITHIN, perceived_at
+from dorothie_gym.analysis.truth_checks.session_world import SessionWorld
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.recording import Event
 from tests.analysis.builders import exception

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.analysis.talk.checks import TalkChecks, check_session
-from dorothie_gym.analysis.talk.session_world import SessionWorld
-from dorothie_gym.analysis.talk.truth import agrees, is_right_cause, is_true
+from dorothie_gym.analysis.truth_checks.checks import TalkChecks, check_session
+from dorothie_gym.analysis.truth_checks.session_world import SessionWorld
+from dorothie_gym.analysis.truth_checks.truth import agrees, is_right_cause, is_true
 from dorothie_gym.dialogue import ASKED, Direction, Predicate, Proposition
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import ActionValue, GoalStatus, LandmarkName, ObjectClass, PhysicalAction, Role, StreetName

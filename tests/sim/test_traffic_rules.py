@@ -12,7 +12,7 @@ from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array, SignalKind
 from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
 from dorothie_gym.sim.network.network import TownNetwork
-from dorothie_gym.sim.traffic.parameters import FRAMES
+from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
 from tests.sim.crossings import crossing, way_in
 from tests.sim.driving import network
 from tests.sim.state.plain_rules import LENGTH, PlainWatch, lawless_way
@@ -44,7 +44,9 @@ def test_breaches_equal_those_of_exhaustive_loops(name: str) -> None:
     roads, count = network(name), Counter[WorldEventKind]()
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        count += compare(roads, lawless_way(roads, rng, 450), int(rng.integers(1, FRAMES + 1)), int(rng.integers(3000)))
+        count += compare(
+            roads, lawless_way(roads, rng, 450), int(rng.integers(1, MAX_SUBSTEPS + 1)), int(rng.integers(3000))
+        )
     assert count[WorldEventKind.OFF_ROAD] > 0
     assert count[WorldEventKind.WRONG_WAY] > 0
 
@@ -55,7 +57,9 @@ def test_breaches_equal_those_of_exhaustive_loops_on_many_drives(name: str) -> N
     roads, count = network(name), Counter[WorldEventKind]()
     for seed in range(100, 160):
         rng = np.random.default_rng(seed)
-        count += compare(roads, lawless_way(roads, rng, 450), int(rng.integers(1, FRAMES + 1)), int(rng.integers(3000)))
+        count += compare(
+            roads, lawless_way(roads, rng, 450), int(rng.integers(1, MAX_SUBSTEPS + 1)), int(rng.integers(3000))
+        )
     lines = {signal.kind for signal in PlainWatch(roads).signals.values()}
     assert count[WorldEventKind.OFF_ROAD] > 10
     assert count[WorldEventKind.WRONG_WAY] > 10

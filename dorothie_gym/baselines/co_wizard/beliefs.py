@@ -10,7 +10,7 @@ from dorothie_gym.baselines.co_wizard.memory import Memory
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.ontology.slots import ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor
-from dorothie_gym.policies.co_wizard.judgement import (
+from dorothie_gym.policies.co_wizard.proposition_truth import (
     DETOUR_TIME,
     is_localised,
     is_located,
@@ -21,8 +21,8 @@ from dorothie_gym.policies.co_wizard.judgement import (
 )
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import street_of
-from dorothie_gym.policies.sight import camera_fault
 from dorothie_gym.policies.travel_time import travel_time
+from dorothie_gym.policies.view_range import camera_fault
 from dorothie_gym.sim.state.codes import Motion
 
 LOST_VARIANCE, GPS_VARIANCE = 36.0, 0.18

@@ -22,7 +22,7 @@ from dorothie_gym.maps.model import Exit
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import GoalStatus, ObjectClass
-from dorothie_gym.policies.co_wizard.judgement import is_red_ahead
+from dorothie_gym.policies.co_wizard.proposition_truth import is_red_ahead
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.language_model.co_wizard_prompt import SHARED_NAMES
 from dorothie_gym.policies.language_model.navigator import RouteStep
@@ -34,8 +34,8 @@ from dorothie_gym.policies.route_progress import (
     stopping_distance,
     streets_named,
 )
-from dorothie_gym.policies.sight import Limit, camera_fault, limit_of, sight, suitable_speed
 from dorothie_gym.policies.turn_lanes import junction_meant
+from dorothie_gym.policies.view_range import Limit, camera_fault, limit_of, sight, suitable_speed
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.spaces.actions import Physical
 

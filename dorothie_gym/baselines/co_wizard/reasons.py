@@ -8,7 +8,7 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass
 from dorothie_gym.policies.co_wizard.answers import RECENT_STOP, explanation
-from dorothie_gym.policies.co_wizard.judgement import DETOUR_TIME, OBEYED_WITHIN, is_red_ahead
+from dorothie_gym.policies.co_wizard.proposition_truth import DETOUR_TIME, OBEYED_WITHIN, is_red_ahead
 from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import Remark, intend

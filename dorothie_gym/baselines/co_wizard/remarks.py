@@ -26,8 +26,8 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import direction_of, first_new_street
-from dorothie_gym.policies.sight import sight, suitable_speed
 from dorothie_gym.policies.speech import Remark
+from dorothie_gym.policies.view_range import sight, suitable_speed
 
 _ENUMS: Final = {
     kind.__name__: kind

@@ -27,7 +27,7 @@ HOP: Final = 320
 BANDS: Final = 32
 """Number of mel bands."""
 
-FRAMES: Final = 256
+MEL_FRAMES: Final = 256
 """Number of frames of a spectrum, 5.1 s; what is spoken later is left out."""
 
 _LOWEST, _HIGHEST = 60.0, 7600.0
@@ -68,10 +68,10 @@ def _filters() -> NDArray[np.float64]:
 
 def mel_table(sounds: Sequence[NDArray[np.float32]]) -> NDArray[np.float16]:
     """Returns the log-mel spectra of sounds, float16 (n, 256, 32): cut, or filled with zeros; zeros for no samples."""
-    table = np.zeros((len(sounds), FRAMES, BANDS), dtype=np.float16)
+    table = np.zeros((len(sounds), MEL_FRAMES, BANDS), dtype=np.float16)
     for row, sound in zip(table, sounds, strict=True):
         if len(sound):
-            levels = log_mel(sound)[:FRAMES]
+            levels = log_mel(sound)[:MEL_FRAMES]
             row[: len(levels)] = levels
     return table
 

@@ -23,8 +23,8 @@ from dorothie_gym.policies.participant.hints import famous_nearby
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.participant.yes_no_answers import JUST_DONE
 from dorothie_gym.policies.route_progress import first_new_street, light_ahead, next_choice
-from dorothie_gym.policies.sight import camera_fault, sight, suitable_speed
 from dorothie_gym.policies.turn_lanes import turn_lanes
+from dorothie_gym.policies.view_range import camera_fault, sight, suitable_speed
 
 AWAY: Final = 300.0
 """Time that stands for "never" or "long ago" [s]."""

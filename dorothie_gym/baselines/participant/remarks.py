@@ -29,8 +29,8 @@ from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
-from dorothie_gym.policies.sight import sight, suitable_speed
 from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.policies.view_range import sight, suitable_speed
 from dorothie_gym.tasks.landmark_designs import features_of
 
 TEXTS: Final = ("person", "item", "purpose", "reason", "feature")

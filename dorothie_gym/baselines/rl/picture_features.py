@@ -10,7 +10,7 @@ from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn
 
-from dorothie_gym.envs.dashboard import rows_of_dashboard
+from dorothie_gym.envs.navigation.dashboard import rows_of_dashboard
 
 STREET: Final = 256
 """Numbers that describe what the camera sees."""

@@ -20,7 +20,7 @@ from dorothie_gym.ontology.dialogue_acts import LABELS
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.recording.events import ActionRecord, EventType, UtteranceRecord
 from dorothie_gym.recording.header import SessionHeader
-from dorothie_gym.recording.points import (
+from dorothie_gym.recording.prediction_points import (
     SPEAKERS,
     SessionHistory,
     at_tenths,

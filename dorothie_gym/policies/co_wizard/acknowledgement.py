@@ -9,8 +9,8 @@ from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies import contents
-from dorothie_gym.policies.co_wizard.judgement import DETOUR_TIME, believes, seconds_to_goal
+from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.co_wizard.proposition_truth import DETOUR_TIME, believes, seconds_to_goal
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
@@ -35,7 +35,7 @@ def acknowledge(
     """
     if rng.random() < state.style.silent:
         return
-    wanted = contents.action(action, words)
+    wanted = act_builders.action(action, words)
     wording = Wording(
         direction=words.direction,
         faster=words.faster,
@@ -67,14 +67,14 @@ def taken_on(state: CoWizardState, wanted: Proposition, rng: np.random.Generator
     """Returns an acceptance ("will do") of what is wanted, or the sign that it was heard ("okay"), by chance."""
     accepts = rng.random() < state.config.accepts
     function, topic = (Function.ACCEPT, "taken") if accepts else (Function.POSITIVE_FEEDBACK, "ordered")
-    return intend(function, wanted, elided=contents.arguments_of(wanted), wording=Wording(topic=topic))
+    return intend(function, wanted, elided=act_builders.arguments_of(wanted), wording=Wording(topic=topic))
 
 
 def _repeated(wanted: Proposition, wording: Wording, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Takes on an instruction by repeating it: "turning left", or "okay, I'm turning left"."""
     if rng.random() < 0.35:
         return (intend(Function.ACCEPT, wanted, wording=replace(wording, topic="taken")),)
-    elided = contents.arguments_of(wanted)
+    elided = act_builders.arguments_of(wanted)
     okay = intend(Function.POSITIVE_FEEDBACK, wanted, elided=elided, wording=Wording(topic="ordered"))
     return okay, intend(Function.INFORM, wanted, wording=wording, joined=True)
 

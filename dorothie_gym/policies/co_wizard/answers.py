@@ -13,11 +13,11 @@ from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, Slot, StreetName
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
 from dorothie_gym.policies.co_wizard.goals import set_goal
-from dorothie_gym.policies.co_wizard.judgement import (
+from dorothie_gym.policies.co_wizard.proposition_truth import (
     believes,
     reason_to_stand,
     reason_to_turn_round,
@@ -26,12 +26,12 @@ from dorothie_gym.policies.co_wizard.judgement import (
 )
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.noticing import fault_remark, view_remark
+from dorothie_gym.policies.notable_conditions import fault_remark, view_remark
 from dorothie_gym.policies.observation_parser import street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import direction_of
-from dorothie_gym.policies.sight import camera_fault, limit_of, sight
 from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.policies.view_range import camera_fault, limit_of, sight
 from dorothie_gym.sim.state.codes import Motion
 
 _ABOUT_THE_GOAL = frozenset(
@@ -52,9 +52,9 @@ def answer_yes_no(
 ) -> None:
     """Answers a yes/no question by what the Co-Wizard believes of it."""
     asked = asked_proposition(act, words)
-    place = contents.first_name(act.values(Slot.LANDMARK))
+    place = act_builders.first_name(act.values(Slot.LANDMARK))
     if place is not None and state.beliefs.goal is None and _REQUEST.search(words.text.lower()):
-        set_goal(state, view, place, contents.named_streets(act), rng, sure=False)  # "could you hard to KFC?"
+        set_goal(state, view, place, act_builders.named_streets(act), rng, sure=False)  # "could you hard to KFC?"
     elif asked is None:
         state.say(intend(Function.NEGATIVE_FEEDBACK))  # a question of which nothing was understood
     elif asked.predicate is Predicate.LIGHTS_ON:

@@ -13,10 +13,10 @@ from dorothie_gym.maps.routing import Place, router
 from dorothie_gym.ontology.actions import MentalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, StreetName
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark, sign_of_hearing
+from dorothie_gym.policies.co_wizard.errand_memory import kept_for_later
 from dorothie_gym.policies.co_wizard.state import CoWizardState
-from dorothie_gym.policies.co_wizard.story import kept_for_later
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
 from dorothie_gym.policies.route_progress import RouteProgress, default_lane_place, streets_named
@@ -103,18 +103,18 @@ def set_goal(
     aim(state, view, mark)
     if dropped is not None:
         wording = Wording(topic="changed", dropped=dropped)
-        state.say(intend(Function.ACCEPT, contents.destination(name), wording=wording))
+        state.say(intend(Function.ACCEPT, act_builders.destination(name), wording=wording))
         progress = state.route.progress
         if progress is not None and progress.turns_round_first(state.town, view.station):
-            state.say(intend(Function.INFORM, contents.action(ActionValue.U_TURN), joined=True))
+            state.say(intend(Function.INFORM, act_builders.action(ActionValue.U_TURN), joined=True))
     elif corrected:
-        state.say(intend(Function.ACCEPT, contents.destination(name), wording=Wording(topic="sorry")))
+        state.say(intend(Function.ACCEPT, act_builders.destination(name), wording=Wording(topic="sorry")))
     elif not sure or (not streets and rng.random() < state.style.checks * (2.0 if name in _COMMON else 0.6)):
-        state.say(intend(Function.CHECK_QUESTION, contents.destination(name, mark.street)))
+        state.say(intend(Function.CHECK_QUESTION, act_builders.destination(name, mark.street)))
     else:
         street = mark.street if streets and rng.random() < state.style.echoes else None
         function = Function.ACCEPT if rng.random() < state.config.accepts_goals else Function.POSITIVE_FEEDBACK
-        taken = intend(function, contents.destination(name, street), wording=Wording(topic="taken"))
+        taken = intend(function, act_builders.destination(name, street), wording=Wording(topic="taken"))
         state.say(taken, *plan_remark(state, view, rng, joined=True))
 
 
@@ -123,7 +123,7 @@ def _set_unknown_goal(
 ) -> None:
     """Takes up a destination that is not on the map and says so; the car then needs guidance."""
     again = state.beliefs.goal is name and not state.beliefs.exact
-    where = contents.located(name, StreetName.QUERIED)
+    where = act_builders.located(name, StreetName.QUERIED)
     state.beliefs = state.beliefs.with_unknown_goal(name).with_status(name, GoalStatus.UNKNOWN)
     state.route = state.route.with_progress(None)
     state.intentions = state.intentions.for_unknown_goal()
@@ -131,7 +131,7 @@ def _set_unknown_goal(
         state.say(intend(Function.SET_QUESTION, where, elided=("street",)))
         return
     unknown = Proposition.of(Predicate.KNOWS, negated=True, place=name)
-    unmarked = contents.errand(name, GoalStatus.UNKNOWN)
+    unmarked = act_builders.errand(name, GoalStatus.UNKNOWN)
     no_map = intend(Function.INFORM, unknown, unmarked, wording=Wording(topic="no_map"))
     draw = rng.random()
     if draw < 0.25 and not streets:
@@ -149,7 +149,7 @@ def _set_unknown_goal(
 def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: np.random.Generator) -> None:
     """Records a place to visit later: acknowledges it, asks for the order, or offers to go there first."""
     state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
-    mark, later = known_landmark(state, view, name, ()), contents.errand(name, GoalStatus.PENDING)
+    mark, later = known_landmark(state, view, name, ()), act_builders.errand(name, GoalStatus.PENDING)
     goal, progress = state.beliefs.goal, state.route.progress
     if goal is None or goal is name or goal in state.speech.heard:  # the order is clear
         state.say(kept_for_later(state, name))
@@ -164,7 +164,7 @@ def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: 
                     Proposition.of(Predicate.NEARER, place=name, landmark=goal),
                     elided=("landmark",),
                 ),
-                intend(Function.OFFER, contents.destination(name), wording=Wording(topic="first"), joined=True),
+                intend(Function.OFFER, act_builders.destination(name), wording=Wording(topic="first"), joined=True),
             )
             return
     if rng.random() < 0.5:
@@ -173,7 +173,7 @@ def postpone(state: CoWizardState, view: CoWizardView, name: LandmarkName, rng: 
     elif rng.random() < state.config.accepts_changes:
         state.say(kept_for_later(state, name))
     else:
-        state.say(intend(Function.POSITIVE_FEEDBACK, later, elided=contents.arguments_of(later)))
+        state.say(intend(Function.POSITIVE_FEEDBACK, later, elided=act_builders.arguments_of(later)))
 
 
 def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
@@ -186,7 +186,7 @@ def accept_offer(state: CoWizardState, view: CoWizardView) -> None:
     if state.beliefs.goal is not None:
         state.beliefs = state.beliefs.with_status(state.beliefs.goal, GoalStatus.PENDING)
     aim(state, view, mark)
-    state.say(intend(Function.ACCEPT, contents.destination(mark.name), wording=Wording(topic="taken")))
+    state.say(intend(Function.ACCEPT, act_builders.destination(mark.name), wording=Wording(topic="taken")))
 
 
 def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName | None, distance: float) -> None:
@@ -203,7 +203,7 @@ def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName |
         if mark is not None and mark.name not in _COMMON:
             if state.beliefs.place != mark.place:
                 aim(state, view, mark)
-            state.say(intend(Function.POSITIVE_FEEDBACK, contents.destination(name)))
+            state.say(intend(Function.POSITIVE_FEEDBACK, act_builders.destination(name)))
             return
     state.beliefs = state.beliefs.with_goal_ahead(name)
     state.intentions = state.intentions.creeping_up()
@@ -237,7 +237,7 @@ def hear_description(
         asked = view.time - state.dialogue.asked_at < state.config.answer_time
         state.say(sign_of_hearing("answered" if asked else "told"))
     else:
-        state.say(intend(Function.POSITIVE_FEEDBACK, contents.located(goal, street), elided=("place",)))
+        state.say(intend(Function.POSITIVE_FEEDBACK, act_builders.located(goal, street), elided=("place",)))
 
 
 def _described_place(

@@ -12,18 +12,18 @@ from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.acknowledgement import plan_remark
 from dorothie_gym.policies.co_wizard.driving import wanted_exit
-from dorothie_gym.policies.co_wizard.judgement import NAMED_ACTIONS, is_localised, reason_to_stand
+from dorothie_gym.policies.co_wizard.errand_memory import arrival_reminder
+from dorothie_gym.policies.co_wizard.proposition_truth import NAMED_ACTIONS, is_localised, reason_to_stand
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive, Wish
-from dorothie_gym.policies.co_wizard.story import arrival_reminder
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.policies.noticing import PARAMETER, fault_remark, notice, view_remark
+from dorothie_gym.policies.notable_conditions import PARAMETER, fault_remark, notice, view_remark
 from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, street_of
 from dorothie_gym.policies.route_progress import Choice, direction_of
-from dorothie_gym.policies.sight import Limit, camera_fault, limit_of, sight, suitable_speed
 from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.policies.view_range import Limit, camera_fault, limit_of, sight, suitable_speed
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.spaces.actions import Physical
 
@@ -116,13 +116,13 @@ def _ask_way(state: CoWizardState, view: CoWizardView, rng: np.random.Generator)
     state.intentions = state.intentions.with_pause(pausing)
     if state.beliefs.goal is None and dialogue.heard_at >= 0.0 and silence > config.goal_interval:
         # the place may have been misheard, and it helps more than the way
-        state.say(intend(Function.SET_QUESTION, contents.destination(LandmarkName.QUERIED)))
+        state.say(intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED)))
     elif not asked and rng.random() < state.style.proposes:
         _propose_way(state, view, choice, rng)
     else:
         state.dialogue = state.dialogue.with_proposal(None)
         first = plan_remark(state, view, rng)
-        asked_way = intend(Function.SET_QUESTION, contents.action(ActionValue.QUERIED), joined=bool(first))
+        asked_way = intend(Function.SET_QUESTION, act_builders.action(ActionValue.QUERIED), joined=bool(first))
         state.say(*first, asked_way)
 
 
@@ -156,7 +156,7 @@ def _propose_way(state: CoWizardState, view: CoWizardView, choice: Choice, rng: 
     action = ActionValue.LANE_FOLLOW if direction is Direction.STRAIGHT else ActionValue.J_TURN
     street = street_of(view.raw, state.town, way.lane)
     named = action is ActionValue.J_TURN and rng.random() < 0.3
-    content = contents.action(action, direction=direction, street=street if named else None)
+    content = act_builders.action(action, direction=direction, street=street if named else None)
     function = Function.PROPOSITIONAL_QUESTION if rng.random() < 0.7 else Function.CHECK_QUESTION
     state.dialogue = state.dialogue.with_proposal(Directive(direction=direction, junction=choice.junction))
     first = plan_remark(state, view, rng)
@@ -205,12 +205,12 @@ def _ask_goal(state: CoWizardState, view: CoWizardView, rng: np.random.Generator
         state.say(intend(Function.FEEDBACK_ELICITATION, wording=Wording(topic="hearing")))
     elif lost:
         street = draw < 0.75 and not state.beliefs.described
-        asked = contents.located(goal, StreetName.QUERIED) if street else contents.action(ActionValue.QUERIED)
+        asked = act_builders.located(goal, StreetName.QUERIED) if street else act_builders.action(ActionValue.QUERIED)
         state.say(intend(Function.SET_QUESTION, asked))
     elif state.beliefs.statuses and draw < 0.25:
-        state.say(intend(Function.SET_QUESTION, contents.errand(None, GoalStatus.QUERIED)))
+        state.say(intend(Function.SET_QUESTION, act_builders.errand(None, GoalStatus.QUERIED)))
     else:
-        state.say(intend(Function.SET_QUESTION, contents.destination(LandmarkName.QUERIED)))
+        state.say(intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED)))
 
 
 def _explain_hazard(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
@@ -268,7 +268,9 @@ def _slower(state: CoWizardState, view: CoWizardView) -> tuple[Remark, ...]:
     state.intentions = state.intentions.with_speed(speed)
     wording = Wording(faster=False, speed=speed)
     return (
-        intend(Function.INFORM, contents.action(ActionValue.SPEED_CHANGE, speed=speed), wording=wording, joined=True),
+        intend(
+            Function.INFORM, act_builders.action(ActionValue.SPEED_CHANGE, speed=speed), wording=wording, joined=True
+        ),
     )
 
 
@@ -293,13 +295,13 @@ def _mention_weather(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
     if bad and state.intentions.speed > speed:
         if rng.random() < state.style.checks + 0.3:
             state.dialogue = state.dialogue.with_slower(speed)
-            content = contents.action(ActionValue.SPEED_CHANGE, speed=speed)
+            content = act_builders.action(ActionValue.SPEED_CHANGE, speed=speed)
             state.say(intend(Function.OFFER, content, wording=Wording(faster=False, speed=speed), joined=True))
         else:
             state.say(*_slower(state, view))
     elif dark:
         state.intentions = state.intentions.with_lights(True)
-        content = contents.action(ActionValue.LIGHT_CHANGE)
+        content = act_builders.action(ActionValue.LIGHT_CHANGE)
         state.say(intend(Function.INFORM, content, wording=Wording(lights=True, topic="own_lights"), joined=True))
 
 
@@ -343,5 +345,5 @@ def announce_action(
             return
         direction = direction_of(way)
         street = street_of(view.raw, state.town, way.lane) if rng.random() < 0.6 else None
-    content = contents.action(action, direction=direction, street=street)
+    content = act_builders.action(action, direction=direction, street=street)
     state.say(intend(Function.INFORM, content, wording=Wording(direction=direction)))

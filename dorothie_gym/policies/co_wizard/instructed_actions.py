@@ -13,7 +13,7 @@ from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.actions import SPEED_STEP
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.slots import ActionValue, StreetName
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.goals import approach_stop
 from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP, CoWizardState, Directive, Wish
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -39,7 +39,7 @@ Obey: TypeAlias = Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText
 
 def do_turn(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText) -> None:
     """Intends the turn that was asked for."""
-    streets, junction = contents.named_streets(act), junction_meant(state.town, view.here, view.choice)
+    streets, junction = act_builders.named_streets(act), junction_meant(state.town, view.here, view.choice)
     directive = Directive(
         direction=words.direction,
         street=streets[0] if streets else StreetName.UNKNOWN,

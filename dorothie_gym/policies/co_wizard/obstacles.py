@@ -11,7 +11,7 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.slots import ActionValue, ObjectClass
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.goals import plan_route
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -50,7 +50,7 @@ def watch_road(state: CoWizardState, view: CoWizardView, rng: np.random.Generato
         state.say(intend(CommunicativeFunction.OFFER, detour, wording=Wording(topic="detour"), joined=not told))
     else:
         state.dialogue = state.dialogue.after_asking(view.time)
-        way = contents.action(ActionValue.QUERIED)
+        way = act_builders.action(ActionValue.QUERIED)
         state.say(intend(CommunicativeFunction.SET_QUESTION, way, joined=not told))
     state.intentions = state.intentions.blocked()
 
@@ -61,9 +61,9 @@ def _proposed_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Ge
     route = state.route.progress.replanned(state.town, view.here, state.route.blocked)
     street = first_new_street(view.raw, state.town, view.lane, route)
     if street is not None and rng.random() < state.config.detour_by_street:
-        return contents.action(None, street=street)
+        return act_builders.action(None, street=street)
     turns_round = route.turns_round_first(state.town, view.station) and rng.random() < 0.5
-    return contents.action(ActionValue.U_TURN if turns_round else None)
+    return act_builders.action(ActionValue.U_TURN if turns_round else None)
 
 
 def _obstacle_on_path(state: CoWizardState, view: CoWizardView) -> SeenObject | None:
@@ -111,9 +111,9 @@ def take_detour(state: CoWizardState, view: CoWizardView, rng: np.random.Generat
         return
     street = first_new_street(view.raw, state.town, view.lane, progress)
     if street is not None:
-        over = contents.action(None, street=street)
+        over = act_builders.action(None, street=street)
         function = CommunicativeFunction.ACCEPT if agreed else CommunicativeFunction.INFORM
         state.say(intend(function, over, wording=Wording(topic="detour")))
     if progress.turns_round_first(state.town, view.station) and rng.random() < 0.6:
-        turn = contents.action(ActionValue.U_TURN)
+        turn = act_builders.action(ActionValue.U_TURN)
         state.say(intend(CommunicativeFunction.INFORM, turn, joined=street is not None))

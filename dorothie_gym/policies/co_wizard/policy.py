@@ -12,13 +12,13 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
+from dorothie_gym.policies.co_wizard.dialogue_update import listen
 from dorothie_gym.policies.co_wizard.driving import creep, drive, end_red_light_rest, junction_ahead, rest
 from dorothie_gym.policies.co_wizard.goals import note_plan, recognise_goal, search_on
 from dorothie_gym.policies.co_wizard.initiative import announce_action, scene_of, take_initiative
-from dorothie_gym.policies.co_wizard.judgement import reason_to_stand
 from dorothie_gym.policies.co_wizard.obstacles import watch_road
+from dorothie_gym.policies.co_wizard.proposition_truth import reason_to_stand
 from dorothie_gym.policies.co_wizard.state import CoWizardState, Intentions
-from dorothie_gym.policies.co_wizard.understanding_update import listen
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace

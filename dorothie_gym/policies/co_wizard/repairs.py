@@ -9,7 +9,7 @@ from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, Slot
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.goals import doubt
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -21,7 +21,7 @@ FRAGMENT = 3
 """Largest number of words that are taken for the rest of a misheard utterance if they make no sense."""
 
 
-_REPEATABLE = contents.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
+_REPEATABLE = act_builders.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTRUCT, DialogueMove.REPLY_W}
 """Moves that are worth saying again."""
 
 _WITHOUT_CONTENT = frozenset(
@@ -77,7 +77,7 @@ def repeat_last(state: CoWizardState) -> None:
         return
     last = said[-1]
     corrects = last.act.slots and bool({said.predicate for said in last.meaning} & _CORRECTED)
-    again = corrects and last.act.move not in contents.QUESTIONS
+    again = corrects and last.act.move not in act_builders.QUESTIONS
     state.say(repeated(last, Function.CORRECTION) if again else replace(last, text="", joined=False))
 
 
@@ -101,7 +101,7 @@ def check_goal(state: CoWizardState, view: CoWizardView) -> None:
         return
     if count == state.config.contradictions:
         state.dialogue = state.dialogue.after_asking(view.time)
-        state.say(intend(Function.CHECK_QUESTION, contents.destination(goal)))
+        state.say(intend(Function.CHECK_QUESTION, act_builders.destination(goal)))
     elif count >= 2 * state.config.contradictions:
         state.dialogue = state.dialogue.with_contradictions(goal, 0)
         doubt(state)

@@ -8,7 +8,7 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.slots import ActionValue
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.speech import intend
@@ -38,6 +38,6 @@ def note_order(state: CoWizardState, view: CoWizardView, action: ActionValue) ->
     state.dialogue = state.dialogue.with_orders_settled()
     tried = Proposition.of(Predicate.TRIED, action=action, times=REPEATED - 1)
     remark = intend(CommunicativeFunction.INFORM, tried, elided=("action", "times"), wording=Wording(topic="tried"))
-    way = contents.action(ActionValue.QUERIED)
+    way = act_builders.action(ActionValue.QUERIED)
     question = intend(CommunicativeFunction.SET_QUESTION, way, wording=Wording(topic="another_way"), joined=True)
     state.say(remark, question)

@@ -18,7 +18,7 @@ from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, 
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.policies.co_wizard.beliefs import BeliefState
 from dorothie_gym.policies.co_wizard.config import CoWizardConfig, CoWizardStyle
-from dorothie_gym.policies.noticing import Noticed
+from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteState
 from dorothie_gym.policies.speech import SpeakingState

@@ -13,7 +13,7 @@ from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, StreetName
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.hints import corner_fact, famous_nearby, looks_remark
@@ -63,7 +63,7 @@ def _report_done(
 ) -> None:
     landmark = view.landmark(subgoal.landmark)
     named = landmark is not None and rng.random() < 0.4
-    finished = contents.errand(None if landmark is None else landmark.name, GoalStatus.COMPLETE)
+    finished = act_builders.errand(None if landmark is None else landmark.name, GoalStatus.COMPLETE)
     wording = (
         _wording_of_meeting(view, subgoal) if landmark is not None and landmark.name is LandmarkName.PERSON else None
     )
@@ -97,13 +97,13 @@ def _report_added(
     if on_the_way or _has_to_wait(state, view, subgoal, landmark):
         _go_first(state, view, subgoal, landmark, rng)
         return
-    later = contents.errand(landmark.name, GoalStatus.PENDING)
+    later = act_builders.errand(landmark.name, GoalStatus.PENDING)
     news = intend(Function.REQUEST, later, wording=Wording(topic="added"))
     progress = state.route.progress
     far = progress is not None and progress.left(view.station) > state.config.wait_distance
     if view.speed > 2.0 and far and state.speech.idle and rng.random() < state.style.waits:
         state.task = state.task.waiting_until(view.time + state.config.thinking_time)
-        stop = intend(Function.REQUEST, contents.action(ActionValue.STOP), urgent=True)
+        stop = intend(Function.REQUEST, act_builders.action(ActionValue.STOP), urgent=True)
         state.say(stop, replace(news, joined=True))
     else:
         state.say(news, *message_remark(state, view, landmark, rng))
@@ -144,11 +144,11 @@ def _go_first(
     assert former is not None
     switch_target(state, view, subgoal, landmark)
     street = None if view.unique(landmark) else landmark.street
-    now = contents.errand(landmark.name, GoalStatus.ONGOING, street)
+    now = act_builders.errand(landmark.name, GoalStatus.ONGOING, street)
     state.say_only(
         intend(Function.REQUEST, now, wording=Wording(topic="added")),
         *message_remark(state, view, landmark, rng),
-        intend(Function.REQUEST, contents.errand(former.name, GoalStatus.PENDING), joined=True),
+        intend(Function.REQUEST, act_builders.errand(former.name, GoalStatus.PENDING), joined=True),
     )
 
 
@@ -167,7 +167,7 @@ def resume_after_wait(state: ParticipantState, view: ParticipantView) -> None:
         return
     state.task = state.task.waiting_until(math.inf)
     if view.standing:
-        state.say(intend(Function.REQUEST, contents.action(ActionValue.START)))
+        state.say(intend(Function.REQUEST, act_builders.action(ActionValue.START)))
 
 
 def _report_dropped(
@@ -183,7 +183,7 @@ def _report_dropped(
         state.forget_target()
         state.task = state.task.with_same_breath(True)
         state.speech = state.speech.cleared()
-    dropped = contents.errand(landmark.name, GoalStatus.ABANDONED)
+    dropped = act_builders.errand(landmark.name, GoalStatus.ABANDONED)
     if known:
         function = Function.REQUEST if rng.random() < 0.8 else Function.INFORM
         news = intend(function, dropped)
@@ -204,12 +204,12 @@ def _report_changed(
         if busy or rng.random() >= state.config.announces_ahead:
             return  # the change is announced when the subgoal becomes the target
         if former.name is landmark.name:
-            later = contents.errand(landmark.name, GoalStatus.PENDING, landmark.street)
+            later = act_builders.errand(landmark.name, GoalStatus.PENDING, landmark.street)
             state.say(intend(Function.REQUEST, later))
         else:
             wording = Wording(topic="changed_later", dropped=former.name)
-            dropped = contents.errand(former.name, GoalStatus.ABANDONED)
-            instead = contents.errand(landmark.name, GoalStatus.PENDING)
+            dropped = act_builders.errand(former.name, GoalStatus.ABANDONED)
+            instead = act_builders.errand(landmark.name, GoalStatus.PENDING)
             state.say(
                 intend(Function.REQUEST, instead, dropped, wording=wording), *message_remark(state, view, landmark, rng)
             )
@@ -224,8 +224,8 @@ def _report_changed(
     if former.name is landmark.name:
         _report_same_place(state, view, former, landmark, rng)
     else:
-        dropped = contents.errand(former.name, GoalStatus.ABANDONED)
-        instead = contents.errand(landmark.name, GoalStatus.ONGOING)
+        dropped = act_builders.errand(former.name, GoalStatus.ABANDONED)
+        instead = act_builders.errand(landmark.name, GoalStatus.ONGOING)
         change = intend(Function.REQUEST, instead, dropped, wording=Wording(dropped=former.name))
         state.say(change, *message_remark(state, view, landmark, rng))
 
@@ -251,7 +251,7 @@ def _report_more(
         item=purpose.items[0] if purpose.items else None,
     )  # fmt: skip
     state.task = state.task.after_telling(more)
-    later = intend(Function.REQUEST, contents.errand(landmark.name, GoalStatus.PENDING))
+    later = intend(Function.REQUEST, act_builders.errand(landmark.name, GoalStatus.PENDING))
     state.say(later, intend(Function.INFORM, more, elided=("place",), wording=Wording(topic="purpose"), joined=True))
 
 
@@ -261,7 +261,7 @@ def _report_same_place(
 ) -> None:  # fmt: skip
     """Tells what else is to be done at the target, or which place of its name is meant now."""
     reason = story_remark(state, view, rng) if former.place == landmark.place else ()
-    state.say(*(reason or (intend(Function.REQUEST, contents.destination(landmark.name, landmark.street)),)))
+    state.say(*(reason or (intend(Function.REQUEST, act_builders.destination(landmark.name, landmark.street)),)))
 
 
 # --- target ---------------------------------------------------------------------------------------------------------
@@ -298,16 +298,16 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
     assert task.goal is not None
     street = None
     if not view.unique(task.goal) or rng.random() < state.style.names_street:
-        street = contents.named(task.goal.street)
+        street = act_builders.named(task.goal.street)
     if task.target in task.put_off:
-        resumed = contents.errand(task.goal.name, GoalStatus.ONGOING)
+        resumed = act_builders.errand(task.goal.name, GoalStatus.ONGOING)
         return intend(Function.REQUEST, resumed, wording=Wording(topic="resume"))
-    goal = contents.destination(task.goal.name, street)
+    goal = act_builders.destination(task.goal.name, street)
     more = sum(subgoal.open for subgoal in view.subgoals) > 2
     if street is None and more and rng.random() < 0.5:
         return intend(Function.REQUEST, goal, wording=Wording(topic="first"))
     if street is None and rng.random() < state.config.leaves_route:
-        return intend(Function.REQUEST, goal, contents.action(ActionValue.UNKNOWN))
+        return intend(Function.REQUEST, goal, act_builders.action(ActionValue.UNKNOWN))
     return intend(Function.REQUEST, goal)
 
 
@@ -390,7 +390,7 @@ def _say_announcement(
     later = [view.landmark(item.landmark) for item in view.subgoals if item.open and item.index != target]
     named = [mark for mark in later if mark is not None and goal is not None and mark.name is not goal.name]
     if named and rng.random() < 0.25:
-        state.say(intend(Function.INFORM, contents.errand(named[0].name, GoalStatus.PENDING), joined=True))
+        state.say(intend(Function.INFORM, act_builders.errand(named[0].name, GoalStatus.PENDING), joined=True))
     elif rng.random() < state.style.aligns:
         state.say(intend(Function.FEEDBACK_ELICITATION, wording=Wording(topic="understood"), joined=True))
     elif goal is not None and rng.random() < state.style.verifies:
@@ -442,12 +442,12 @@ def describe(state: ParticipantState, view: ParticipantView, function: Function,
         state.say_first(intend(function, corner, elided=elided, wording=Wording(topic="located_cross")), *looks)
         return
     if goal.name is LandmarkName.PERSON and not no_street and not named:
-        where = contents.located(goal.name, goal.street)
+        where = act_builders.located(goal.name, goal.street)
         state.say_first(intend(function, where, wording=Wording(topic="person_where")), *looks)
         return
     near = famous_nearby(goal, view, state.config.near_landmark)
     beside = None if near is None else Proposition.of(Predicate.NEAR, place=goal.name, landmark=near.name)
-    on_street = None if no_street else contents.located(goal.name, goal.street)
+    on_street = None if no_street else act_builders.located(goal.name, goal.street)
     facts = [fact for fact in (on_street, beside) if fact is not None]
     if named and beside is None:
         state.set_guiding(True)

@@ -15,8 +15,8 @@ from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.observation_parser import SeenLandmark, street_of
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
-from dorothie_gym.policies.sight import DENSE, sight
 from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.policies.view_range import DENSE, sight
 from dorothie_gym.tasks.landmark_designs import features_of
 
 _FAMOUS = frozenset(LandmarkName) - {

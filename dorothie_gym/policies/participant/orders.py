@@ -9,7 +9,7 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, StreetName
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.speech import Remark, intend
 
 _FUNCTIONS: Final = MappingProxyType(
@@ -45,7 +45,7 @@ def order(
         KeyError: the move is none of the three.
     """
     particulars = Wording() if wording is None else wording
-    wanted = contents.action(
+    wanted = act_builders.action(
         action,
         direction=particulars.direction,
         street=street,

@@ -12,10 +12,10 @@ from dorothie_gym.dialogue.realization_context import Wording, WordingContext
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
 from dorothie_gym.policies.mood import Happening
-from dorothie_gym.policies.noticing import PARAMETER, notice, view_remark
+from dorothie_gym.policies.notable_conditions import PARAMETER, notice, view_remark
 from dorothie_gym.policies.observation_parser import (
     is_dark,
     is_foggy,
@@ -29,8 +29,8 @@ from dorothie_gym.policies.participant.goals import purpose_of_target
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.policies.sight import FAR_SIGHT, Limit, camera_fault, limit_of, sight, suitable_speed
 from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.policies.view_range import FAR_SIGHT, Limit, camera_fault, limit_of, sight, suitable_speed
 
 _HANDLED = frozenset({WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION})
 """Parameters of the weather that have a reaction of their own."""
@@ -171,7 +171,7 @@ def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.ran
         speed = suitable_speed(sight(view.raw)) + _HASTE * (state.style.hurries > _HURRIED)
         if view.speed > (speed + _HASTE) / 3.6:
             content, wording = (
-                contents.action(ActionValue.SPEED_CHANGE, speed=speed),
+                act_builders.action(ActionValue.SPEED_CHANGE, speed=speed),
                 Wording(faster=False, speed=speed),
             )
             state.say(said, intend(Function.REQUEST, content, wording=wording, joined=True))
@@ -186,7 +186,10 @@ def _mention_weather(state: ParticipantState, view: ParticipantView, rng: np.ran
         arrives = progress is not None and progress.left(view.station) < _SPEEDING_UP
         if not arrives and rng.random() < 0.5:
             speed = round(config.usual_speed)
-            content, wording = contents.action(ActionValue.SPEED_CHANGE, speed=speed), Wording(faster=True, speed=speed)
+            content, wording = (
+                act_builders.action(ActionValue.SPEED_CHANGE, speed=speed),
+                Wording(faster=True, speed=speed),
+            )
             state.say(intend(Function.REQUEST, content, wording=wording))
 
 
@@ -214,7 +217,7 @@ def _mention_lights(state: ParticipantState, view: ParticipantView, rng: np.rand
         state.say(intend(Function.PROPOSITIONAL_QUESTION, on, wording=replace(wording, topic="lights")))
         return
     dark = () if told else (view_remark(Limit.NIGHT, sight(view.raw), rng),)
-    content = contents.action(ActionValue.LIGHT_CHANGE)
+    content = act_builders.action(ActionValue.LIGHT_CHANGE)
     state.say(*dark, intend(Function.REQUEST, content, wording=wording, joined=bool(dark)))
 
 
@@ -298,14 +301,14 @@ def _chat_options(state: ParticipantState, view: ParticipantView, rng: np.random
     if not state.guidance.guiding:
         arrival = Proposition.of(Predicate.ARRIVES_IN, place=goal.name, seconds=ASKED)
         found.append((intend(asks_open, arrival, elided=("place",)),))
-        found.append((intend(asks_open, contents.action(ActionValue.QUERIED)),))
-        found.append((intend(Function.CHECK_QUESTION, contents.destination(goal.name)),))
+        found.append((intend(asks_open, act_builders.action(ActionValue.QUERIED)),))
+        found.append((intend(Function.CHECK_QUESTION, act_builders.destination(goal.name)),))
         found.append((intend(asks_open, Proposition.of(Predicate.ON_STREET, street=StreetName.QUERIED)),))
         may_hurry = not state.conversation.hurried and not state.conversation.slowed and view.speed > 5.0
         if rng.random() < 0.15 and may_hurry and sight(view.raw) >= FAR_SIGHT:
             speed = round(state.config.usual_speed + 5.0) if rng.random() < 0.5 else None
             state.conversation = state.conversation.after_hurrying()
-            content = contents.action(ActionValue.SPEED_CHANGE, speed=speed)
+            content = act_builders.action(ActionValue.SPEED_CHANGE, speed=speed)
             return [(intend(Function.REQUEST, content, wording=Wording(faster=True, speed=speed)),)]
     if view.objects:
         near = view.objects[int(rng.integers(min(len(view.objects), 3)))].kind

@@ -9,13 +9,13 @@ from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, Slot, SlotValue
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import Remark, intend, repeated
 
-_WORTH_REPEATING = contents.QUESTIONS | {DialogueMove.EXPLAIN}
+_WORTH_REPEATING = act_builders.QUESTIONS | {DialogueMove.EXPLAIN}
 """Moves that the participant asks to have repeated."""
 
 _TAKES_UP = frozenset({DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.EXPLAIN, DialogueMove.QUERY_W})
@@ -80,7 +80,7 @@ def _corrected_place(state: ParticipantState, act: DialogueAct) -> Remark | None
     if act.move is DialogueMove.EXPLAIN and GoalStatus.UNKNOWN not in act.slots:
         return None  # a remark about something in sight
     street = goal.street if goal.street.label not in ("Unknown", "Queried") else None
-    return intend(CommunicativeFunction.CORRECTION, contents.destination(goal.name, street))
+    return intend(CommunicativeFunction.CORRECTION, act_builders.destination(goal.name, street))
 
 
 def _revives(state: ParticipantState, act: DialogueAct, named: set[SlotValue]) -> bool:

@@ -22,7 +22,7 @@ from dorothie_gym.ontology.slots import (
     SlotValue,
     StreetName,
 )
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.mood import Happening
 from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
 from dorothie_gym.policies.participant.arriving import about_to_arrive, straight_on
@@ -154,8 +154,8 @@ def _name_target(state: ParticipantState, view: ParticipantView, rng: np.random.
     state.task = state.task.after_announcement(view.time)
     announced = announcement(state, view, rng).meaning[0]
     street = announced.get("street")
-    place = contents.first_name([announced.get("place")])
-    wanted = contents.destination(place, street if isinstance(street, StreetName) else None)
+    place = act_builders.first_name([announced.get("place")])
+    wanted = act_builders.destination(place, street if isinstance(street, StreetName) else None)
     answer = intend(Function.ANSWER, wanted)
     state.say_only(answer, *more)
 
@@ -164,7 +164,7 @@ def _name_order(state: ParticipantState, landmarks: Collection[SlotValue], rng: 
     """Answers the question about the order of two tasks: the target is finished first."""
     goal = state.task.goal
     assert goal is not None
-    other = contents.first_name(name for name in landmarks if name is not goal.name)
+    other = act_builders.first_name(name for name in landmarks if name is not goal.name)
     order = Proposition.of(Predicate.ORDER, place=goal.name, then=other)
     state.say_first(intend(Function.ANSWER, order, elided=("place", "then"), wording=Wording(topic="after")))
     if rng.random() < state.config.explains_order:
@@ -261,7 +261,7 @@ def _nod_to(view: ParticipantView, heard: HeardUtterance) -> Remark:
 def _answers_question(state: ParticipantState, heard: HeardUtterance) -> bool:
     """Returns whether the car has answered the question that was asked last."""
     last = state.speech.last
-    return last is not None and last.act.move in contents.QUESTIONS and heard.acts[0].move in _REPLIES
+    return last is not None and last.act.move in act_builders.QUESTIONS and heard.acts[0].move in _REPLIES
 
 
 def _thank(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
@@ -324,14 +324,14 @@ def _confusion(
     elif state.guidance.guiding and state.guidance.step is not None:
         _name_step(state, view, DialogueMove.CLARIFY, rng)
     elif goal is not None and state.task.announced:
-        state.say_first(intend(Function.CORRECTION, contents.destination(goal.name)))
+        state.say_first(intend(Function.CORRECTION, act_builders.destination(goal.name)))
     elif last is not None:
         state.say_first(repeated(last, Function.CORRECTION))
 
 
 def _is_of_the_moment(said: Remark) -> bool:
     """Returns whether a remark is repeated as it was: a question, a yes or no, small talk, an action no step names."""
-    if said.act.move in contents.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
+    if said.act.move in act_builders.QUESTIONS | _SHORT_ANSWERS or said.act.move is DialogueMove.IRRELEVANT:
         return True
     return bool(set(said.act.values(Slot.ACTION)) & _AT_ONCE)
 

@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.ontology.slots import LandmarkName
-from dorothie_gym.policies.noticing import Noticed
+from dorothie_gym.policies.notable_conditions import Noticed
 from dorothie_gym.policies.observation_parser import HeardUtterance, SeenLandmark, SeenSubgoal
 from dorothie_gym.policies.participant.config import ParticipantConfig, ParticipantStyle
 from dorothie_gym.policies.policy import replace

@@ -13,7 +13,7 @@ from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, Slot, SlotValue, StreetName
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.observation_parser import SeenSubgoal
 from dorothie_gym.policies.participant.arriving import about_to_arrive, creep_instruction
 from dorothie_gym.policies.participant.goals import announcement, route_length, story_remark, switch_target
@@ -46,7 +46,7 @@ def check(
     if goal is not None and landmarks:
         right = landmarks == (goal.name,) and streets in ((), (goal.street,))
         if not right:
-            again = intend(Function.REQUEST, contents.destination(goal.name, goal.street), joined=True)
+            again = intend(Function.REQUEST, act_builders.destination(goal.name, goal.street), joined=True)
             state.say_first(denied(checked(state, act, words)), again)
             return
     elif act.values(Slot.ACTION) and not _fits(state, view, act, words, rng):
@@ -60,20 +60,20 @@ def check(
 
 def checked(state: ParticipantState, act: DialogueAct, words: ParsedText) -> Proposition:
     """Returns what the car wants verified or proposes: a destination, an action, or the present destination."""
-    place = contents.first_name(act.values(Slot.LANDMARK))
+    place = act_builders.first_name(act.values(Slot.LANDMARK))
     street = next((value for value in act.values(Slot.STREET) if isinstance(value, StreetName)), None)
     wanted = next((value for value in act.values(Slot.ACTION) if isinstance(value, ActionValue)), None)
     if place is not None:
-        return contents.destination(place, street)
+        return act_builders.destination(place, street)
     if wanted is not None or street is not None:
-        return contents.action(wanted, words if wanted is not None else None, street=street)
+        return act_builders.action(wanted, words if wanted is not None else None, street=street)
     goal = state.task.goal
-    return contents.destination(None if goal is None else goal.name)
+    return act_builders.destination(None if goal is None else goal.name)
 
 
 def _short(function: Function, content: Proposition) -> Remark:
     """Returns an answer whose content goes without saying: "yes", "that's it"."""
-    return intend(function, content, elided=contents.arguments_of(content))
+    return intend(function, content, elided=act_builders.arguments_of(content))
 
 
 def denied(content: Proposition) -> Remark:
@@ -207,24 +207,24 @@ def _answer_offer(state: ParticipantState, view: ParticipantView, offered: SeenS
     left = progress.left(view.station) if progress is not None else math.inf
     if landmark is not None and route_length(state, view, landmark) < left:
         switch_target(state, view, offered, landmark)
-        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, contents.destination(landmark.name)))
+        state.say_first(_short(Function.AFFIRMATIVE_ANSWER, act_builders.destination(landmark.name)))
         return
-    state.say_first(denied(contents.destination(None if landmark is None else landmark.name)), go_first(goal.name))
+    state.say_first(denied(act_builders.destination(None if landmark is None else landmark.name)), go_first(goal.name))
 
 
 def go_first(name: LandmarkName) -> Remark:
     """Returns the instruction to go to a place first, as the rest of an answer."""
-    return intend(Function.REQUEST, contents.destination(name), wording=Wording(topic="first"), joined=True)
+    return intend(Function.REQUEST, act_builders.destination(name), wording=Wording(topic="first"), joined=True)
 
 
 def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
     """Accepts a detour that is the participant's own, and insists on the own one otherwise."""
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
-    proposed = contents.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
+    proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
     if own is None or own in act.values(Slot.STREET):
         state.say_first(_short(Function.AFFIRMATIVE_ANSWER, proposed))
         return
-    over = contents.action(None, street=own)
+    over = act_builders.action(None, street=own)
     state.say_first(denied(proposed), intend(Function.REQUEST, over, wording=Wording(topic="detour"), joined=True))
 
 
@@ -273,8 +273,8 @@ def deny_other_place(state: ParticipantState, places: Collection[SlotValue]) -> 
     if state.task.goal is None or not state.task.announced:
         return
     state.set_guiding(True)
-    other = Proposition.of(Predicate.GOAL, negated=True, place=contents.first_name(places))
-    again = intend(Function.REQUEST, contents.destination(state.task.goal.name), joined=True)
+    other = Proposition.of(Predicate.GOAL, negated=True, place=act_builders.first_name(places))
+    again = intend(Function.REQUEST, act_builders.destination(state.task.goal.name), joined=True)
     state.say_only(intend(Function.NEGATIVE_ANSWER, other, elided=("place",)), again)
 
 

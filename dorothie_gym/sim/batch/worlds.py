@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym.compilation import concurrent, direct
 from dorothie_gym.compilation.by_reference import gives_row
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Array
 from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.threads import ThreadPool, take, turns_of
@@ -126,7 +126,7 @@ def step_batch_of_one(
 # --- Batch of worlds --------------------------------------------------------------------------------------------------
 
 
-class VectorWorld(Lookups):
+class VectorWorld(CachedViews):
     """Worlds of one town in one set of arrays; every thread steps a share of them in one compiled call.
 
     A thread has a block of worlds of its own, which stay in its processor's cache; then it takes worlds that other
@@ -140,7 +140,7 @@ class VectorWorld(Lookups):
         threads: number of threads, the caller's included.
     """
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_pool",)
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_pool",)
 
     def __init__(self, town: TownArrays, world: WorldArrays, worlds: int, *, threads: int | None = None) -> None:
         """Makes copies of a world, each to be replaced by `put`.

@@ -10,8 +10,8 @@ import math
 from typing import TYPE_CHECKING
 
 from dorothie_gym.compilation import compiled
-from dorothie_gym.sim.ego.course import follow, keep, switch, u_turn
 from dorothie_gym.sim.ego.limits import LEAD, MIN_SWITCH, PLANNED_BRAKING, SWITCH_TIME
+from dorothie_gym.sim.ego.path_builder import follow, keep, switch, u_turn
 from dorothie_gym.sim.network.lane_exits import ANOTHER_WAY
 from dorothie_gym.sim.state.codes import NOBODY
 

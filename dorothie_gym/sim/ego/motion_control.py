@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.sim.ego.course import height_at_point
 from dorothie_gym.sim.ego.ego_hazards import look
 from dorothie_gym.sim.ego.limits import (
     APPROACH_DISTANCE,
@@ -30,6 +29,7 @@ from dorothie_gym.sim.ego.limits import (
 )
 from dorothie_gym.sim.ego.obstacles import SHORTEST_STOP, room, safe_speed
 from dorothie_gym.sim.ego.path import advance, heading_at, point_at, take_lanes
+from dorothie_gym.sim.ego.path_builder import height_at_point
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import STATIC, U_TURN, EventCode, Motion

@@ -15,7 +15,7 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.ego.course import SEARCH_RANGE
+from dorothie_gym.sim.ego.path_builder import SEARCH_RANGE
 from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.ego_records import CoursePointRecord, SweepRecord
 from dorothie_gym.sim.traffic.parameters import PLANNED

@@ -14,7 +14,7 @@ import numpy as np
 
 from dorothie_gym.compilation import direct
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
@@ -71,10 +71,10 @@ def request_path(
         holder.arrays = lengthened(holder.arrays)
 
 
-class LocalPlanner(Lookups):
+class LocalPlanner(CachedViews):
     """Path of the ego, changed by navigation actions: a view on the plan in the arrays of its world."""
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_shown", "_row", "_car", "_course", "_laid", "_path")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_shown", "_row", "_car", "_course", "_laid", "_path")
 
     _shown: WorldArrays | None = None
     _laid = 0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation.records import fields, plain
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.sim.road import TownRoad
@@ -19,14 +19,14 @@ from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 
 
-class Car(Lookups, Vehicle):
+class Car(CachedViews, Vehicle):
     """The ego, vehicle number 0 of a world (`Kind.DRIVEN`), as of the last step of the world.
 
     Setting its position, heading or speed moves it.
     """
 
     MAX_SPEED = 40.0
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_state_of", "_own_state")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_state_of", "_own_state")
 
     _state_of: WorldArrays | None = None
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled
 from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.randomness import begin_stream, draw_normal
@@ -131,10 +131,10 @@ DEPARTURE_SIGMAS = (0.1, 0.1, 0.01)
 """Standard deviations of the place of departure [m, m, rad]."""
 
 
-class Localizer(Lookups):
+class Localizer(CachedViews):
     """Estimator of the ego's pose from its sensors: a view on the record of its world."""
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_record_of", "_own_record")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_record_of", "_own_record")
 
     _record_of: WorldArrays | None = None
 

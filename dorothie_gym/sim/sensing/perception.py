@@ -14,7 +14,7 @@ import numpy as np
 from dorothie_gym import portable_math as pm
 from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
@@ -307,10 +307,10 @@ def _normal(state: int) -> tuple[float, int]:
 # --- Perception of a world --------------------------------------------------------------------------------------------
 
 
-class Perception(Lookups):
+class Perception(CachedViews):
     """Perception with the errors of one seed."""
 
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_opened",)
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_opened",)
 
     _opened: tuple[RecordArray[EyeRecord], Visibility] | None = None
 

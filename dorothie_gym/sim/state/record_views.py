@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeAlias, TypeVa
 import numpy as np
 
 from dorothie_gym import portable_math as pm
-from dorothie_gym.copying import Lookups
+from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 
@@ -111,7 +111,7 @@ def _accessors(
     return read, write
 
 
-class BodyView(Lookups, Generic[Record_co]):
+class BodyView(CachedViews, Generic[Record_co]):
     """A row of the arrays. Its memory is looked up once and again whenever the holder has other arrays.
 
     Attributes:
@@ -120,7 +120,7 @@ class BodyView(Lookups, Generic[Record_co]):
 
     RECORDS: ClassVar[str]
     DTYPE: ClassVar[np.dtype[np.void]]
-    LOOKED_UP: ClassVar[Sequence[str]] = ("_arrays", "_cells", "_position")
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_arrays", "_cells", "_position")
 
     # set by `RoadObject.__init__`; the records have no field for them
     collidable = True

@@ -43,7 +43,7 @@ from dorothie_gym.sim.state.sensing_records import (
 )
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
-from dorothie_gym.sim.traffic.parameters import COURSE, EVENTS, FRAMES, GOALS, POINTS, STEPS
+from dorothie_gym.sim.traffic.parameters import COURSE, EVENTS, GOALS, MAX_SUBSTEPS, POINTS, STEPS
 
 PROPS = 16
 """Most props in a world."""
@@ -60,7 +60,7 @@ STACK = 32
 LONG_AGO = -(1 << 40)
 """A frame before all others."""
 
-BREACHES = FRAMES + 2
+BREACHES = MAX_SUBSTEPS + 2
 """Most breaches in one call of `step`: a line each frame, and the road and the direction left once."""
 
 
@@ -229,8 +229,8 @@ def empty_world(
         seen_props=np.zeros((props if driven else 0, 3)),
         eye=empty_records(EyeRecord, 1),
         seen=empty_records(SeenRecord, vehicles + pedestrians + props if driven else 1),
-        trace=np.zeros((FRAMES if driven else 1, len(TRACE))),
-        poses=np.zeros((1 + FRAMES if driven else 1, len(POSE))),
+        trace=np.zeros((MAX_SUBSTEPS if driven else 1, len(TRACE))),
+        poses=np.zeros((1 + MAX_SUBSTEPS if driven else 1, len(POSE))),
         events=empty_records(EventRecord, EVENTS if driven else 1),
         localizer=empty_records(LocalizerRecord, 1),
         watch=empty_records(WatchRecord, 1),

@@ -82,7 +82,7 @@ COURSE, STEPS = 320, 128
 EVENTS = 32
 """Most events of the ego within a call."""
 
-FRAMES = 15
+MAX_SUBSTEPS = 15
 """Most substeps within a call of a world with a driven ego, whose path is lengthened in between."""
 
 STOPPED = 0.05

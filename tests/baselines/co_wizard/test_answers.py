@@ -8,7 +8,7 @@ from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.answers import RECENT_STOP
 from dorothie_gym.policies.co_wizard.state import TOLD_TO_STOP
 from dorothie_gym.policies.co_wizard.view import CoWizardView
@@ -184,7 +184,7 @@ def test_answer_of_the_corpus_becomes_the_answer_to_another_question(scene):
 
 def test_last_remark_is_said_again_where_it_was_not_understood(scene):
     view, memory = scene
-    asked = intend(Function.SET_QUESTION, contents.destination(LandmarkName.QUERIED))
+    asked = intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED))
     memory = memory.spoken(asked, "goal", view, asks=True, asks_way=False)
     assert said_again(heard(view, "what?", DialogueMove.CONFUSE), memory) == asked
     assert said_again(heard(view, "okay", DialogueMove.ACKNOWLEDGE), memory) is None
@@ -219,7 +219,7 @@ def test_answer_about_something_else_is_not_sayable(scene):
     ("text", "value", "about"),
     [
         ("why did we stop?", ActionValue.STOP, STANDS),
-        ("which way now?", ActionValue.QUERIED, contents.action(ActionValue.LANE_FOLLOW)),
+        ("which way now?", ActionValue.QUERIED, act_builders.action(ActionValue.LANE_FOLLOW)),
         ("what street is this?", StreetName.QUERIED, Proposition.of(Predicate.ON_STREET, street=StreetName.BEAL)),
     ],
 )
@@ -227,7 +227,7 @@ def test_open_question_rules_out_answers_about_something_else(scene, text, value
     view, memory = scene
     asked = heard(view, text, DialogueMove.QUERY_W, value)
     here = street_of(view.raw, memory.town, view.lane)
-    answers = (STANDS, contents.action(ActionValue.LANE_FOLLOW), Proposition.of(Predicate.ON_STREET, street=here))
+    answers = (STANDS, act_builders.action(ActionValue.LANE_FOLLOW), Proposition.of(Predicate.ON_STREET, street=here))
     sayable = [
         said.predicate for said in answers
         if is_sayable(intend(Function.ANSWER, said), str(said.predicate), memory, view, asked)
@@ -247,7 +247,7 @@ def test_question_is_not_acknowledged_but_an_instruction_is(scene):
 
 def test_same_is_not_said_twice_unless_the_participant_spoke_or_time_has_passed(scene):
     view, memory = scene
-    asked = intend(Function.SET_QUESTION, contents.destination(LandmarkName.QUERIED))
+    asked = intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED))
     memory = memory.spoken(asked, "goal", view, asks=True, asks_way=False)
     assert not is_sayable(asked, "goal", memory, view, None)
     assert is_sayable(asked, "goal", replace(memory, heard_at=view.time), view, None)

@@ -4,7 +4,7 @@ from dorothie_gym.baselines.co_wizard.remarks import check_form, filled, form_of
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass, StreetName
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.speech import intend
 
 RED = Proposition.of(
@@ -12,16 +12,16 @@ RED = Proposition.of(
     effect=Proposition.of(Predicate.STANDS, action=ActionValue.STOP),
     cause=Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT),
 )
-LEFT = contents.action(ActionValue.J_TURN, direction=Direction.LEFT, street=StreetName.BEAL)
+LEFT = act_builders.action(ActionValue.J_TURN, direction=Direction.LEFT, street=StreetName.BEAL)
 
 
 @pytest.mark.parametrize(
     ("remark", "available"),
     [
-        (intend(Function.POSITIVE_FEEDBACK, contents.destination(LandmarkName.KFC)), {"goal": LandmarkName.KFC}),
+        (intend(Function.POSITIVE_FEEDBACK, act_builders.destination(LandmarkName.KFC)), {"goal": LandmarkName.KFC}),
         (intend(Function.ANSWER, RED, elided=("effect",), wording=Wording(topic="because")), {}),
         (intend(Function.INFORM, LEFT, wording=Wording(direction=Direction.LEFT)), {"to_left": StreetName.BEAL}),
-        (intend(Function.SET_QUESTION, contents.destination(LandmarkName.QUERIED)), {}),
+        (intend(Function.SET_QUESTION, act_builders.destination(LandmarkName.QUERIED)), {}),
         (
             intend(Function.ANSWER, Proposition.of(Predicate.ARRIVES_IN, place=LandmarkName.COCO, seconds=42)),
             {"goal": LandmarkName.COCO, "seconds": 42},
@@ -36,15 +36,15 @@ def test_remark_survives_being_taken_apart_and_filled_in_again(remark, available
 
 
 def test_names_are_taken_from_where_they_are_now():
-    form = form_of(intend(Function.ACCEPT, contents.destination(LandmarkName.KFC)), {"goal": LandmarkName.KFC})
+    form = form_of(intend(Function.ACCEPT, act_builders.destination(LandmarkName.KFC)), {"goal": LandmarkName.KFC})
     assert LandmarkName.KFC.name not in form
     again = filled(form, {"goal": LandmarkName.IKEA})
     assert again.act.slots == {LandmarkName.IKEA}
-    assert again.meaning == (contents.destination(LandmarkName.IKEA),)
+    assert again.meaning == (act_builders.destination(LandmarkName.IKEA),)
 
 
 def test_remark_without_a_source_cannot_be_said():
-    remark = intend(Function.ACCEPT, contents.destination(LandmarkName.KFC))
+    remark = intend(Function.ACCEPT, act_builders.destination(LandmarkName.KFC))
     assert form_of(remark, {"goal": LandmarkName.IKEA}) is None
     form = form_of(remark, {"place0": LandmarkName.KFC})
     assert sources_of(form) == {"place0"}

@@ -6,7 +6,7 @@ from dorothie_gym.baselines.participant.remarks import STOP_FORM, check_form, fi
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, Predicate, Proposition, Wording
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, ObjectClass, StreetName
-from dorothie_gym.policies import contents
+from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
@@ -20,7 +20,7 @@ ERRAND = Proposition.of(Predicate.PURPOSE, place=LandmarkName.KFC, purpose="buy 
     [
         (order(DialogueMove.INSTRUCT, ActionValue.J_TURN, Wording(direction=Direction.LEFT)), LEFT),
         (
-            intend(Function.REQUEST, contents.destination(LandmarkName.KFC, StreetName.BEAL)),
+            intend(Function.REQUEST, act_builders.destination(LandmarkName.KFC, StreetName.BEAL)),
             {"goal": LandmarkName.KFC, "goal_street": StreetName.BEAL},
         ),
         (

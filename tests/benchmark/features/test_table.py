@@ -11,7 +11,7 @@ from dorothie_gym.errors import SessionError
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import LABELS, PhysicalAction, Role
 from dorothie_gym.recording import Event, EventType, Session, Task, task_points
-from dorothie_gym.recording.points import at_tenths
+from dorothie_gym.recording.prediction_points import at_tenths
 from dorothie_gym.recording.recorded_perception import last_perceived
 from tests.recording.builders import physical, session, utterance
 from tests.recording.dialogues import DONE, OKAY, STREET, TO_KFC, TURNING, YES, talk

@@ -7,7 +7,7 @@ import pytest
 
 from dorothie_gym.maps import Lane
 from dorothie_gym.ontology import ObjectClass
-from dorothie_gym.sim.ego.briefing import write_window
+from dorothie_gym.sim.ego.decision_setup import write_window
 from dorothie_gym.sim.ego.manoeuvres import begin
 from dorothie_gym.sim.ego.obstacles import bodies_ahead, room, safe_speed
 from dorothie_gym.sim.network.network import TownNetwork

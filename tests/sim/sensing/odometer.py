@@ -9,7 +9,7 @@ from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.sensing.localizer import Localizer, localize, switch_on
 from dorothie_gym.sim.state.town_arrays import empty_town
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.traffic.parameters import FRAMES
+from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
 
 
 class CarriedLocalizer(Localizer):
@@ -25,8 +25,8 @@ class CarriedLocalizer(Localizer):
     def carry(self, track: Array, frame: int, *, gps_from: int = 0) -> None:
         """Carries the localizer along a track (n + 1, 3); `frame` is the number of the first pose's frame."""
         self.lose_gps(gps_from)
-        for first in range(0, len(track) - 1, FRAMES):
-            part = track[first : first + FRAMES + 1, :3]
+        for first in range(0, len(track) - 1, MAX_SUBSTEPS):
+            part = track[first : first + MAX_SUBSTEPS + 1, :3]
             self.arrays.poses[: len(part), :3] = part
             self.arrays.car["frames"], self.arrays.clock["frame"] = len(part) - 1, frame + first + len(part) - 1
             localize(self.arrays, 1.0 / FRAME_RATE)

@@ -9,7 +9,7 @@ from dorothie_gym.sim.infractions import WorldEvent, WorldEventLog
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world
-from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, FRAMES
+from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, MAX_SUBSTEPS
 from dorothie_gym.sim.traffic_rules import watch
 
 
@@ -27,8 +27,8 @@ class TrajectoryWatch(WorldEventLog):
 
         The first pose is that of `frame`, and the last one of the stretch before.
         """
-        for first in range(0, len(poses) - 1, FRAMES):
-            part = poses[first : first + FRAMES + 1]
+        for first in range(0, len(poses) - 1, MAX_SUBSTEPS):
+            part = poses[first : first + MAX_SUBSTEPS + 1]
             self.arrays.poses[: len(part)] = part
             self.arrays.car["frames"], self.arrays.car["breaches"] = len(part) - 1, 0
             self.arrays.clock["frame"] = frame + first + len(part) - 1

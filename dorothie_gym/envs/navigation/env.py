@@ -1,0 +1,163 @@
+"""Base class of the navigation environments of one car: a batch of one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar, TypeVar
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.copying import Restorable
+from dorothie_gym.engine.live_session import LiveSession
+from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_option, template_option
+from dorothie_gym.envs.navigation.batch import DrivingBatch
+from dorothie_gym.envs.navigation.cameras import DriverObservation
+from dorothie_gym.envs.navigation.config import NavigationConfig
+from dorothie_gym.envs.navigation.driver_panel import DrivingView
+from dorothie_gym.envs.navigation.episode import TERMS, Ending
+from dorothie_gym.envs.navigation.rows import INFRACTIONS
+from dorothie_gym.envs.session_view import SessionView, metadata_at
+from dorothie_gym.maps.catalogue import load_town
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.spaces.actions import StepInfo
+from dorothie_gym.tasks.storyboard import StoryboardTemplate
+from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
+
+Action = TypeVar("Action")
+
+
+class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
+    """Base class of the navigation environments; subclasses define observations and actions.
+
+    Attributes:
+        config: settings.
+        town: the map.
+        template: template of the storyboards, or None.
+        batch: the session, as a batch of one.
+    """
+
+    MUTABLE_ATTRIBUTES: ClassVar[Sequence[str]] = ("_ending", "_np_random", "_np_random_seed")
+
+    def __init__(
+        self, town: str | Path | Town, storyboard: str | Path | StoryboardTemplate | None, config: NavigationConfig,
+        render_mode: str | None, view: str, render_view: str, *, pedals: bool,
+    ) -> None:  # fmt: skip
+        self.config = config
+        self.metadata = metadata_at(config.decision_frequency)
+        self.render_mode = render_mode
+        drawn = SessionView.of_role(Role.CO_WIZARD, view, render_mode, config.decision_frequency, render_view)
+        self._view = DrivingView(drawn)
+        self.town = town if isinstance(town, Town) else load_town(town)
+        self.template = template_option(storyboard)
+        self.batch = DrivingBatch(self.town, self.template, config, 1, 1, pedals=pedals)
+        self._ending = Ending.NONE
+
+    # --- States -------------------------------------------------------------------------------------------------------
+
+    def mutable_values(self) -> dict[str, object]:
+        """Returns what changes in the environment, and what was noted for its pictures."""
+        return {**super().mutable_values(), "batch": self.batch.mutable_values(), "view": self._view.notes}
+
+    def apply_values(self, values: dict[str, object]) -> None:
+        """Applies the values of the environment and the notes for its pictures."""
+        notes, batch = values.pop("view"), values.pop("batch")
+        assert isinstance(batch, dict)  # of `mutable_values`
+        super().apply_values(values)
+        self.batch.apply_values(batch)
+        if self.batch.has_begun:
+            self._view.apply_values(notes, self.batch.catch_up(0))
+
+    def compatibility(self) -> dict[str, object]:
+        """Returns the kind of environment, the town and the settings."""
+        return {**super().compatibility(), "the town": self.town.identity, "the settings": self.config}
+
+    # --- Episodes -----------------------------------------------------------------------------------------------------
+
+    @property
+    def decision_limit(self) -> int:
+        """Decisions until truncation."""
+        return decisions_in(self.config.max_seconds, self.config.decision_frequency)
+
+    @property
+    def session(self) -> LiveSession:
+        """Session in progress; raises `gymnasium.error.ResetNeeded` before the first reset."""
+        self._check_begun()
+        session = self.batch.catch_up(0)
+        if self._ending and not session.over:
+            session.end(self._ending.label)
+        return session
+
+    def _check_begun(self) -> None:
+        if not self.batch.has_begun:
+            raise gym.error.ResetNeeded("no session is being played: call reset() first")
+
+    def _begin(self, seed: int | None, options: ResetOptions | None) -> tuple[DriverObservation, StepInfo]:
+        """Begins a session, see `reset`."""
+        super().reset(seed=seed)
+        check_options(options, "scenario")
+        session = seed if seed is not None else int(self.np_random.integers(2**31))
+        self.batch.begin({0: session}, scenario_option(options))
+        self._ending = Ending.NONE
+        self._show()
+        return self.batch.observations[0].copy(), self._info()
+
+    def _play(self, action: NDArray[np.generic] | int) -> tuple[DriverObservation, float, bool, bool, StepInfo]:
+        """Plays a decision, see `step`."""
+        if self._ending:
+            raise gym.error.ResetNeeded("the session is over: call reset() first")
+        batch = self.batch
+        batch.play(action, _ALL)
+        outcome = batch.outcomes[0]
+        ending = self._ending = Ending(outcome["ending"])
+        self._show()
+        truncated = ending is Ending.OUT_OF_TIME
+        return (
+            batch.observations[0].copy(), float(outcome["reward"]), ending > 0 and not truncated, truncated,
+            self._info(),
+        )  # fmt: skip
+
+    def _info(self) -> StepInfo:
+        """Returns the info of the last decision, as a new dictionary; what belongs to the end is "" or 0 before."""
+        batch = self.batch
+        outcome = batch.outcomes[0]
+        reasons = batch.refusals(0)
+        info: StepInfo = {
+            "reward_terms": dict(zip(TERMS, outcome["terms"].tolist(), strict=True)),
+            "refused": {kind: bool(reason) for kind, reason in reasons.items()},
+            "refusal_reason": "; ".join(filter(None, reasons.values())),
+            "infractions": dict(zip(INFRACTIONS, batch.infractions[0].tolist(), strict=True)),
+        }
+        over = bool(self._ending)
+        info["is_success"], info["reason"] = over and bool(batch.successes[0]), self._ending.label
+        info["subgoals"] = {
+            "live": int(batch.live_subgoals[0]) * over, "reached": int(outcome["reached"]) * over
+        }  # fmt: skip
+        return info
+
+    # --- Pictures -----------------------------------------------------------------------------------------------------
+
+    def _show(self) -> None:
+        """Notes the present decision for `render()`, and draws it in human mode."""
+        if self.render_mode is None:
+            return
+        self._view.note(self.batch, 0)
+        if self.render_mode == "human":
+            self.render()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Draws what the Co-Wizard observes, or the session (see `view`), as `DuoWizardEnv.render`.
+
+        The instructions of the participant are part of the picture.
+        """
+        return self._view.view.render(self.session)
+
+    def close(self) -> None:
+        """Closes the window, if there is one."""
+        self._view.view.close()
+
+
+_ALL = np.ones(1, dtype=np.bool_)

@@ -1,0 +1,494 @@
+"""State update from an utterance of the participant: one reaction for each dialogue move and each action named."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, Slot, StreetName
+from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.co_wizard.acknowledgement import acknowledge, plan_remark, sign_of_hearing
+from dorothie_gym.policies.co_wizard.answers import answer_open, answer_yes_no
+from dorothie_gym.policies.co_wizard.errand_memory import note_owner, remember
+from dorothie_gym.policies.co_wizard.goals import (
+    abandon,
+    accept_offer,
+    approach_stop,
+    complete,
+    doubt,
+    hear_description,
+    plan_route,
+    postpone,
+    set_goal,
+)
+from dorothie_gym.policies.co_wizard.instructed_actions import OBEYED, do_stop, do_turn
+from dorothie_gym.policies.co_wizard.obstacles import take_detour
+from dorothie_gym.policies.co_wizard.proposition_truth import believes
+from dorothie_gym.policies.co_wizard.repairs import (
+    check_goal,
+    expects_stop,
+    is_garbled,
+    is_unclear,
+    is_unclear_reply,
+    note_contradiction,
+    repeat_last,
+)
+from dorothie_gym.policies.co_wizard.repetition import note_order
+from dorothie_gym.policies.co_wizard.state import CoWizardState, Directive
+from dorothie_gym.policies.co_wizard.view import CoWizardView
+from dorothie_gym.policies.mood import Happening
+from dorothie_gym.policies.observation_parser import HeardUtterance, heard_utterance
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.policies.turn_lanes import junction_meant
+from dorothie_gym.policies.view_range import camera_fault
+
+NEAR = 100
+"""Distance up to which a place that is said to be ahead is approached slowly [m]."""
+
+_STEERING = frozenset(
+    {ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.START}
+)
+_COMMANDS = _STEERING | {ActionValue.STOP}
+_STOP_AHEAD = frozenset({ActionValue.STOP, ActionValue.LANE_FOLLOW})
+_SETTLED = act_builders.QUESTIONS | {DialogueMove.ALIGN}
+_PLANS = frozenset({Predicate.GOAL, Predicate.ARRIVES_IN, Predicate.HAS_ROUTE, Predicate.KNOWS})
+_UNNAMED = (LandmarkName.UNKNOWN, LandmarkName.QUERIED)
+
+
+def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -> None:
+    """Updates the state with what the participant has said since the last decision, and queues answers."""
+    last = state.speech.last
+    heard = heard_utterance(view.raw, Role.PARTICIPANT, last.act.move if last is not None else None)
+    if heard is None:
+        return
+    state.dialogue = state.dialogue.after_hearing(view.time)
+    state.speech = state.speech.heard_other(view.time, heard.acts, rng, state.clock.interval / 2.0)
+    if state.persona is not None:
+        reaction = state.persona.draw_reaction(rng) - state.clock.interval / 2.0
+        state.commands = state.commands.reacting_until(view.time + reaction)
+    done = any(GoalStatus.COMPLETE in act.slots for act in heard.acts)
+    state.speech = state.speech.without_told(heard.words.told)
+    before = () if done else _still_due(state)
+    state.speech = state.speech.cleared()
+    unclear = is_unclear(state, view, heard)
+    if unclear and is_garbled(heard.words) and expects_stop(state, view, heard.words):
+        do_stop(state, view, heard.acts[0], heard.words)
+    if unclear or _mishears(state, heard, rng):
+        state.say(intend(Function.NEGATIVE_FEEDBACK), *before)
+        return
+    state.dialogue = state.dialogue.with_noticed(state.dialogue.noticed.after_hearing(heard.words, view.time))
+    note_owner(state, heard)
+    for act in heard.acts:
+        react = _REACTIONS.get(act.move)
+        if react is not None:
+            react(state, view, act, heard.words, rng)
+    remember(state, heard, rng)
+    answer = _in_one_breath(state.speech.queue)
+    before = tuple(itertools.dropwhile(_is_plain_sign, before))  # the "okay" to what was said before comes too late
+    if before:
+        before = (replace(before[0], joined=False), *before[1:])
+    state.speech = state.speech.cleared().plan(*before, *answer)
+
+
+def _still_due(state: CoWizardState) -> tuple[Remark, ...]:
+    """Returns the queued remarks without own questions and plans, which what was heard may have settled."""
+    kept: list[Remark] = []
+    dropped = False
+    for item in state.speech.queue:
+        idle = item.act.move in _SETTLED or any(said.predicate in _PLANS for said in item.meaning)
+        dropped = dropped if item.joined else idle and not item.urgent
+        if not dropped:
+            kept.append(item)
+    if len(kept) < len(state.speech.queue):
+        state.dialogue = state.dialogue.with_proposal(None)
+    return tuple(kept)
+
+
+def _in_one_breath(answers: Sequence[Remark]) -> tuple[Remark, ...]:
+    """Joins the answers to an utterance.
+
+    A mere "okay" is dropped where something more is said for itself, and "what?" where a part of it was understood.
+    Plans come last.
+    """
+    understood = [item for item in answers if item.act.move is not DialogueMove.CONFUSE]
+    answers = sorted(understood or answers[:1], key=_tells_plan)
+    plain = list(map(_is_plain_sign, answers))
+    leads = [following.joined for following in answers[1:]]
+    kept = [
+        item
+        for k, item in enumerate(answers)
+        if not plain[k] or (k == 0 if all(plain) else k < len(leads) and leads[k])
+    ]
+    return tuple(replace(item, joined=k > 0 or item.joined) for k, item in enumerate(kept))
+
+
+def _is_plain_sign(item: Remark) -> bool:
+    """Returns whether a remark is a mere "okay"."""
+    return item.act.move is DialogueMove.ACKNOWLEDGE and not item.act.slots
+
+
+def _tells_plan(item: Remark) -> bool:
+    """Returns whether a remark tells a plan that nobody has asked for."""
+    plan = any(said.predicate in _PLANS for said in item.meaning)
+    return item.act.move is DialogueMove.EXPLAIN and plan and GoalStatus.UNKNOWN not in item.act.slots
+
+
+def _mishears(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> bool:
+    """Returns whether an instruction is not understood; never an urgent one, nor one that would not be repeated."""
+    act = heard.acts[0]
+    if len(heard.acts) > 1 or act.move is not DialogueMove.INSTRUCT or act.values(Slot.STATUS):
+        return False
+    plain = ActionValue.J_TURN in act.values(Slot.ACTION) or bool(act.values(Slot.LANDMARK))
+    return plain and not act.values(Slot.ACTION)[1:] and rng.random() < state.style.mishears
+
+
+def _instruction(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    landmarks = tuple(name for name in act.values(Slot.LANDMARK) if name not in _UNNAMED)
+    actions = tuple(value for value in act.values(Slot.ACTION) if isinstance(value, ActionValue) and value in OBEYED)
+    streets = tuple(name for name in act.values(Slot.STREET) if isinstance(name, StreetName))
+    if not actions and landmarks:
+        _instructed_place(state, view, act, words, rng)
+    elif words.distance is not None and not view.standing and _STOP_AHEAD & set(actions):
+        name = landmarks[0] if landmarks and isinstance(landmarks[0], LandmarkName) else None
+        approach_stop(state, view, name, float(words.distance))
+        if state.speech.idle and rng.random() > state.style.silent:
+            state.say(sign_of_hearing("ordered"))
+    elif actions:
+        _obey(state, view, act, actions, words, rng)
+    elif streets:
+        _instructed_street(state, view, streets[0])
+    elif state.dialogue.detour_asked_at is not None:
+        take_detour(state, view, rng)
+    elif not act.slots:
+        state.dialogue = state.dialogue.with_orders_settled()  # perhaps another way is going to be tried
+        _senseless(state, view, act, words, asks=state.beliefs.goal is None or is_garbled(words))
+
+
+def _senseless(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, *, asks: bool
+) -> bool:  # fmt: skip
+    """Stops after words without sense where that is expected, or asks again; returns whether it did."""
+    if is_garbled(words) and expects_stop(state, view, words):
+        do_stop(state, view, act, words)
+        return True
+    if asks:
+        state.say(intend(Function.NEGATIVE_FEEDBACK))
+    return asks
+
+
+def _obey(
+    state: CoWizardState,
+    view: CoWizardView,
+    act: DialogueAct,
+    actions: Sequence[ActionValue],
+    words: ParsedText,
+    rng: np.random.Generator,
+) -> None:
+    """Carries out actions that were asked for, and acknowledges them."""
+    if state.intentions.arrived and _STEERING & set(actions) and not words.further:
+        doubt(state)
+    state.dialogue = state.dialogue.with_proposal(None)
+    if _STEERING & set(actions):
+        state.dialogue = state.dialogue.after_steering(view.time)
+        if not state.beliefs.exact:  # the car is guided and need not search for the place
+            state.route = state.route.with_progress(None)
+    contradicts = note_contradiction(state, view, actions[0], words)
+    for action in actions:
+        OBEYED[action](state, view, act, words)
+    acknowledge(state, view, actions[0], words, rng)
+    note_order(state, view, actions[0])
+    if contradicts:
+        check_goal(state, view)
+
+
+def _instructed_place(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    landmarks = _landmarks(act)
+    statuses, streets = act.values(Slot.STATUS), act.values(Slot.STREET)
+    known = state.beliefs.exact or state.beliefs.described
+    if GoalStatus.ABANDONED in statuses:
+        _abandoned_place(state, view, act, words, rng)
+    elif GoalStatus.PENDING in statuses:
+        postpone(state, view, landmarks[0], rng)
+    elif landmarks[0] is state.beliefs.goal and known and not state.intentions.arrived and not streets:
+        state.intentions = state.intentions.resumed()
+        state.say(intend(Function.POSITIVE_FEEDBACK, act_builders.destination(landmarks[0])))
+    else:
+        set_goal(
+            state, view, landmarks[0], act_builders.named_streets(act), rng, sure=landmarks[0] not in words.guessed
+        )
+
+
+def _abandoned_place(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Gives up a place, for another one now, for another one later, or for none."""
+    landmarks = _landmarks(act)
+    dropped = next((name for name in words.dropped if name in landmarks), landmarks[0])
+    others = [name for name in landmarks if name is not dropped]
+    if others and GoalStatus.PENDING in act.values(Slot.STATUS):
+        beliefs = state.beliefs.with_status(dropped, GoalStatus.ABANDONED)
+        state.beliefs = beliefs.with_status(others[0], GoalStatus.PENDING)
+        wording = Wording(topic="changed", dropped=dropped)
+        later = act_builders.errand(others[0], GoalStatus.PENDING)
+        state.say(intend(Function.ACCEPT, later, elided=("status",), wording=wording))
+    elif others:
+        set_goal(state, view, others[0], act_builders.named_streets(act), rng, dropped=dropped)
+    else:
+        abandon(state, dropped)
+        _accept_change(state, act_builders.errand(dropped, GoalStatus.ABANDONED), rng)
+
+
+def _accept_change(state: CoWizardState, change: Proposition, rng: np.random.Generator) -> None:
+    """Accepts a change of the tasks by repeating it, or shows that it was heard, by chance."""
+    if rng.random() < state.config.accepts_changes:
+        state.say(intend(Function.ACCEPT, change))
+    else:
+        state.say(intend(Function.POSITIVE_FEEDBACK, change, elided=act_builders.arguments_of(change)))
+
+
+def _landmarks(act: DialogueAct) -> list[LandmarkName]:
+    return [name for name in act.values(Slot.LANDMARK) if isinstance(name, LandmarkName)]
+
+
+def _instructed_street(state: CoWizardState, view: CoWizardView, street: StreetName) -> None:
+    if state.dialogue.detour_asked_at is not None:
+        state.dialogue = state.dialogue.with_detour_question(None)
+        state.intentions = state.intentions.resumed()
+        plan_route(state, view)
+        over = act_builders.action(None, street=street)
+        state.say(intend(Function.ACCEPT, over, wording=Wording(topic="detour")))
+        return
+    junction = junction_meant(state.town, view.here, view.choice)
+    directive = Directive(direction=None, street=street, junction=-1 if junction is None else junction.junction)
+    state.intentions = state.intentions.directed(directive).resumed()
+    state.say(intend(Function.ACCEPT, act_builders.action(None, street=street), wording=Wording(topic="taken")))
+
+
+# --- other moves ----------------------------------------------------------------------------------------------------
+
+
+def _explanation(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    landmarks, statuses = _landmarks(act), act.values(Slot.STATUS)
+    name = landmarks[0] if landmarks else None
+    if _COMMANDS & set(act.values(Slot.ACTION)):
+        _instruction(state, view, act, words, rng)  # "you should be turning left" counts as an instruction
+    elif words.distance is not None and name is not None and name is state.beliefs.goal and _is_near(state, words):
+        approach_stop(state, view, name, float(words.distance))
+        if rng.random() > state.style.silent:
+            state.say(sign_of_hearing("told"))
+    elif _is_here(state, view, words):
+        do_stop(state, view, act, words)
+        acknowledge(state, view, ActionValue.STOP, words, rng)
+    elif GoalStatus.COMPLETE in statuses:
+        state.feel(Happening.DONE, view.time)
+        complete(state, name)
+        if rng.random() < 0.5:
+            state.say(sign_of_hearing("done"))
+    elif GoalStatus.ABANDONED in statuses:
+        abandon(state, name)
+        if name is None:
+            state.say(sign_of_hearing("told"))
+        else:
+            _accept_change(state, act_builders.errand(name, GoalStatus.ABANDONED), rng)
+    elif name is not None and not statuses and (state.beliefs.goal is None or state.intentions.arrived):
+        _mentioned_place(state, view, act, name, rng)
+    elif act.values(Slot.STREET):
+        hear_description(state, view, act_builders.named_streets(act), landmarks, rng)
+    elif act.slots or not _senseless(state, view, act, words, asks=False):
+        _statement(state, view, act, words, rng)
+
+
+def _mentioned_place(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, name: LandmarkName, rng: np.random.Generator
+) -> None:
+    """Takes a place that is mentioned while there is nowhere to go for the next one, unless the car stands at it."""
+    if name is state.beliefs.goal:
+        state.say(intend(Function.NEGATIVE_FEEDBACK))
+    else:
+        set_goal(state, view, name, act_builders.named_streets(act), rng, sure=False)
+
+
+def _is_here(state: CoWizardState, view: CoWizardView, words: ParsedText) -> bool:
+    """Returns whether a place that the car has not found by itself is said to be right here."""
+    here = words.told is not None and words.told.predicate is Predicate.ARRIVED and not words.told.negated
+    return here and not view.standing and not state.intentions.arrived and state.beliefs.goal is not None
+
+
+def _is_near(state: CoWizardState, words: ParsedText) -> bool:
+    """Returns whether a place that the car is guided to is said to be near."""
+    return not state.beliefs.exact and words.distance is not None and words.distance <= NEAR
+
+
+def _statement(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Reacts to a statement that changes no destination."""
+    landmarks, statuses = _landmarks(act), act.values(Slot.STATUS)
+    name = landmarks[0] if landmarks else None
+    if "wrong" in words.text.lower():
+        state.feel(Happening.WRONG_WAY, view.time)
+        if not state.beliefs.exact:
+            state.route = state.route.with_progress(None)
+        state.say(intend(Function.POSITIVE_FEEDBACK, wording=Wording(topic="sorry")))
+    elif GoalStatus.PENDING in statuses and name is not None:
+        state.beliefs = state.beliefs.with_status(name, GoalStatus.PENDING)
+        state.say(sign_of_hearing("told"))
+    elif ObjectClass.STATIC in act.values(Slot.OBJECT) or rng.random() < 0.25:
+        sees = words.told is not None and camera_fault(view.raw) is None
+        state.say(sign_of_hearing("seen" if sees else "told"))
+
+
+def _reply(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Takes up an answer to an open question, or a clarification: an action, a direction or a place."""
+    asked_elsewhere = view.choice is not None and state.dialogue.asked_lane not in (-1, view.choice.lane)
+    if act.move is DialogueMove.REPLY_W and asked_elsewhere and state.beliefs.exact and words.turns:
+        return  # the junction that was asked about lies behind, and the way is known by now
+    if act.values(Slot.ACTION):
+        _instruction(state, view, act, words, rng)
+    elif words.turns:
+        state.dialogue = state.dialogue.with_proposal(None)
+        if not state.beliefs.exact:
+            state.route = state.route.with_progress(None)
+        do_turn(state, view, act, words)
+        acknowledge(state, view, ActionValue.J_TURN, words, rng)
+    elif act.values(Slot.STREET) or act.values(Slot.LANDMARK):
+        _reply_with_place(state, view, act, rng)
+    elif is_unclear_reply(state, view, act, words):
+        state.say(intend(Function.NEGATIVE_FEEDBACK))
+    elif rng.random() < 0.5:
+        state.say(sign_of_hearing("answered"))
+
+
+def _reply_with_place(state: CoWizardState, view: CoWizardView, act: DialogueAct, rng: np.random.Generator) -> None:
+    landmarks, streets, goal = _landmarks(act), act_builders.named_streets(act), state.beliefs.goal
+    if act.move is DialogueMove.CLARIFY and landmarks and goal is not landmarks[0]:
+        set_goal(state, view, landmarks[0], streets, rng, corrected=True)
+    elif (goal is None or state.intentions.arrived) and landmarks:
+        set_goal(state, view, landmarks[0], streets, rng)
+    else:
+        hear_description(state, view, streets, landmarks, rng)
+
+
+def _yes(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    dialogue = state.dialogue
+    if dialogue.offer is not None:
+        accept_offer(state, view)
+    elif dialogue.detour_asked_at is not None:
+        take_detour(state, view, rng)
+    elif dialogue.proposed is not None:
+        if dialogue.proposed.junction == view.junction and state.intentions.directive is None:
+            state.intentions = state.intentions.directed(dialogue.proposed).resumed()
+        state.dialogue = dialogue.with_proposal(None)
+    elif dialogue.slower is not None:
+        speed = dialogue.slower
+        state.dialogue = dialogue.with_slower(None)
+        state.intentions = state.intentions.with_speed(speed)
+        wording = Wording(faster=False, speed=speed)
+        state.say(intend(Function.INFORM, act_builders.action(ActionValue.SPEED_CHANGE, speed=speed), wording=wording))
+
+
+def _no(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    state.feel(Happening.MISUNDERSTOOD, view.time)
+    state.dialogue = state.dialogue.after_refusal()
+    if state.intentions.arrived:
+        doubt(state)
+    if words.turns and not act.values(Slot.ACTION):
+        do_turn(state, view, act, words)
+
+
+def _alignment(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    if state.beliefs.goal is not None or state.intentions.directive is not None:
+        state.say(sign_of_hearing("hears" if words.about_hearing else "align"))
+    else:
+        state.say(intend(Function.NEGATIVE_FEEDBACK))
+
+
+def _check(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    checked = _checked(state, act, words)
+    held = believes(state, view, checked)
+    elided = act_builders.arguments_of(checked)
+    if held is None:
+        state.say(intend(Function.UNCERTAIN_ANSWER, checked, elided=elided))
+        return
+    said = intend(
+        Function.CONFIRM if held else Function.NEGATIVE_ANSWER, checked if held else checked.opposite, elided=elided
+    )
+    state.say(said, *plan_remark(state, view, rng, joined=True))
+
+
+def _checked(state: CoWizardState, act: DialogueAct, words: ParsedText) -> Proposition:
+    """Returns what the participant wants verified: a destination, a street, an action, or the present destination."""
+    places, streets, actions = _landmarks(act), act_builders.named_streets(act), act.values(Slot.ACTION)
+    if places:
+        return act_builders.destination(places[0])
+    if streets:
+        return Proposition.of(Predicate.ON_STREET, street=streets[0])
+    if words.asked is not None:
+        return words.asked
+    if actions:
+        return Proposition.of(Predicate.DOES, action=actions[0])
+    return act_builders.destination(state.beliefs.goal)
+
+
+def _confusion(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    """Says again what was not understood."""
+    state.feel(Happening.MISUNDERSTOOD, view.time)
+    repeat_last(state)
+
+
+def _small_talk(
+    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, rng: np.random.Generator
+) -> None:
+    awaited = not state.beliefs.statuses or view.time - state.dialogue.asked_at < state.config.answer_time
+    expected = awaited and state.beliefs.goal is None and state.intentions.directive is None
+    if _senseless(state, view, act, words, asks=expected or is_garbled(words)):
+        return
+    if rng.random() < state.style.chats:
+        replies = intend(Function.OTHER, wording=Wording(topic="reply"))
+        state.say(replies if rng.random() < 0.6 else sign_of_hearing("chat"))
+
+
+_REACTIONS: dict[
+    DialogueMove, Callable[[CoWizardState, CoWizardView, DialogueAct, ParsedText, np.random.Generator], None]
+] = {
+    DialogueMove.INSTRUCT: _instruction,
+    DialogueMove.EXPLAIN: _explanation,
+    DialogueMove.REPLY_W: _reply,
+    DialogueMove.CLARIFY: _reply,
+    DialogueMove.REPLY_Y: _yes,
+    DialogueMove.CONFIRM: _yes,
+    DialogueMove.REPLY_N: _no,
+    DialogueMove.ALIGN: _alignment,
+    DialogueMove.CHECK: _check,
+    DialogueMove.CONFUSE: _confusion,
+    DialogueMove.IRRELEVANT: _small_talk,
+    DialogueMove.QUERY_YN: answer_yes_no,
+    DialogueMove.QUERY_W: answer_open,
+}

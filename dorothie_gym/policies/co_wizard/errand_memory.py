@@ -1,0 +1,101 @@
+"""Memory of the Co-Wizard for the errands that the participant tells about, and remarks that come back to them."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from dorothie_gym.dialogue.intentions import CommunicativeFunction as Function
+from dorothie_gym.dialogue.nlu import understand
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.dialogue_acts import DialogueMove
+from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, Slot
+from dorothie_gym.policies import act_builders
+from dorothie_gym.policies.co_wizard.state import CoWizardState
+from dorothie_gym.policies.observation_parser import HeardUtterance
+from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.tasks.purposes import read_purpose
+
+_TELLING = frozenset({DialogueMove.INSTRUCT, DialogueMove.EXPLAIN, DialogueMove.REPLY_W})
+_CLAUSE = re.compile(
+    r"\bI(?:'m| am)? (?:have to|need to|want to|supposed to) (?P<errand>(?:[^,.?]|(?<=\b(?:Mr|Ms|Dr))\.|(?<=\bMrs)\.)+)"
+)
+_OF_SPEAKER = re.compile(r"^(my|our) ")
+_OWNER = re.compile(
+    r"\b(?P<owner>(?:(?:Mr|Mrs|Ms|Dr|Se.ora)\.? )?(?:[A-Z]\w+ ){0,2}[A-Z]\w+(?:'s [a-z]+)?|my \w+)'s "
+    r"(?:house|home|place)\b"
+)
+_BEFORE_NAMES = frozenset({"to", "at", "for", "so", "and", "now", "then", "next", "yes", "no", "okay", "well", "oh"})
+_OVER = frozenset({GoalStatus.ABANDONED, GoalStatus.COMPLETE})
+
+
+def remember(state: CoWizardState, heard: HeardUtterance, rng: np.random.Generator) -> None:
+    """Keeps the thing or person of an errand that the participant has told, and perhaps repeats it.
+
+    Args:
+        state: working copy of the state, after the reaction to the utterance.
+        heard: the utterance.
+        rng: random generator of the decision.
+    """
+    told = _told(state, heard)
+    if told is None or told in state.beliefs.told:
+        return
+    state.beliefs = state.beliefs.with_told(told)
+    if rng.random() < state.style.recalls and len(state.speech.queue) < 2:
+        wording = None if state.speech.idle else Wording(topic="purpose_too")
+        joined = not state.speech.idle
+        state.say(intend(Function.POSITIVE_FEEDBACK, told, elided=("place",), wording=wording, joined=joined))
+
+
+def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
+    """Keeps whose house the participant wants to go to: "Mateo" of "go to Mateo's house"."""
+    about = [act.slots for act in heard.acts if LandmarkName.HOUSE in act.slots]
+    if not any(GoalStatus.PENDING not in slots and not _OVER & slots for slots in about):
+        return
+    done = any(_OVER & act.slots for act in heard.acts)
+    found = _OWNER.search(heard.words.text)
+    if found is not None:
+        first, _, rest = found["owner"].partition(" ")
+        name = rest if rest and first.lower() in _BEFORE_NAMES else found["owner"]
+        state.beliefs = state.beliefs.with_owner(_OF_SPEAKER.sub("your ", name))
+    elif done or state.beliefs.goal is not LandmarkName.HOUSE:
+        state.beliefs = state.beliefs.with_owner(None)  # another house than the last one
+
+
+def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:
+    """Returns what an utterance tells about an errand: its thing, or its person; None if it tells neither."""
+    if not any(act.move in _TELLING for act in heard.acts) or any(_OVER & act.slots for act in heard.acts):
+        return None
+    named = [value for act in heard.acts for value in act.values(Slot.LANDMARK)]
+    place = act_builders.first_name(named) or state.beliefs.goal
+    clause = _CLAUSE.search(heard.words.text)
+    if place is None or clause is None or understand(clause["errand"]).actions:
+        return None  # "I need you to take the next right" tells of no errand
+    purpose = read_purpose(clause["errand"])
+    item = _OF_SPEAKER.sub("your ", purpose.items[0]) if purpose.items else None
+    person = None if purpose.person is None else _OF_SPEAKER.sub("your ", purpose.person)
+    return None if item is person is None else Proposition.of(Predicate.PURPOSE, place=place, item=item, person=person)
+
+
+def told_of(state: CoWizardState, place: LandmarkName | None) -> Proposition | None:
+    """Returns what the participant has told last about the errand at a place; None if it has told nothing."""
+    return next((told for told in reversed(state.beliefs.told) if told.get("place") is place), None)
+
+
+def arrival_reminder(state: CoWizardState, rng: np.random.Generator) -> tuple[Remark, ...]:
+    """Returns a remark about what the car has come for, or nothing, by chance."""
+    told = told_of(state, state.beliefs.goal)
+    stands_for_person = state.beliefs.goal is LandmarkName.PERSON and told is not None and told.get("item") is None
+    if told is None or stands_for_person or rng.random() >= state.style.recalls:
+        return ()
+    return (intend(Function.INFORM, told, elided=("place",), wording=Wording(topic="come_for"), joined=True),)
+
+
+def kept_for_later(state: CoWizardState, place: LandmarkName) -> Remark:
+    """Returns the acceptance of a task for later, by the thing that it is about if that is known."""
+    later, told = act_builders.errand(place, GoalStatus.PENDING), told_of(state, place)
+    if told is None or told.get("item") is None:
+        return intend(Function.ACCEPT, later)
+    return intend(Function.ACCEPT, told.without("person"), later, wording=Wording(topic="later_purpose"))

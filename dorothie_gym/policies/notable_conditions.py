@@ -1,0 +1,234 @@
+"""Noticing of the scripted agents: the ten parameters of the weather, crowds, and what limits the view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from dorothie_gym.angles import wrap_degrees
+from dorothie_gym.dialogue.intentions import CommunicativeFunction
+from dorothie_gym.dialogue.nlu import ParsedText
+from dorothie_gym.dialogue.propositions import Predicate, Proposition
+from dorothie_gym.dialogue.realization_context import Wording
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.world_exceptions import Sensor
+from dorothie_gym.ontology.world_exceptions import WeatherParameter as W
+from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
+from dorothie_gym.policies.observation_parser import SeenObject, scalar, weather
+from dorothie_gym.policies.policy import replace
+from dorothie_gym.policies.speech import Remark, intend
+from dorothie_gym.policies.view_range import DENSE, FAR_SIGHT, Limit
+from dorothie_gym.spaces.observations import ObservationMapping
+
+
+def _turned(azimuth: float) -> float:
+    """Returns how far the sun stands from where it usually is [degrees]."""
+    return abs(wrap_degrees(azimuth))
+
+
+CONSPICUOUS: Final[Mapping[W, Callable[[Mapping[W, float]], float]]] = MappingProxyType(
+    {
+        W.CLOUDINESS: lambda now: now[W.CLOUDINESS] / 75.0,
+        W.PRECIPITATION: lambda now: now[W.PRECIPITATION] / RAIN_LIMIT,
+        W.PRECIPITATION_DEPOSITS: lambda now: now[W.PRECIPITATION_DEPOSITS] / 45.0,
+        W.WIND_INTENSITY: lambda now: now[W.WIND_INTENSITY] / 55.0,
+        W.SUN_AZIMUTH_ANGLE: lambda now: (now[W.SUN_ALTITUDE_ANGLE] > 0.0) * _turned(now[W.SUN_AZIMUTH_ANGLE]) / 60.0,
+        W.SUN_ALTITUDE_ANGLE: lambda now: (60.0 - now[W.SUN_ALTITUDE_ANGLE]) / 45.0,
+        W.FOG_DENSITY: lambda now: now[W.FOG_DENSITY] / FOG_LIMIT,
+        W.FOG_DISTANCE: lambda now: now[W.FOG_DISTANCE] / 25.0 * (now[W.FOG_DENSITY] > FOG_LIMIT),
+        W.FOG_FALLOFF: lambda now: now[W.FOG_FALLOFF] / 1.5 * (now[W.FOG_DENSITY] > FOG_LIMIT),
+        W.WETNESS: lambda now: now[W.WETNESS] / 45.0,
+    }
+)  # fmt: skip
+"""How conspicuous each parameter is; it is noticed from 1 on, and its end below `OVER`. The sun is noticed when it is
+within 15 degrees of the horizon, or stands elsewhere than at noon."""
+
+OVER: Final = 0.6
+
+CROWD_DISTANCE: Final = 50.0
+"""Distance within which a crowd is noticed [m]."""
+
+CROWDS: Final[Mapping[ObjectClass, int]] = MappingProxyType({ObjectClass.PEDESTRIAN: 3, ObjectClass.VEHICLES: 3})
+"""Least number of objects in a crowd."""
+
+MORE_THAN_USUAL: Final = 1.5
+"""Least number of objects by which a crowd exceeds what is usual."""
+
+USUAL_TIME: Final = 30.0
+"""Time over which the usual number of objects is averaged [s]."""
+
+CROWD_INTERVAL: Final = 60.0
+"""Time between remarks about crowds of a kind [s]."""
+
+
+_TELLS_DISTANCE: Final = 0.2  # probability that the range of sight is named
+_NAMES_OBJECT: Final = 0.35  # probability that an object is named that is hidden or shown
+
+PARAMETER: Final[Mapping[Limit, W]] = MappingProxyType(
+    {Limit.FOG: W.FOG_DENSITY, Limit.RAIN: W.PRECIPITATION, Limit.NIGHT: W.SUN_ALTITUDE_ANGLE}
+)
+"""Parameter of the weather behind each limit of the view."""
+
+HIDDEN: Final[Mapping[Limit, tuple[ObjectClass, ...]]] = MappingProxyType(
+    {
+        Limit.FOG: (ObjectClass.ROAD_LINE, ObjectClass.ROAD),
+        Limit.RAIN: (ObjectClass.WATER, ObjectClass.GROUND, ObjectClass.ROAD),
+        Limit.NIGHT: (ObjectClass.SKY,),
+    }
+)
+"""Objects that each limit hides or shows."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noticed:
+    """What an agent has noticed.
+
+    Attributes:
+        weather: parameters that have become conspicuous and are still so.
+        mentioned: changes (parameter, whether it is high) that either speaker has mentioned.
+        crowds: kinds of crowds, with the time at which each was last noticed [s].
+        usual: usual number of objects near, by the kinds of `CROWDS`.
+        looked_at: time of the last look around [s].
+    """
+
+    weather: frozenset[W] = frozenset()
+    mentioned: frozenset[tuple[W, bool]] = frozenset()
+    crowds: tuple[tuple[ObjectClass, float], ...] = ()
+    usual: tuple[float, ...] = (0.0,) * len(CROWDS)
+    looked_at: float = 0.0
+
+    def with_change(self, parameter: W, *, high: bool) -> Noticed:
+        """Records that a parameter has become conspicuous, or has ceased to be."""
+        weather = self.weather | {parameter} if high else self.weather - {parameter}
+        return replace(self, weather=weather, mentioned=self.mentioned - {(parameter, not high)})
+
+    def with_mention(self, parameter: W, *, high: bool) -> Noticed:
+        """Records that a speaker has mentioned that a parameter is conspicuous, or has ceased to be."""
+        return replace(self, mentioned=self.mentioned | {(parameter, high)})
+
+    def has_mentioned(self, parameter: W) -> bool:
+        """Returns whether a speaker has mentioned that a parameter is conspicuous."""
+        return (parameter, True) in self.mentioned
+
+    def with_crowd(self, kind: ObjectClass, now: float) -> Noticed:
+        """Records that a crowd was noticed at a time [s]."""
+        return replace(self, crowds=(*(row for row in self.crowds if row[0] is not kind), (kind, now)))
+
+    def after_looking(self, near: Sequence[ObjectClass], now: float) -> Noticed:
+        """Updates the usual numbers of objects by the kinds of those near, at a time [s]."""
+        weight = min(max(now - self.looked_at, 0.0) / USUAL_TIME, 1.0)
+        usual = tuple(mean + weight * (near.count(kind) - mean) for kind, mean in zip(CROWDS, self.usual, strict=True))
+        return replace(self, usual=usual, looked_at=now)
+
+    def after_hearing(self, words: ParsedText, now: float) -> Noticed:
+        """Records what the other speaker has just mentioned at a time [s], which then needs no mention."""
+        told = words.told
+        if told is None:
+            return self
+        parameter = told.get("parameter")
+        if isinstance(parameter, W):
+            return self.with_mention(parameter, high=told.get("high") is True)
+        kind = next((thing for thing in words.objects if thing in CROWDS), None)
+        return self.with_crowd(kind, now) if told.predicate is Predicate.CROWDED and kind is not None else self
+
+
+def notice(
+    noticed: Noticed,
+    observation: ObservationMapping,
+    objects: Sequence[SeenObject],
+    rng: np.random.Generator,
+    *,
+    chance: float,
+    handled: Collection[W],
+) -> tuple[Remark | None, Noticed]:
+    """Looks around, and perhaps mentions a change of the weather or a crowd.
+
+    Args:
+        noticed: what has been noticed before.
+        observation: observation of the agent.
+        objects: objects in sight.
+        rng: random generator of the decision.
+        chance: probability that what is noticed is mentioned.
+        handled: parameters whose beginning the agent reacts to elsewhere.
+
+    Returns:
+        The remark, or None, and what has been noticed now.
+    """
+    for parameter, high in changes(observation, noticed.weather):
+        told = (parameter, high) in noticed.mentioned
+        noticed = noticed.with_change(parameter, high=high)
+        if not told and not (high and parameter in handled) and rng.random() < chance:
+            return weather_change_remark(parameter, high=high), noticed
+    near, now = [thing.kind for thing in objects if thing.distance < CROWD_DISTANCE], scalar(observation, "time")
+    recent = {kind for kind, at in noticed.crowds if now - at < CROWD_INTERVAL}
+    kind = next((kind for kind in crowds_among(near, noticed.usual) if kind not in recent), None)
+    noticed = noticed.after_looking(near, now)
+    if kind is None:
+        return None, noticed
+    noticed = noticed.with_crowd(kind, now)
+    return crowd_remark(kind) if rng.random() < chance else None, noticed
+
+
+def changes(observation: ObservationMapping, noted: frozenset[W]) -> Iterator[tuple[W, bool]]:
+    """Yields the parameters that have become conspicuous (True), or are so no more (False), since they were noted."""
+    now = {parameter: weather(observation, parameter) for parameter in W}
+    for parameter, measure in CONSPICUOUS.items():
+        value = measure(now)
+        if value >= 1.0 and parameter not in noted:
+            yield parameter, True
+        elif value < OVER and parameter in noted:
+            yield parameter, False
+
+
+def crowds_among(near: Sequence[ObjectClass], usual: Sequence[float]) -> list[ObjectClass]:
+    """Returns those of pedestrians and vehicles of which conspicuously many are near, and more than usual."""
+    return [
+        kind
+        for (kind, least), mean in zip(CROWDS.items(), usual, strict=True)
+        if near.count(kind) >= max(least, mean + MORE_THAN_USUAL)
+    ]
+
+
+def crowd_remark(kind: ObjectClass) -> Remark:
+    """Returns a remark about many pedestrians or vehicles."""
+    return intend(CommunicativeFunction.INFORM, Proposition.of(Predicate.CROWDED, object=kind))
+
+
+def weather_change_remark(parameter: W, *, high: bool) -> Remark:
+    """Returns a remark about a parameter that has become conspicuous, or has ceased to be."""
+    said = Proposition.of(Predicate.WEATHER, parameter=parameter, high=high)
+    topic = f"{'much' if high else 'less'}_{parameter}"
+    return intend(CommunicativeFunction.INFORM, said, wording=Wording(topic=topic))
+
+
+def view_remark(limit: Limit, distance: float, rng: np.random.Generator) -> Remark:
+    """Returns a remark about what limits the view: the condition, an object that it hides, or how far one sees.
+
+    Args:
+        limit: what limits it.
+        distance: range of sight [m].
+        rng: random generator of the decision.
+    """
+    draw = rng.random()
+    if draw < _TELLS_DISTANCE and distance < FAR_SIGHT:
+        said = Proposition.of(Predicate.VISIBILITY, metres=10 * round(distance / 10.0))
+        return intend(CommunicativeFunction.INFORM, said, wording=Wording(topic="sight"))
+    if limit is Limit.CAMERA:
+        said = Proposition.of(Predicate.VISIBILITY, negated=True)
+        return intend(CommunicativeFunction.INFORM, said)
+    things = HIDDEN[limit]
+    thing = things[int(rng.integers(len(things)))] if draw > 1.0 - _NAMES_OBJECT else None
+    said = Proposition.of(Predicate.WEATHER, parameter=PARAMETER[limit], high=True, object=thing)
+    dense = limit is Limit.FOG and distance < DENSE
+    return intend(CommunicativeFunction.INFORM, said, wording=Wording(topic=f"{'dense_' * dense}{limit}"))
+
+
+def fault_remark(sensor: Sensor, *, over: bool = False, joined: bool = False) -> Remark:
+    """Returns a remark that a sensor fails, or works again."""
+    said = Proposition.of(Predicate.FAILED, sensor=sensor, negated=over)
+    wording = Wording(topic=f"{'not_' * over}failed_{sensor}")
+    return intend(CommunicativeFunction.INFORM, said, wording=wording, joined=joined)
