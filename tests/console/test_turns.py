@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from typing import Any, cast
 
 import pytest
@@ -57,3 +58,18 @@ def test_addresses_take_turns_and_of_each_the_newest_and_the_oldest() -> None:
     lines.insert(150, Line(read, "other", "198.51.100.1"))
     asyncio.run(read_all(*lines))
     assert "other" in read[:2] and {"flood 0", "flood 199", "flood 1", "flood 198"} <= set(read[:8])
+
+
+def test_what_turns_set_off_leaves_half_of_the_time_to_others() -> None:
+    class Costly(Line):
+        def take_turn(self) -> None:
+            super().take_turn()
+            asyncio.get_running_loop().call_soon(time.sleep, 0.005)
+
+    async def run() -> float:
+        began = time.monotonic()
+        await read_all(*(Costly([], str(number)) for number in range(40)))
+        return time.monotonic() - began
+
+    # the last series, of eight turns, is followed by no pause that is waited for
+    assert asyncio.run(run()) > 0.005 * (40 + 32)
