@@ -55,7 +55,7 @@ def test_tables_name_seeds_and_the_folder_of_sessions(tmp_path: Path) -> None:
         (("--towns", ","), "give seen, unseen, all"),
         (("--co-wizard", "weights.json"), "which cannot be played"),
         (("--co-wizard", "hollow"), "co_wizard: hollow/model."),
-        (("--participant", "hollow"), "navigation models play the co_wizard, not the participant"),
+        (("--participant", "hollow"), "participant: hollow/model."),
     ],
 )
 def test_invalid_arguments_are_reported(

@@ -87,7 +87,7 @@ def noise_levels(state: CabinState) -> dict[str, float]:
 
 def noise_level(state: CabinState) -> float:
     """Returns the level of all noise together [dB(A)]."""
-    return 10.0 * pm.log10(sum(10.0 ** (level / 10.0) for level in noise_levels(state).values()))
+    return 10.0 * pm.log10(sum(pm.power(10.0, level / 10.0) for level in noise_levels(state).values()))
 
 
 def signal_to_noise(state: CabinState) -> float:

@@ -20,7 +20,7 @@ PORTABLE = (
 
 EXCEPTIONS = {
     "maps/lint": "reports faults of a map; no session reads it",
-    "rendering/figures.py": "draws people's pictures",
+    "rendering/sprites.py": "draws people's pictures",
     "sim/town_env.py": "highway-env's own observations",
 }
 
