@@ -18,7 +18,7 @@ from dorothie_gym.dialogue import Direction, Wording, guess_spans, load_lexicon,
 from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, MentalAction, Role
-from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, contents
+from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, act_builders
 from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.policy import policy_inputs, policy_seed
@@ -32,7 +32,7 @@ UPDATES = ("mental", "plan", "goals", "landmark", "status", "lane", "metres")
 
 
 def vocabulary():
-    goal = intend(Function.REQUEST, contents.destination(LandmarkName.KFC))
+    goal = intend(Function.REQUEST, act_builders.destination(LandmarkName.KFC))
     turn = order(DialogueMove.INSTRUCT, ActionValue.J_TURN, Wording(direction=Direction.LEFT))
     step = {"manoeuvre": ActionValue.J_TURN, "turn": Direction.LEFT}
     return ("", STOP_FORM, form_of(goal, {"goal": LandmarkName.KFC}), form_of(turn, step))
