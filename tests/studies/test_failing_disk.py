@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count
 from pathlib import Path
@@ -67,6 +68,7 @@ def test_a_group_that_cannot_be_stored_binds_nobody(tmp_path: Path, monkeypatch:
         two.enter()
         while not failures:
             two.do("news")
+            time.sleep(0.2)  # as a browser does; a person has no more requests than that
         one.do("withdraw", {"sure": True})
         three.enter()
         seat(two, three)
