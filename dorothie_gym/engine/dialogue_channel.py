@@ -17,9 +17,8 @@ from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.engine.cabin import CabinState, signal_to_noise
 from dorothie_gym.engine.channel_kind import ChannelKind
 from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.providers import speak_aloud
+from dorothie_gym.engine.providers import SpokenChannel, speak_aloud
 from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.engine.spoken_channel import SpokenChannel
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName

@@ -17,8 +17,7 @@ from dorothie_gym.engine.exception_executor import ExceptionExecutor
 from dorothie_gym.engine.masks import ActionMasks
 from dorothie_gym.engine.observations import DeliveredMessages, ObservationBuilder
 from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.engine.pictures import Pictures, VisiblePerception
-from dorothie_gym.engine.providers import draw_pictures, see_by_camera
+from dorothie_gym.engine.providers import Pictures, VisiblePerception, draw_pictures, see_by_camera
 from dorothie_gym.engine.scenario import Scenario, header_of
 from dorothie_gym.engine.session_log import EventLog, SessionSummary, SubgoalCounts, SubgoalTracker
 from dorothie_gym.engine.session_views import SessionViews

@@ -159,13 +159,12 @@ class StudyServer:
             except StorageError as error:
                 logger.error("the study could not be stored; it tries again: %s", error)
                 await asyncio.sleep(5.0)
-                continue
             except Exception:
                 logger.exception("the study could not go on; it tries again")
                 await asyncio.sleep(5.0)
-                continue
-            if changed:
-                self._presence.tell()
+            else:
+                if changed:
+                    self._presence.tell()
 
     # --- requests ---------------------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""AdWizardTrigger of the scripted Ad-Wizard with a session in which an agent drives.
+"""Trigger of the scripted Ad-Wizard in a session in which an agent drives.
 
 Compiled code looks at every decision whether a planned trick finds its moment, by the functions and random numbers of
 the policy. Only then does the policy observe and act.

@@ -16,8 +16,8 @@ from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_o
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import DriverObservation
 from dorothie_gym.envs.navigation.config import NavigationConfig
-from dorothie_gym.envs.navigation.driver_panel import DrivingView
 from dorothie_gym.envs.navigation.episode import TERMS, Ending
+from dorothie_gym.envs.navigation.render import DrivingView
 from dorothie_gym.envs.navigation.rows import INFRACTIONS
 from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.maps.catalogue import load_town

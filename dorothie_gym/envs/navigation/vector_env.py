@@ -21,8 +21,8 @@ from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import DriverObservation
 from dorothie_gym.envs.navigation.config import NavigationConfig
-from dorothie_gym.envs.navigation.driver_panel import DrivingView
 from dorothie_gym.envs.navigation.episode import TERMS, Ending
+from dorothie_gym.envs.navigation.render import DrivingView
 from dorothie_gym.envs.navigation.rows import INFRACTIONS, REFUSED
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr

@@ -13,6 +13,7 @@ from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.polyline import HEADING, HEIGHT, STATION, X, Y
 from dorothie_gym.sim.ego.limits import LATERAL_ACCELERATION, PROFILE_BRAKING, U_TURN_SPEED
+from dorothie_gym.sim.ego.path_search import foot_on_segment
 from dorothie_gym.sim.network.centre_lines import interpolated, position_on, project_on, segment_at, value_on
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.state.ego_records import CoursePointRecord
@@ -335,10 +336,7 @@ def enter(world: WorldArrays, x: float, y: float) -> None:
     for k in range(min(point_before(world, SEARCH_RANGE) + 1, last)):
         one, other = course[k], course[k + 1]
         dx, dy = other.x - one.x, other.y - one.y
-        t = ((x - one.x) * dx + (y - one.y) * dy) / (dx * dx + dy * dy)
-        # before the first and after the last point the path continues straight
-        if (t < 0.0 and k > 0) or (t > 1.0 and k < last - 1):
-            t = 0.0 if t < 0.0 else 1.0
+        t = foot_on_segment(one, other, x, y, k == 0, k == last - 1)
         ox, oy = x - one.x - t * dx, y - one.y - t * dy
         gap = ox * ox + oy * oy
         if gap < best:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from dorothie_gym.compilation import compiled
+from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.sim.state.ego_records import CoursePointRecord
 
@@ -23,6 +23,21 @@ def point_before(course: RecordArray[CoursePointRecord], count: int, at: float) 
         else:
             low = middle + 1
     return max(low - 1, 0)
+
+
+@inlined
+def foot_on_segment(
+    one: CoursePointRecord, other: CoursePointRecord, x: float, y: float, is_first: bool, is_last: bool
+) -> float:
+    """Returns where a segment of a path is closest to a position [m], from 0 to 1 between its points.
+
+    Before the first and after the last point the path continues straight: there it is less than 0, or more than 1.
+    """
+    dx, dy = other.x - one.x, other.y - one.y
+    t = ((x - one.x) * dx + (y - one.y) * dy) / (dx * dx + dy * dy)
+    if (t < 0.0 and not is_first) or (t > 1.0 and not is_last):
+        t = 0.0 if t < 0.0 else 1.0
+    return t
 
 
 @compiled
@@ -45,13 +60,10 @@ def progress_on_path(
     best, answer = math.inf, near
     first, last = point_before(course, count, near - window), point_before(course, count, near + window)
     for k in range(first, min(last + 1, end)):
-        one, two = course[k], course[k + 1]
-        dx, dy = two.x - one.x, two.y - one.y
-        t = ((x - one.x) * dx + (y - one.y) * dy) / (dx * dx + dy * dy)
-        if (t < 0.0 and k > 0) or (t > 1.0 and k < end - 1):
-            t = 0.0 if t < 0.0 else 1.0
-        ox, oy = x - one.x - t * dx, y - one.y - t * dy
+        one, other = course[k], course[k + 1]
+        t = foot_on_segment(one, other, x, y, k == 0, k == end - 1)
+        ox, oy = x - one.x - t * (other.x - one.x), y - one.y - t * (other.y - one.y)
         distance = ox * ox + oy * oy
         if distance < best:
-            best, answer = distance, one.s + t * (two.s - one.s)
+            best, answer = distance, one.s + t * (other.s - one.s)
     return answer

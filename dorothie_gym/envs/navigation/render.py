@@ -1,4 +1,4 @@
-"""Pictures of the navigation environments."""
+"""`render()` of the navigation environments."""
 
 from __future__ import annotations
 

@@ -222,7 +222,7 @@ def test_observing_changes_nothing_and_copies_go_on_alike() -> None:
 
 PROGRAM = """
 import hashlib
-from tests.engine.test_camera_perception import CONFIG, TOWN, played
+from tests.camera.test_camera_perception import CONFIG, TOWN, played
 from dorothie_gym.engine.session_engine import SessionEngine
 found = hashlib.sha256()
 for observations in played(SessionEngine(TOWN, config=CONFIG), seed=6, decisions=40):
