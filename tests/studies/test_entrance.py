@@ -81,6 +81,7 @@ def test_a_person_in_another_browser_is_told_whom_to_ask_and_goes_on_by_a_link(t
     with ServedStudy(write_study(tmp_path, SOLO), data) as served:
         old, new, later, stranger = (Client(served.port) for _ in range(4))
         old.enter({"PROLIFIC_PID": "platform-one"})
+        old.follow(lambda: old.view.get("token"))  # the stage stays the same from now on
         assert new.post("join", {"parameters": {"PROLIFIC_PID": "platform-one"}}) == 409
         assert CONTACT in new.answer["error"]
         code, text = command("readmit", data, "platform-one", "--address", "https://study.example.org/")
