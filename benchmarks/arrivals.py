@@ -26,11 +26,11 @@ from typing import Any, Final
 import numpy as np
 import yaml
 
+from dorothie_gym.lab.studies.assignment import Assigner, Candidate, changed_role, match, needed_role
+from dorothie_gym.lab.studies.stages import Stage
+from dorothie_gym.lab.studies.study_file import read_study
+from dorothie_gym.lab.studies.waiting_room import CERTAINTY, GONE_SECONDS, MOVABLE
 from dorothie_gym.ontology import Role
-from dorothie_gym.studies.assignment import Assigner, Candidate, changed_role, match, needed_role
-from dorothie_gym.studies.stages import Stage
-from dorothie_gym.studies.study_file import read_study
-from dorothie_gym.studies.waiting_room import CERTAINTY, GONE_SECONDS, MOVABLE
 
 PAGES: Final = {
     Stage.CONSENT: (30.0, 120.0), Stage.BEFORE: (40.0, 150.0), Stage.INSTRUCTIONS: (40.0, 120.0),

@@ -17,21 +17,21 @@ import numpy as np
 from benchmarks.metadrive_reference import metadrive_reference
 from benchmarks.opengl_reference import opengl_reference
 from benchmarks.timing import Figures, Progress, cpu_seconds, ignore_progress, machine, rounded
-from dorothie_gym.camera.pose import CameraPose, pose_on_car
-from dorothie_gym.camera.scene_cache import town_scene
-from dorothie_gym.camera.session_camera import SessionCamera
-from dorothie_gym.camera.town_scene import SessionScene
-from dorothie_gym.engine.camera_config import CameraConfig, CameraMount, CameraOutput
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import Role
+from dorothie_gym.pictures.camera.pose import CameraPose, pose_on_car
+from dorothie_gym.pictures.camera.scene_cache import town_scene
+from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.town_scene import SessionScene
 from dorothie_gym.policies import make_policy
-from dorothie_gym.rollout import play_session
+from dorothie_gym.session.camera_config import CameraConfig, CameraMount, CameraOutput
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.weather import Weather
-from dorothie_gym.user_cache import CACHE_VARIABLE
+from dorothie_gym.support.user_cache import CACHE_VARIABLE
 
 Size: TypeAlias = tuple[int, int]
 """Width and height of a picture [pixels]."""
@@ -260,9 +260,9 @@ import dorothie_gym
 env = dorothie_gym.DuoWizardEnv(sys.argv[1])
 env.reset(seed=0)
 start = time.process_time()
-from dorothie_gym.camera.scene_cache import town_scene
-from dorothie_gym.camera.session_camera import SessionCamera
-from dorothie_gym.camera.town_scene import SessionScene
+from dorothie_gym.pictures.camera.scene_cache import town_scene
+from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.town_scene import SessionScene
 scenario = env.session.scenario
 names = [name.label for name in scenario.street_names]
 scene = SessionScene(town_scene(env.session.world.town), names, scenario.storyboard.landmarks)

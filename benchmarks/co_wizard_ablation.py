@@ -26,7 +26,7 @@ from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard, LearnedStat
 from dorothie_gym.baselines.co_wizard.remarks import Sources, filled
 from dorothie_gym.baselines.imitation.drawing import drawn
 from dorothie_gym.cli.output import reporting_errors, session_progress
-from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology import PhysicalAction, Role
@@ -38,9 +38,9 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.pretrained import is_pretrained
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.turn_lanes import junction_meant
-from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.spaces import ObservationMapping, Physical, SpaceLimits
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces import ObservationMapping, Physical, SpaceLimits
 
 SHOWN: Final = ("success", "driving_score", "goal_condition_success", "exchanges_per_subgoal", "seconds")
 """Metrics of the printed table."""

@@ -10,13 +10,14 @@ from typing import Annotated
 
 import typer
 
-from dorothie_gym.analysis.truth_checks import TalkChecks, checks
-from dorothie_gym.analysis.truth_checks.session_world import SessionWorld
-from dorothie_gym.analysis.truth_checks.truth import is_true
+from dorothie_gym.archive import Corpus
 from dorothie_gym.dialogue import Predicate
+from dorothie_gym.evaluation.analysis.truth_checks import TalkChecks, checks
+from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
+from dorothie_gym.evaluation.analysis.truth_checks.truth import is_true
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import Role
-from dorothie_gym.recording import Corpus, MoveRecord, Session
+from dorothie_gym.session.recording import MoveRecord, Session
 
 FIGURES = ("truth", "yes_no_answers", "relevance")
 

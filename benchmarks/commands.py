@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from benchmarks.report import Report
     from benchmarks.timing import Figures, Progress
-    from dorothie_gym.engine.camera_config import CameraOutput
+    from dorothie_gym.session.camera_config import CameraOutput
 
 Measure: TypeAlias = "Callable[[Progress], Figures]"
 """Measurement; takes a callback for its progress."""
@@ -160,7 +160,7 @@ def _size(text: str) -> tuple[int, int]:
     width, separator, height = text.partition("x")
     if not (separator and width.isdecimal() and height.isdecimal()):
         fail(f"--size {text}: give it as WIDTHxHEIGHT in pixels, for instance 480x320")
-    from dorothie_gym.engine.camera_config import CameraConfig
+    from dorothie_gym.session.camera_config import CameraConfig
 
     try:
         config = CameraConfig(width=int(width), height=int(height))
@@ -171,7 +171,7 @@ def _size(text: str) -> tuple[int, int]:
 
 def _outputs(text: str) -> tuple[CameraOutput, ...]:
     """Returns the outputs of a list of names; exits with code 2 for another name."""
-    from dorothie_gym.engine.camera_config import CameraOutput
+    from dorothie_gym.session.camera_config import CameraOutput
 
     if text == "all":
         return tuple(CameraOutput)
@@ -280,7 +280,7 @@ def train(
         except ImportError as error:
             fail(f"{error.name} is not installed; run: pip install 'dorothie-gym[baselines]'")
         from dorothie_gym.errors import CacheError
-        from dorothie_gym.rollout import default_corpus
+        from dorothie_gym.evaluation.rollout import default_corpus
 
         try:
             folder = corpus or default_corpus()

@@ -31,11 +31,11 @@ def serve(sessions: int, pipe: Pipe) -> None:
 
     import uvicorn
 
-    from dorothie_gym.console.config import ConsoleConfig
-    from dorothie_gym.console.room import Room
-    from dorothie_gym.console.seating import parse_roles
-    from dorothie_gym.console.server import Console
-    from dorothie_gym.engine.session_engine import SessionEngine
+    from dorothie_gym.lab.console.config import ConsoleConfig
+    from dorothie_gym.lab.console.room import Room
+    from dorothie_gym.lab.console.seating import parse_roles
+    from dorothie_gym.lab.console.server import Console
+    from dorothie_gym.session.session_engine import SessionEngine
 
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})

@@ -19,6 +19,7 @@ import torch
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from dorothie_gym.archive import Corpus
 from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes, objects_in
 from dorothie_gym.baselines.vision.detector import Detector
 from dorothie_gym.baselines.vision.experiment import TESTS, config_of, load_detector, load_segformer, sampling_of
@@ -27,7 +28,6 @@ from dorothie_gym.baselines.vision.object_learner import corners_of, focals_of
 from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
 from dorothie_gym.baselines.vision.segformer import SegFormer, normalised
 from dorothie_gym.baselines.vision.solids import Focals, spaces_of
-from dorothie_gym.recording import Corpus
 
 SCALE = 2
 """Pixels of the drawing for one of the picture."""

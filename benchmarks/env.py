@@ -11,12 +11,12 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Final
 
 from benchmarks.timing import Figures, Progress, Worker, alternate, ignore_progress, machine, rounded
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES
-from dorothie_gym.processors import available_processors
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.spaces import noop
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
-from dorothie_gym.spaces import noop
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from benchmarks.highway_reference import StockIntersection

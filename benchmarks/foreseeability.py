@@ -24,10 +24,10 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 from sklearn.linear_model import LogisticRegression
 from threadpoolctl import threadpool_limits
 
-from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, build, gather, points
-from dorothie_gym.benchmark.shallow_models import BoostedTrees, WordRegression
+from dorothie_gym.archive import Task
 from dorothie_gym.cli.output import reporting_errors
-from dorothie_gym.recording import Task
+from dorothie_gym.evaluation.teacher_forced.features import BatchSpec, Columns, PointTable, build, gather, points
+from dorothie_gym.evaluation.teacher_forced.shallow_models import BoostedTrees, WordRegression
 
 MOVES, ACTIONS = 6, 4
 """Number of moves and of physical actions in the history."""

@@ -16,11 +16,11 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from dorothie_gym.analysis.intervals import Estimate
 from dorothie_gym.baselines.rl.checkpoint import load_model
 from dorothie_gym.baselines.rl.evaluation import FIRST_SEED, EpisodeStatistics, evaluate_settings, greedy_policy
 from dorothie_gym.baselines.rl.run import BEST
 from dorothie_gym.cli.output import reporting_errors
+from dorothie_gym.evaluation.analysis.intervals import Estimate
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
 
 FIRST_TEST: Final = FIRST_SEED + 500_000

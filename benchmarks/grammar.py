@@ -19,10 +19,11 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from dorothie_gym.archive import Corpus
 from dorothie_gym.cli.output import fail, reporting_errors
 from dorothie_gym.dialogue import load_lexicon
 from dorothie_gym.ontology import SLOT_VALUES, Slot
-from dorothie_gym.recording import Corpus, UtteranceRecord
+from dorothie_gym.session.recording import UtteranceRecord
 from dorothie_gym.tasks.catalogue import catalogue
 
 STYLE: Final = frozenset({"Enhancement", "Formatting", "Readability", "Redundancy", "Regionalism", "Style"})

@@ -20,28 +20,28 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from dorothie_gym.analysis.intervals import wilson_interval
-from dorothie_gym.camera.camera_perception import CameraPerception
-from dorothie_gym.camera.cells import sorted_by_cell
-from dorothie_gym.camera.mesh import empty_mesh
-from dorothie_gym.camera.pose import pose_on_car
-from dorothie_gym.camera.scene_cache import town_scene
-from dorothie_gym.camera.scenery.lenses import Lenses
-from dorothie_gym.camera.session_camera import SessionCamera
-from dorothie_gym.camera.town_scene import SessionScene
-from dorothie_gym.camera.visibility import PERCEPTION_CAMERA, is_body_seen
-from dorothie_gym.compilation.records import plain
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.evaluation.analysis.intervals import wilson_interval
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES
+from dorothie_gym.pictures.camera.camera_perception import CameraPerception
+from dorothie_gym.pictures.camera.cells import sorted_by_cell
+from dorothie_gym.pictures.camera.mesh import empty_mesh
+from dorothie_gym.pictures.camera.pose import pose_on_car
+from dorothie_gym.pictures.camera.scene_cache import town_scene
+from dorothie_gym.pictures.camera.scenery.lenses import Lenses
+from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.town_scene import SessionScene
+from dorothie_gym.pictures.camera.visibility import PERCEPTION_CAMERA, is_body_seen
+from dorothie_gym.pictures.charts import INK, SHEET, SOFT, empty_figure
 from dorothie_gym.policies import make_policy
-from dorothie_gym.rendering.charts import INK, SHEET, SOFT, empty_figure
-from dorothie_gym.rollout import play_session
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT
 from dorothie_gym.sim.state.codes import Group
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.world import World
+from dorothie_gym.support.compilation.records import plain
 
 EVERY: Final = 8
 """Decisions between two looks."""

@@ -26,14 +26,14 @@ from dorothie_gym.baselines.experiment import RESULT_FILE
 from dorothie_gym.baselines.participant import files as participant
 from dorothie_gym.baselines.rl.checkpoint import TENSORS, load_model, save_model
 from dorothie_gym.baselines.rl.run import BEST, PROGRESS
-from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
+from dorothie_gym.evaluation.closed_loop.running import command_of
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, Player, find_player
 from dorothie_gym.policies.navigation import FIELDS
 from dorothie_gym.policies.policy_loader import DESCRIPTION
 from dorothie_gym.policies.pretrained import CARD_FILE, PREFIX, SHIPPED, CardFigure, PretrainedCard
-from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings, parse_towns, roll_out
-from dorothie_gym.rollout.closed_loop.running import command_of
+from dorothie_gym.session.config import EnvConfig
 
 SEED: Final = 0
 """Seed of every training."""

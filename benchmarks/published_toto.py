@@ -16,14 +16,15 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from dorothie_gym.archive import Task
+from dorothie_gym.archive.prediction_points import DecisionPoint, InferencePoint, Point, PointView, history_angle
 from dorothie_gym.baselines.model_io import backpropagate
 from dorothie_gym.baselines.toto.layers import GraphAttention
-from dorothie_gym.benchmark.features import TownGraph
+from dorothie_gym.evaluation.teacher_forced.features import TownGraph
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES
 from dorothie_gym.ontology import LABELS, NAVIGATION_ACTIONS, VECTOR_SLOTS, DialogueMove, PhysicalAction, Role
 from dorothie_gym.ontology.dialogue_acts import SLOT_SPANS
-from dorothie_gym.recording import Session, Task
-from dorothie_gym.recording.prediction_points import DecisionPoint, InferencePoint, Point, PointView, history_angle
+from dorothie_gym.session.recording import Session
 
 TOKEN_WIDTH: Final = 770
 LANES, ROADS, JUNCTIONS = 486, 259, 34

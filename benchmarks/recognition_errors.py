@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Final
 
 from dorothie_gym._version import __version__
-from dorothie_gym.analysis.word_errors import WordErrorCounts, WordErrors
+from dorothie_gym.archive.corpus import load_sessions
 from dorothie_gym.dialogue.recognition_errors import PROFILE_FILE
-from dorothie_gym.files import write_atomically
-from dorothie_gym.recording.corpus import load_sessions
+from dorothie_gym.evaluation.analysis.word_errors import WordErrorCounts, WordErrors
+from dorothie_gym.support.files import write_atomically
 
 TARGET: Final = Path(__file__).parent.parent / "dorothie_gym" / "dialogue" / "data" / PROFILE_FILE
 

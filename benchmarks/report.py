@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from benchmarks.timing import Figures
-from dorothie_gym.engine.camera_config import CameraOutput
-from dorothie_gym.rendering.charts import GRID, INK, SHEET, SOFT, hexadecimal
-from dorothie_gym.rendering.palette import CAR, LIGHT_RED, ROAD
+from dorothie_gym.pictures.charts import GRID, INK, SHEET, SOFT, hexadecimal
+from dorothie_gym.pictures.palette import CAR, LIGHT_RED, ROAD
+from dorothie_gym.session.camera_config import CameraOutput
 from dorothie_gym.sim.config import FRAME_RATE
 
 if TYPE_CHECKING:

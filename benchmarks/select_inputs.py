@@ -19,7 +19,7 @@ from dorothie_gym.baselines.experiment import validation_scores
 from dorothie_gym.baselines.model_zoo import SIZES, build_model, find_row
 from dorothie_gym.baselines.toto import TOTOConfig
 from dorothie_gym.baselines.trainer import predict, train
-from dorothie_gym.benchmark import COLUMNS
+from dorothie_gym.evaluation.teacher_forced import COLUMNS
 
 
 def _silent(name: str) -> Callable[[Any], None]:

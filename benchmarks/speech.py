@@ -11,15 +11,14 @@ import numpy as np
 from rapidfuzz.distance import Levenshtein
 
 from benchmarks.timing import Figures, Progress, ignore_progress, machine, rounded
-from dorothie_gym.audio import SAMPLE_RATE, Samples
 from dorothie_gym.dialogue import Span, Utterance, guess_act
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.evaluation.rollout.corpus_generation import plan_corpus
+from dorothie_gym.evaluation.rollout.play import play_session
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import Slot, SlotValue
 from dorothie_gym.policies import ALL_SCRIPTED
-from dorothie_gym.rollout.corpus_generation import plan_corpus
-from dorothie_gym.rollout.play import play_session
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.speech import (
     Recognition,
     find_recognizer,
@@ -29,6 +28,7 @@ from dorothie_gym.speech import (
     spoken_words,
     understand_speech,
 )
+from dorothie_gym.support.audio import SAMPLE_RATE, Samples
 
 SEED: Final = 31000
 """Seed of the sessions; those of the language model have 21001 (`benchmarks/speech_transcripts.py`)."""

@@ -12,9 +12,9 @@ import argparse
 import gzip
 from pathlib import Path
 
-from dorothie_gym.files import write_atomically
-from dorothie_gym.recording.corpus import load_sessions
+from dorothie_gym.archive.corpus import load_sessions
 from dorothie_gym.speech.grammar_sentences import TRANSCRIPTS_FILE
+from dorothie_gym.support.files import write_atomically
 
 TARGET = Path(__file__).parent.parent / "dorothie_gym" / "speech" / "data" / TRANSCRIPTS_FILE
 

@@ -14,12 +14,13 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from benchmarks.published_toto import Features, PublishedTOTO, Senses, rebuild, train_step
 from benchmarks.timing import Progress, alternate, cpu_seconds, ignore_progress, machine, rounded
+from dorothie_gym.archive import Corpus
+from dorothie_gym.archive.prediction_points import Point, task_points
 from dorothie_gym.baselines.model_io import TASKS, Examples, Labels, backpropagate
 from dorothie_gym.baselines.toto import TOTO, FrozenTexts, TOTOConfig, Towns
-from dorothie_gym.benchmark.features import Columns, build, points
-from dorothie_gym.processors import available_processors
-from dorothie_gym.recording import Corpus, Session
-from dorothie_gym.recording.prediction_points import Point, task_points
+from dorothie_gym.evaluation.teacher_forced.features import Columns, build, points
+from dorothie_gym.session.recording import Session
+from dorothie_gym.support.processors import available_processors
 
 _POINTS: Final = 512
 """Points of the corpus that are looked at."""

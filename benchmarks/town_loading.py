@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from dorothie_gym.maps import load_town, town_names
-from dorothie_gym.user_cache import CACHE_VARIABLE
+from dorothie_gym.support.user_cache import CACHE_VARIABLE
 
 # The clock starts after the imports, which are the same for both.
 LOAD = """

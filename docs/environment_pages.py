@@ -34,12 +34,12 @@ from PIL import Image
 from vocabulary_page import GENERATED, anchors, vocabularies
 
 import dorothie_gym
+from dorothie_gym.archive import Task
 from dorothie_gym.envs.history_space import act_fields, decision_fields, history_fields
 from dorothie_gym.envs.navigation_continuous_v0 import CONTINUOUS_FIELD_SPECS
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.navigation import FIELD_SPECS
-from dorothie_gym.recording import Task
-from dorothie_gym.spaces import action_fields, observation_fields
+from dorothie_gym.session.spaces import action_fields, observation_fields
 
 FOLDER = Path(__file__).parent / "environments"
 

@@ -22,7 +22,9 @@ from typing import Any
 
 import environment_pages
 
-from dorothie_gym.analysis import (
+from dorothie_gym.archive import Corpus
+from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.evaluation.analysis import (
     PAPER,
     Handled,
     Units,
@@ -32,16 +34,15 @@ from dorothie_gym.analysis import (
     phenomena_of,
     verdicts_of,
 )
-from dorothie_gym.analysis.exception_attribution import kind_of
-from dorothie_gym.analysis.transcript import markdown
-from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.evaluation.analysis.exception_attribution import kind_of
+from dorothie_gym.evaluation.analysis.transcript import markdown
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES, Role
+from dorothie_gym.pictures.charts import SHEET, SOFT, empty_figure, hexadecimal
+from dorothie_gym.pictures.palette import CAR, INK_SOFT, LIGHT_GREEN, NOTE, PROP
 from dorothie_gym.policies import make_policy, pretrained_card, pretrained_names
 from dorothie_gym.policies.pretrained import CardFigure, pretrained_size
-from dorothie_gym.recording import Corpus, EventType, Session
-from dorothie_gym.rendering.charts import SHEET, SOFT, empty_figure, hexadecimal
-from dorothie_gym.rendering.palette import CAR, INK_SOFT, LIGHT_GREEN, NOTE, PROP
-from dorothie_gym.rollout import play_session
+from dorothie_gym.session.recording import EventType, Session
 
 DOCS = Path(__file__).parent
 TRANSCRIPTS, DATA_SHEET, CURVES = DOCS / "transcripts.md", DOCS / "data-sheet.md", DOCS / "navigation_curve.png"

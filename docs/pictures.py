@@ -28,30 +28,30 @@ from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from dorothie_gym.camera.pose import pose_on_car
-from dorothie_gym.camera.recorded_pictures import RecordedPictures
-from dorothie_gym.camera.scene_cache import town_scene
-from dorothie_gym.camera.session_camera import SessionCamera
-from dorothie_gym.camera.town_scene import SessionScene
 from dorothie_gym.cli.run import draw_session
-from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
+from dorothie_gym.evaluation.closed_loop.leaderboard import PART_TITLES
+from dorothie_gym.evaluation.closed_loop.leaderboard_chart import CHART_METRICS, ChartRow, draw_rows
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.maps import fold_of, load_town
 from dorothie_gym.ontology import AGENT_ROLES, ActionValue, LandmarkName, WeatherParameter
+from dorothie_gym.pictures import town_picture
+from dorothie_gym.pictures.camera.pose import pose_on_car
+from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
+from dorothie_gym.pictures.camera.scene_cache import town_scene
+from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.town_scene import SessionScene
+from dorothie_gym.pictures.views.playback import Playback
+from dorothie_gym.pictures.views.session_views import SessionRenderer
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation import NavigationAction
-from dorothie_gym.recording import Session
-from dorothie_gym.render_view import RenderView
-from dorothie_gym.rendering import town_picture
-from dorothie_gym.rendering.playback import Playback
-from dorothie_gym.rendering.session_views import SessionRenderer
-from dorothie_gym.rollout import play_session
-from dorothie_gym.rollout.closed_loop.leaderboard import PART_TITLES
-from dorothie_gym.rollout.closed_loop.leaderboard_chart import CHART_METRICS, ChartRow, draw_rows
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording import Session
+from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.weather import Weather
+from dorothie_gym.support.render_view import RenderView
 
 sys.path.append(str(Path(__file__).parents[1]))  # the benchmarks are a folder of the checkout and not installed
 from benchmarks.report import Report, draw, world_report
@@ -189,9 +189,9 @@ def draw_dashboard(path: Path) -> None:
 
 def draw_corpus(path: Path, corpus: Path) -> None:
     """Draws moves and slots of a corpus."""
-    from dorothie_gym.analysis import corpus_stats_of
-    from dorothie_gym.analysis.profiles import draw_profiles
-    from dorothie_gym.recording import Corpus
+    from dorothie_gym.archive import Corpus
+    from dorothie_gym.evaluation.analysis import corpus_stats_of
+    from dorothie_gym.evaluation.analysis.profiles import draw_profiles
 
     census = corpus_stats_of(Corpus.load(corpus))
     made = json.loads((corpus / "generation.json").read_text(encoding="utf-8"))

@@ -1,13 +1,7 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
 from ._version import __version__ as __version__
-from .engine.camera_config import CameraConfig as CameraConfig
-from .engine.camera_config import CameraMount as CameraMount
-from .engine.camera_config import CameraOutput as CameraOutput
-from .engine.config import EnvConfig as EnvConfig
-from .engine.config import RewardWeights as RewardWeights
-from .engine.scenario import Scenario as Scenario
-from .engine.scenario import draw_scenario as draw_scenario
+from .archive import load_sessions as load_sessions
 from .envs.duo_wizard_v0 import DuoWizardEnv as DuoWizardEnv
 from .envs.duo_wizard_vector_env import DuoWizardVectorEnv as DuoWizardVectorEnv
 from .envs.navigation.config import NavigationWeights as NavigationWeights
@@ -25,11 +19,17 @@ from .ontology import Role as Role
 from .policies import Policy as Policy
 from .policies import make_policy as make_policy
 from .policies.navigation import NavigationAction as NavigationAction
-from .recording import Session as Session
-from .recording import load_sessions as load_sessions
+from .session.camera_config import CameraConfig as CameraConfig
+from .session.camera_config import CameraMount as CameraMount
+from .session.camera_config import CameraOutput as CameraOutput
+from .session.config import EnvConfig as EnvConfig
+from .session.config import RewardWeights as RewardWeights
+from .session.recording import Session as Session
+from .session.scenario import Scenario as Scenario
+from .session.scenario import draw_scenario as draw_scenario
+from .session.spaces import SpaceLimits as SpaceLimits
+from .session.spaces import noop as noop
 from .sim.config import WorldConfig as WorldConfig
-from .spaces import SpaceLimits as SpaceLimits
-from .spaces import noop as noop
 from .tasks import load_template as load_template
 from .tasks import template_names as template_names
 from .wrappers.flatten import FlattenAction as FlattenAction

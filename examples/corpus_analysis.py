@@ -16,10 +16,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dorothie_gym import EnvConfig
-from dorothie_gym.analysis import corpus_stats_of
+from dorothie_gym.archive import Corpus
+from dorothie_gym.evaluation.analysis import corpus_stats_of
+from dorothie_gym.evaluation.rollout import generate_corpus
 from dorothie_gym.ontology import DialogueMove, Role
-from dorothie_gym.recording import Corpus
-from dorothie_gym.rollout import generate_corpus
 
 SPEAKERS = {Role.PARTICIPANT: "participant", Role.CO_WIZARD: "Co-Wizard"}
 

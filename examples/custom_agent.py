@@ -17,8 +17,8 @@ import numpy as np
 
 import dorothie_gym  # noqa: F401 (registers the environments)
 from dorothie_gym.ontology import DialogueAct, DialogueMove, PhysicalAction
+from dorothie_gym.session.spaces import CoWizardAction, ExitColumn, Physical, SpaceLimits, Speech
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces import CoWizardAction, ExitColumn, Physical, SpaceLimits, Speech
 
 DIRECTIONS = {"left": 90.0, "right": -90.0, "straight": 0.0}
 """Angles of the directions that the agent understands [degrees, positive left]."""

@@ -19,11 +19,17 @@ from scipy.sparse import csr_matrix, hstack
 from sklearn.feature_extraction.text import HashingVectorizer
 from sklearn.linear_model import LogisticRegression
 
-from dorothie_gym.benchmark import ActionPredictions, ActPredictions, TaskPredictions, evaluate_files, write_predictions
-from dorothie_gym.benchmark.features import BatchSpec, Columns, PointTable, build, gather, points
+from dorothie_gym.archive import Task
+from dorothie_gym.evaluation.rollout import default_corpus
+from dorothie_gym.evaluation.teacher_forced import (
+    ActionPredictions,
+    ActPredictions,
+    TaskPredictions,
+    evaluate_files,
+    write_predictions,
+)
+from dorothie_gym.evaluation.teacher_forced.features import BatchSpec, Columns, PointTable, build, gather, points
 from dorothie_gym.ontology import DialogueMove
-from dorothie_gym.recording import Task
-from dorothie_gym.rollout import default_corpus
 
 
 def features(columns: Columns, table: PointTable) -> csr_matrix:

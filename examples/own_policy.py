@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from dorothie_gym import DuoWizardEnv, EnvConfig, Policy, Session, Town, make_policy
+from dorothie_gym.evaluation.closed_loop import METRICS, measure
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role
-from dorothie_gym.rollout import play_session
-from dorothie_gym.rollout.closed_loop import METRICS, measure
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.session.spaces import SpaceLimits
 
 
 class SteadySpeed(Policy[Any]):

@@ -14,11 +14,11 @@ import argparse
 from pathlib import Path
 
 from dorothie_gym import DuoWizardEnv, EnvConfig, make_policy
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.maps import describe, load_town
 from dorothie_gym.maps.lint import check_town
 from dorothie_gym.ontology import AGENT_ROLES
-from dorothie_gym.rendering import town_picture
-from dorothie_gym.rollout import play_session
+from dorothie_gym.pictures import town_picture
 
 TOWN = """\
 name: mill_end

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.audio import Samples, encode_wav, resample
+from dorothie_gym.support.audio import Samples, encode_wav, resample
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 

@@ -16,11 +16,11 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from dorothie_gym.camera import warm_up as camera
-from dorothie_gym.compilation import compiled_folder
-from dorothie_gym.engine.warm_up import is_warm
 from dorothie_gym.envs import warm_up as navigation
-from dorothie_gym.user_cache import CACHE_VARIABLE
+from dorothie_gym.pictures.camera import warm_up as camera
+from dorothie_gym.session.warm_up import is_warm
+from dorothie_gym.support.compilation import compiled_folder
+from dorothie_gym.support.user_cache import CACHE_VARIABLE
 
 settings.register_profile("patient", deadline=None)  # durations are no results: another process may use the cores
 settings.load_profile("patient")
@@ -46,7 +46,7 @@ PICTURES = "camera", "picture", "video", "film"
 
 COMPILE = """
 import os, subprocess, sys
-from dorothie_gym.engine.warm_up import warm_up
+from dorothie_gym.session.warm_up import warm_up
 warm_up()
 os.close(int(sys.argv[1]))
 if "2" in sys.argv[4:]:
@@ -55,7 +55,7 @@ if "2" in sys.argv[4:]:
         warm_up(everything=True)
 os.close(int(sys.argv[2]))
 if "3" in sys.argv[4:]:
-    from dorothie_gym.camera.warm_up import warm_up
+    from dorothie_gym.pictures.camera.warm_up import warm_up
     warm_up()
 """
 """Program that compiles sessions, then batches, then the camera, and gives a lock back after each.

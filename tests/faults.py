@@ -17,13 +17,13 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from dorothie_gym.studies.database import StorageError
-from dorothie_gym.studies.erasure import erase, finish_erasures
-from dorothie_gym.studies.records import StudyRecords
-from tests.annotation import killing as annotation
-from tests.console import killing as console
-from tests.studies import killing as studies
-from tests.studies.faults import Faults, die, fail, prepare, remains, striking
+from dorothie_gym.lab.studies.database import StorageError
+from dorothie_gym.lab.studies.erasure import erase, finish_erasures
+from dorothie_gym.lab.studies.records import StudyRecords
+from tests.lab.annotation import killing as annotation
+from tests.lab.console import killing as console
+from tests.lab.studies import killing as studies
+from tests.lab.studies.faults import Faults, die, fail, prepare, remains, striking
 
 SHARES = {"erasure": 0.3, "annotation": 0.25, "console": 0.15, "studies": 0.3}
 """Shares of the faults."""

@@ -17,9 +17,9 @@ from typing import Any, ClassVar
 import websockets.sync.client as sockets
 from websockets.exceptions import ConnectionClosed
 
-from tests.annotation.builders import recorded
-from tests.studies.content import SOLO, write_study
-from tests.studies.serving import Client
+from tests.lab.annotation.builders import recorded
+from tests.lab.studies.content import SOLO, write_study
+from tests.lab.studies.serving import Client
 
 STUDY = {
     **SOLO,

@@ -15,29 +15,29 @@ import numpy as np
 import pytest
 import yaml
 
-from dorothie_gym.benchmark import metrics_of, read_predictions
-from dorothie_gym.benchmark.features import Batch
-from dorothie_gym.benchmark.predictions import file_schema
+from dorothie_gym.archive import Task
 from dorothie_gym.dialogue.grammar import parse_grammar
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.dialogue.talk_files import read_talk_files
-from dorothie_gym.engine.cabin import CabinState, signal_to_noise
-from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.evaluation.closed_loop import METRICS, RecoverySeconds
+from dorothie_gym.evaluation.teacher_forced import metrics_of, read_predictions
+from dorothie_gym.evaluation.teacher_forced.features import Batch
+from dorothie_gym.evaluation.teacher_forced.predictions import file_schema
+from dorothie_gym.lab.studies.export import COLUMNS
+from dorothie_gym.lab.studies.items import Item
+from dorothie_gym.lab.studies.study import Study
+from dorothie_gym.lab.studies.study_file import read_study
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, describe, load_town, town_names
 from dorothie_gym.ontology import Question, WeatherParameter, paths
 from dorothie_gym.policies import policy_loader
-from dorothie_gym.recording import Task
-from dorothie_gym.rollout.closed_loop import METRICS, RecoverySeconds
+from dorothie_gym.session.cabin import CabinState, signal_to_noise
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.weather import Weather
-from dorothie_gym.studies.export import COLUMNS
-from dorothie_gym.studies.items import Item
-from dorothie_gym.studies.study import Study
-from dorothie_gym.studies.study_file import read_study
 from dorothie_gym.tasks import bind, load_template, template_names
-from tests.recording.builders import write
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import write
+from tests.session.recording.dialogues import talk
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -75,7 +75,7 @@ def test_pages_have_a_title_and_no_dead_links(page: str) -> None:
 
 def test_the_page_of_studies_has_every_field_table_and_kind_of_item(tmp_path: Path) -> None:
     page = (DOCS / "studies.md").read_text(encoding="utf-8")
-    content = yaml.safe_load((files("dorothie_gym.studies") / "data" / "example.yaml").read_text(encoding="utf-8"))
+    content = yaml.safe_load((files("dorothie_gym.lab.studies") / "data" / "example.yaml").read_text(encoding="utf-8"))
     content["questionnaires"]["after"] = yaml.safe_load(example("studies.md", "yaml"))
     (tmp_path / "study.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     items = read_study(tmp_path / "study.yaml").questionnaires.after
@@ -292,7 +292,7 @@ def test_the_diagram_of_the_architecture_has_the_order_of_the_import_contract() 
     layers = next(each["layers"] for each in contract["contracts"] if each["type"] == "layers")
     diagram = (DOCS / "architecture.md").read_text(encoding="utf-8").split("```")[1].splitlines()
     lines = []
-    packages = layers[: layers.index("dorothie_gym.portable_arrays")]  # those below serve every package: see the text
+    packages = layers[:-1]  # those below serve every package: see the text
     for layer in packages:
         names = [name.strip().removeprefix("dorothie_gym.") for name in layer.split("|")]
         found = {

@@ -12,8 +12,8 @@ import pytest
 from gymnasium import spaces
 
 import dorothie_gym
-from tests.recording.builders import write
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import write
+from tests.session.recording.dialogues import talk
 
 DOCS = Path(__file__).parents[1] / "docs"
 FOLDER = DOCS / "environments"

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.recording.builders import write
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import write
+from tests.session.recording.dialogues import talk
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "examples"

@@ -155,8 +155,9 @@ def test_importing_an_environment_loads_neither_pictures_nor_speech() -> None:
         "import json, sys, dorothie_gym.envs.duo_wizard_v0; "
         "print(json.dumps([name for name in sys.modules if name.startswith('dorothie_gym.')]))"
     )
-    drawn = [name for name in modules if name.startswith(("dorothie_gym.camera.", "dorothie_gym.rendering."))]
-    spoken = [name for name in modules if name.startswith(("dorothie_gym.speech", "dorothie_gym.audio"))]
+    faces = ("dorothie_gym.pictures.camera", "dorothie_gym.pictures")
+    drawn = [name for name in modules if name.startswith("dorothie_gym.pictures.") and name not in faces]
+    spoken = [name for name in modules if name.startswith(("dorothie_gym.speech", "dorothie_gym.support.audio"))]
     assert drawn + spoken == []
     assert not {"dorothie_gym.dialogue.nlg", "dorothie_gym.dialogue.nlu", "dorothie_gym.tasks.parsing"} & set(modules)
     assert not [name for name in modules if name.startswith(("dorothie_gym.maps.yaml", "dorothie_gym.maps.opendrive"))]

@@ -18,7 +18,7 @@ SNIPPETS = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8")
 
 @pytest.fixture(autouse=True)
 def a_default_corpus_that_is_played_fast(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = importlib.import_module("dorothie_gym.rollout.corpus_cache")
+    module = importlib.import_module("dorothie_gym.evaluation.rollout.corpus_cache")
     monkeypatch.setattr(module, "SESSIONS", 2)
     monkeypatch.setattr(module, "CONFIG", EnvConfig(max_seconds=30.0))
 

@@ -12,21 +12,21 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from dorothie_gym.archive.corpus import Corpus, Fold
 from dorothie_gym.baselines.encoders import text_encoder
 from dorothie_gym.baselines.encoders.byte_pairs import BytePairs
 from dorothie_gym.baselines.encoders.encoder import TextEncoder, text_table
 from dorothie_gym.baselines.model_io import TASKS, Examples
 from dorothie_gym.baselines.sound_inputs import Sound, SoundInputs
-from dorothie_gym.benchmark.features.batch import BatchSpec
-from dorothie_gym.benchmark.features.columns import Columns
-from dorothie_gym.benchmark.features.corpus_columns import build
-from dorothie_gym.benchmark.features.point_table import PointTable, points
-from dorothie_gym.benchmark.features.sight import Sight, VisibleBoxes
 from dorothie_gym.errors import CheckpointError, SessionError
+from dorothie_gym.evaluation.teacher_forced.features.batch import BatchSpec
+from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
+from dorothie_gym.evaluation.teacher_forced.features.corpus_columns import build
+from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable, points
+from dorothie_gym.evaluation.teacher_forced.features.sight import Sight, VisibleBoxes
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording.corpus import Corpus, Fold
-from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
-from dorothie_gym.user_cache import cache_folder
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
+from dorothie_gym.support.user_cache import cache_folder
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes

@@ -14,6 +14,8 @@ import numpy as np
 import torch
 
 from dorothie_gym._version import __version__
+from dorothie_gym.archive.corpus import Corpus
+from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines.checkpoints import ModelCard, sha256_of
 from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION, Dataset
 from dorothie_gym.baselines.learning_curves import draw_loss_curves
@@ -22,27 +24,25 @@ from dorothie_gym.baselines.model_zoo import ROWS, SIZES, ModelEntry, find_row, 
 from dorothie_gym.baselines.toto.model import TOTO
 from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.trainer import BEST_FILE, Epoch, OnEpoch, TrainingSummary, predict, train
-from dorothie_gym.benchmark.features.columns import Columns
-from dorothie_gym.benchmark.features.point_table import PointTable
-from dorothie_gym.benchmark.labels import labels_of
-from dorothie_gym.benchmark.prediction_reader import read_predictions
-from dorothie_gym.benchmark.predictions import (
+from dorothie_gym.errors import CheckpointError
+from dorothie_gym.evaluation.rollout.processes import run_tasks
+from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
+from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
+from dorothie_gym.evaluation.teacher_forced.labels import labels_of
+from dorothie_gym.evaluation.teacher_forced.prediction_reader import read_predictions
+from dorothie_gym.evaluation.teacher_forced.predictions import (
     ActionPredictions,
     ActPredictions,
     Predictions,
     TaskPredictions,
     write_predictions,
 )
-from dorothie_gym.benchmark.scoring import score_task
-from dorothie_gym.benchmark.shallow_models import SHALLOW
-from dorothie_gym.benchmark.table import ResultsTable, evaluate_predictions
-from dorothie_gym.benchmark.trivial_baselines import FLOORS, predict_floor
-from dorothie_gym.errors import CheckpointError
-from dorothie_gym.files import write_atomically
-from dorothie_gym.input_files import MAX_MODEL_JSON, checked, raising, read_json
-from dorothie_gym.recording.corpus import Corpus
-from dorothie_gym.recording.visibility import Task
-from dorothie_gym.rollout.processes import run_tasks
+from dorothie_gym.evaluation.teacher_forced.scoring import score_task
+from dorothie_gym.evaluation.teacher_forced.shallow_models import SHALLOW
+from dorothie_gym.evaluation.teacher_forced.table import ResultsTable, evaluate_predictions
+from dorothie_gym.evaluation.teacher_forced.trivial_baselines import FLOORS, predict_floor
+from dorothie_gym.support.files import write_atomically
+from dorothie_gym.support.input_files import MAX_MODEL_JSON, checked, raising, read_json
 
 PREDICTIONS_FILE: Final = "predictions.parquet"
 RESULT_FILE: Final = "result.json"

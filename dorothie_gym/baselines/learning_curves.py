@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dorothie_gym.baselines.trainer import Epoch
-from dorothie_gym.files import replacing
-from dorothie_gym.rendering.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
-from dorothie_gym.rendering.palette import CAR, ROAD
+from dorothie_gym.pictures.charts import INK, SHEET, SOFT, empty_figure, hexadecimal
+from dorothie_gym.pictures.palette import CAR, ROAD
+from dorothie_gym.support.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,11 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from dorothie_gym.benchmark.features.batch import Batch, BatchSpec, gather
-from dorothie_gym.benchmark.features.columns import Columns
-from dorothie_gym.benchmark.features.point_table import PointTable
+from dorothie_gym.archive.visibility import Task
+from dorothie_gym.evaluation.teacher_forced.features.batch import Batch, BatchSpec, gather
+from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
+from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
 from dorothie_gym.ontology.actions import LANE_SWITCH_LEFT, LANE_SWITCH_RIGHT, NAVIGATION_ACTIONS, ArgumentKind
-from dorothie_gym.recording.visibility import Task
 
 Inputs: TypeAlias = Mapping[str, Tensor]
 """The fields of `Batch` by name, as tensors of B points; whole numbers as int64."""

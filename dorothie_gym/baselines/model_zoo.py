@@ -19,8 +19,8 @@ from dorothie_gym.baselines.toto.config import ABLATIONS, Channel, TOTOConfig
 from dorothie_gym.baselines.toto.model import TOTO
 from dorothie_gym.baselines.toto.texts import FrozenTexts, PretrainedBert, SmallTextEncoder, Texts, TrainedTexts
 from dorothie_gym.baselines.toto.towns import Towns
-from dorothie_gym.benchmark.paper_comparison import paper_name
 from dorothie_gym.errors import did_you_mean
+from dorothie_gym.evaluation.teacher_forced.paper_comparison import paper_name
 
 Kind = Literal["toto", "reader", "ppo", "cloning", "shallow"]
 
@@ -47,7 +47,7 @@ class ModelEntry:
         queries: whether the objects at the point are the queries of the detector, as in the paper.
         sound: encoder of the current utterance's sound; None for models that receive its recognised words.
         kind: "toto" (with ablations and rivals), "reader" (Junction Reader), a policy by "ppo" or "cloning", or
-            "shallow" (scikit-learn, see `dorothie_gym.benchmark.shallow_models`).
+            "shallow" (scikit-learn, see `dorothie_gym.evaluation.teacher_forced.shallow_models`).
     """
 
     name: str

@@ -11,17 +11,17 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from dorothie_gym.audio import read_audio
+from dorothie_gym.archive.corpus import Corpus
+from dorothie_gym.archive.sound import audio_files
+from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines.encoders.encoder import SpeechEncoder
 from dorothie_gym.baselines.encoders.pretrained import HubertEncoder
 from dorothie_gym.baselines.encoders.sound import BANDS, MEL_FRAMES, SpeechEmbeddingEncoder, mel_table
-from dorothie_gym.benchmark.features.columns import Columns
-from dorothie_gym.benchmark.features.point_table import PointTable
 from dorothie_gym.errors import EncoderError, SessionError
-from dorothie_gym.recording.corpus import Corpus
-from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.sound import audio_files
-from dorothie_gym.recording.visibility import Task
+from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
+from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.support.audio import read_audio
 
 Sound: TypeAlias = Literal["log-mel", "speech-embedding", "hubert"]
 """Encoder of sound: log-mel spectra for a convolution that is trained with the model, or frozen vectors."""

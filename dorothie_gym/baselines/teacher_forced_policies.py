@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from torch import nn
 
+from dorothie_gym.archive.corpus import Corpus
+from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.dataset import TEST, TRAIN, VALIDATION
 from dorothie_gym.baselines.model_io import allowed_angle, backpropagate
-from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, TaskPredictions
 from dorothie_gym.envs.nfd_v0 import NfDEnv
 from dorothie_gym.envs.rfn_v0 import RfNEnv
 from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
 from dorothie_gym.envs.ufn_v0 import UfNEnv
 from dorothie_gym.errors import SessionError
-from dorothie_gym.recording.corpus import Corpus
-from dorothie_gym.recording.visibility import Task
+from dorothie_gym.evaluation.teacher_forced.predictions import ActionPredictions, ActPredictions, TaskPredictions
 from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation
 
 ENVS: Final[dict[Task, type[TeacherForcedEnv]]] = {Task.UFN: UfNEnv, Task.RFN: RfNEnv, Task.NFD: NfDEnv}

@@ -18,7 +18,7 @@ from safetensors.torch import save_file
 from torch import Tensor
 
 from dorothie_gym.errors import InputFileError, one_line, short_repr
-from dorothie_gym.input_files import MAX_WEIGHTS, MIB, check_file, checked, parse_json
+from dorothie_gym.support.input_files import MAX_WEIGHTS, MIB, check_file, checked, parse_json
 
 _SYSTEM_ERROR: Final = re.compile(r"\(os error (\d+)\)")
 """End of the message of a `SafetensorError` that an error of the operating system has caused."""

@@ -15,8 +15,8 @@ from torch import Tensor, nn
 
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted, backpropagate
-from dorothie_gym.benchmark.features.batch import BatchSpec
 from dorothie_gym.errors import CheckpointError
+from dorothie_gym.evaluation.teacher_forced.features.batch import BatchSpec
 
 BEST_FILE: Final = "best.safetensors"
 """Weights of the epoch with the lowest validation loss."""

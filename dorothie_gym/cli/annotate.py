@@ -14,7 +14,7 @@ from dorothie_gym.cli.serving import LOCAL, Host, Port, address, check_libraries
 from dorothie_gym.cli.warm_up import compile_first
 
 if TYPE_CHECKING:
-    from dorothie_gym.annotation.workplace import SeatKind
+    from dorothie_gym.lab.annotation.workplace import SeatKind
 
 PORT = 8024
 """Usual port of the annotation tool."""
@@ -48,9 +48,9 @@ def annotate(
     """
     check_libraries("annotate")
     with reporting_errors():
-        from dorothie_gym.annotation.links import keep_links, seats_of
-        from dorothie_gym.annotation.server import AnnotationServer
-        from dorothie_gym.annotation.workplace import Workplace
+        from dorothie_gym.lab.annotation.links import keep_links, seats_of
+        from dorothie_gym.lab.annotation.server import AnnotationServer
+        from dorothie_gym.lab.annotation.workplace import Workplace
 
         people = _people(annotator or ([] if adjudicator is not None else ["annotator"]), adjudicator)
         entries = load_corpus(path, maps).entries
@@ -76,8 +76,8 @@ def annotate(
 
 
 def _people(annotators: Sequence[str], adjudicator: str | None) -> list[tuple[str, SeatKind]]:
-    from dorothie_gym.annotation.log import check_name
-    from dorothie_gym.annotation.workplace import SeatKind
+    from dorothie_gym.lab.annotation.log import check_name
+    from dorothie_gym.lab.annotation.workplace import SeatKind
 
     people = [(check_name(name), SeatKind.ANNOTATOR) for name in annotators]
     if adjudicator is not None:

@@ -12,9 +12,9 @@ from dorothie_gym.cli.options import AsJson, Maps
 from dorothie_gym.cli.output import coefficient, fail, print_json, reporting_errors, stdout, wide_stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.annotation.corpus_agreement import CorpusAgreement
-    from dorothie_gym.annotation.formats import Format
-    from dorothie_gym.recording.corpus import Corpus, CorpusEntry
+    from dorothie_gym.archive.corpus import Corpus, CorpusEntry
+    from dorothie_gym.lab.annotation.corpus_agreement import CorpusAgreement
+    from dorothie_gym.lab.annotation.formats import Format
 
 _FORMATS = ("native", "sdn", "jsonl", "elan")
 
@@ -25,7 +25,7 @@ CorpusOrSession = Annotated[
 
 def load_corpus(path: Path, maps: Path | None) -> Corpus:
     """Returns the sessions of a command; fails if there are none, or no such folder of maps."""
-    from dorothie_gym.recording.corpus import Corpus
+    from dorothie_gym.archive.corpus import Corpus
 
     if maps is not None and not maps.is_dir():
         fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
@@ -55,8 +55,8 @@ def export_annotations(
     if to not in _FORMATS:
         fail(f"--to is {to!r}; it must be {' or '.join(_FORMATS)}")
     with reporting_errors():
-        from dorothie_gym.annotation.formats import Format
-        from dorothie_gym.annotation.log import log_path
+        from dorothie_gym.lab.annotation.formats import Format
+        from dorothie_gym.lab.annotation.log import log_path
 
         corpus = load_corpus(path, maps)
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -74,7 +74,7 @@ def export_annotations(
 
 
 def _known(corpus: Corpus) -> str:
-    from dorothie_gym.annotation.log import annotators_of
+    from dorothie_gym.lab.annotation.log import annotators_of
 
     names = sorted({name for entry in corpus.entries for name in annotators_of(entry.path)})
     return f"annotators are {', '.join(names)}" if names else "nobody has; run dorothie-gym annotate"
@@ -83,9 +83,9 @@ def _known(corpus: Corpus) -> str:
 def _export(
     corpus: Corpus, entry: CorpusEntry, annotator: str, out: Path, to: Format, maps: Path | None
 ) -> str:  # fmt: skip
-    from dorothie_gym.annotation.formats import export_annotation
-    from dorothie_gym.annotation.log import read_annotation
-    from dorothie_gym.annotation.source_text import SourceText
+    from dorothie_gym.lab.annotation.formats import export_annotation
+    from dorothie_gym.lab.annotation.log import read_annotation
+    from dorothie_gym.lab.annotation.source_text import SourceText
 
     session = entry.load()
     annotation = read_annotation(SourceText.of(session), entry.path, annotator)
@@ -112,10 +112,10 @@ def import_annotations(
 ) -> None:
     """Store annotations of other programs, or labels of other copies of sessions, as those of an annotator."""
     with reporting_errors():
-        from dorothie_gym.annotation.formats import import_annotation
-        from dorothie_gym.annotation.log import ADJUDICATED, AnnotationLog, check_name, log_path
-        from dorothie_gym.annotation.marks import Annotation
-        from dorothie_gym.annotation.source_text import SourceText
+        from dorothie_gym.lab.annotation.formats import import_annotation
+        from dorothie_gym.lab.annotation.log import ADJUDICATED, AnnotationLog, check_name, log_path
+        from dorothie_gym.lab.annotation.marks import Annotation
+        from dorothie_gym.lab.annotation.source_text import SourceText
 
         name = annotator if annotator == ADJUDICATED else check_name(annotator)
         corpus = load_corpus(path, maps)
@@ -166,8 +166,8 @@ def agreement(
 ) -> None:
     """Print the agreement of annotators: spans; Cohen's kappa of moves, slots, and borders of units; alpha."""
     with reporting_errors():
-        from dorothie_gym.analysis.span_agreement import has_alpha
-        from dorothie_gym.annotation.corpus_agreement import corpus_agreement
+        from dorothie_gym.evaluation.analysis.span_agreement import has_alpha
+        from dorothie_gym.lab.annotation.corpus_agreement import corpus_agreement
 
         found = corpus_agreement(load_corpus(path, maps).entries, annotator or (), with_alpha=has_alpha())
     if as_json:

@@ -15,8 +15,8 @@ from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_lib
 from dorothie_gym.cli.warm_up import compile_first
 
 if TYPE_CHECKING:
-    from dorothie_gym.console.config import ConsoleConfig
-    from dorothie_gym.console.room import Room
+    from dorothie_gym.lab.console.config import ConsoleConfig
+    from dorothie_gym.lab.console.room import Room
 
 TOWN = "brookside"
 """Town if none is given: the smallest one."""
@@ -77,7 +77,7 @@ def console(
     Each link holds a secret and leads to one seat. A second browser at the seat of a role takes it over.
     """
     check_libraries("console")
-    from dorothie_gym.console.server import Console
+    from dorothie_gym.lab.console.server import Console
 
     compile_first(pictures=pictures)
     with reporting_errors():
@@ -101,7 +101,7 @@ def console(
 def _config(
     max_seconds: float | None, word_errors: float | None, absence: float, after: str, away: str, pictures: bool
 ) -> ConsoleConfig:  # fmt: skip
-    from dorothie_gym.console.config import AbsenceRules, AfterAbsence, ConsoleConfig, WhileAway
+    from dorothie_gym.lab.console.config import AbsenceRules, AfterAbsence, ConsoleConfig, WhileAway
 
     for name, value, choices in (("--after-absence", after, AfterAbsence), ("--while-away", away, WhileAway)):
         if value not in list(map(str, choices)):
@@ -118,10 +118,10 @@ def _config(
 def _room(
     town: str, storyboard: str | None, seed: int, roles: str, out: Path | None, config: ConsoleConfig
 ) -> Room:  # fmt: skip
-    from dorothie_gym.console.room import Room
-    from dorothie_gym.console.seating import parse_roles
-    from dorothie_gym.console.town_page import town_page
-    from dorothie_gym.engine.session_engine import SessionEngine
+    from dorothie_gym.lab.console.room import Room
+    from dorothie_gym.lab.console.seating import parse_roles
+    from dorothie_gym.lab.console.town_page import town_page
+    from dorothie_gym.session.session_engine import SessionEngine
 
     plans = parse_roles(roles)
     engine = SessionEngine(town, storyboard, config=config.environment())
@@ -133,11 +133,11 @@ def _room(
 def _resumed_room(
     folder: Path, town: str | None, storyboard: str | None, roles: str, out: Path, config: ConsoleConfig
 ) -> Room:  # fmt: skip
-    from dorothie_gym.console.resuming import Resumed
-    from dorothie_gym.console.room import Room
-    from dorothie_gym.console.seating import parse_roles
-    from dorothie_gym.console.town_page import town_page
-    from dorothie_gym.rollout.replay import ReplaySources, begin_replay
+    from dorothie_gym.evaluation.rollout.replay import ReplaySources, begin_replay
+    from dorothie_gym.lab.console.resuming import Resumed
+    from dorothie_gym.lab.console.room import Room
+    from dorothie_gym.lab.console.seating import parse_roles
+    from dorothie_gym.lab.console.town_page import town_page
     from dorothie_gym.tasks.parsing import load_template
 
     resumed = Resumed.load(folder)
@@ -162,7 +162,7 @@ def _print_links(links: Facts, out: Path | None) -> None:
     for name, link in links.items():
         screen.print(f"{name.replace('_', '-').capitalize():<13} {link}", soft_wrap=True)
     if out is not None:
-        from dorothie_gym.console.resuming import interrupted_sessions
+        from dorothie_gym.lab.console.resuming import interrupted_sessions
 
         for folder in interrupted_sessions(out):
             screen.print(f"{folder} was interrupted; --resume {folder} goes on with it.", soft_wrap=True)

@@ -16,8 +16,8 @@ from dorothie_gym.cli.output import Facts, fail, print_json, reporting_errors, s
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dorothie_gym.recording.corpus import Corpus, CorpusEntry
-    from dorothie_gym.recording.session import Session
+    from dorothie_gym.archive.corpus import Corpus, CorpusEntry
+    from dorothie_gym.session.recording.session import Session
 
 
 class TargetLayout(enum.StrEnum):
@@ -76,7 +76,7 @@ def convert(
     if maps is not None and not maps.is_dir():
         fail(f"{maps}: there is no such folder; give one with maps (.xodr)")
     with reporting_errors():
-        from dorothie_gym.recording.corpus import Corpus
+        from dorothie_gym.archive.corpus import Corpus
 
         corpus = Corpus.load(source, maps=maps)
         _check_out(source, out)
@@ -122,19 +122,19 @@ def _write_role(
     fields: list[str], *, as_json: bool,
 ) -> None:  # fmt: skip
     """Writes the view of a role on all sessions; a session that cannot be simulated again fails the command."""
+    from dorothie_gym.evaluation.rollout.replay import ReplaySources
+    from dorothie_gym.evaluation.rollout.role_episodes import role_episodes
     from dorothie_gym.ontology.roles import Role
-    from dorothie_gym.rollout.replay import ReplaySources
-    from dorothie_gym.rollout.role_episodes import role_episodes
 
     whose = Role(role.value)
     with _progress(len(corpus), quiet=as_json) as advance:
         episodes = role_episodes(corpus.entries, whose, ReplaySources(maps=maps))
         if to is TargetLayout.MINARI:
-            from dorothie_gym.rollout.minari_export import export_minari
+            from dorothie_gym.evaluation.rollout.minari_export import export_minari
 
             name = export_minari(episodes, whose, out, advance, storage=storage.value, fields=fields)
         else:
-            from dorothie_gym.rollout.hugging_face_export import export_hugging_face
+            from dorothie_gym.evaluation.rollout.hugging_face_export import export_hugging_face
 
             name = str(export_hugging_face(episodes, whose, out, advance))
     facts = {"to": to.value, "in": str(corpus.root), "out": str(out), "role": role.value, "dataset": name}
@@ -169,8 +169,8 @@ def _convert_one(
     is_one: bool,
 ) -> Facts:
     """Converts a session; returns its row for --json."""
+    from dorothie_gym.archive.sdn.writer import write_sdn
     from dorothie_gym.errors import SessionError, TownError
-    from dorothie_gym.recording.sdn.writer import write_sdn
 
     path = entry.path.relative_to(corpus.root)
     row: Facts = {"path": str(path)}
@@ -214,7 +214,7 @@ def _progress(total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
 
 
 def _show(rows: list[Facts], out: Path) -> None:
-    from dorothie_gym.recording.validation import report_lines
+    from dorothie_gym.session.recording.validation import report_lines
 
     console = stdout()
     for row in rows:

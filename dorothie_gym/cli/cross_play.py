@@ -33,11 +33,11 @@ from dorothie_gym.cli.output import (
     wide_stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
-from dorothie_gym.processors import available_processors
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
+    from dorothie_gym.evaluation.closed_loop.cross_play import CrossPlayResult, CrossPlaySettings
     from dorothie_gym.policies.policy_loader import Player
-    from dorothie_gym.rollout.closed_loop.cross_play import CrossPlayResult, CrossPlaySettings
 
 USUAL = ["scripted", "silent"]
 """Players of both roles where none is given."""
@@ -92,8 +92,8 @@ def cross_play(
     The result does not depend on the number of workers. An interrupted run is resumed by the same command with --out.
     """
     with reporting_errors():
-        from dorothie_gym.rollout.closed_loop.cross_play import RESULT_NAME, CrossPlaySettings
-        from dorothie_gym.rollout.closed_loop.running import parse_towns
+        from dorothie_gym.evaluation.closed_loop.cross_play import RESULT_NAME, CrossPlaySettings
+        from dorothie_gym.evaluation.closed_loop.running import parse_towns
 
         if page is not None:
             if page.suffix != ".md":
@@ -116,8 +116,8 @@ def cross_play(
         if out is None:
             shutil.rmtree(folder)
         else:
-            from dorothie_gym.files import write_atomically
-            from dorothie_gym.recording.json_io import to_page
+            from dorothie_gym.session.recording.json_io import to_page
+            from dorothie_gym.support.files import write_atomically
 
             write_atomically(folder / RESULT_NAME, to_page(result.to_json()))
         if page is not None:
@@ -149,7 +149,7 @@ def _play(
     settings: CrossPlaySettings, folder: Path, workers: int, ray: str | None, *, quiet: bool
 ) -> CrossPlayResult:  # fmt: skip
     from dorothie_gym.errors import ProcessError
-    from dorothie_gym.rollout.closed_loop.cross_play import cross_play
+    from dorothie_gym.evaluation.closed_loop.cross_play import cross_play
 
     try:
         compile_first(pictures=False)

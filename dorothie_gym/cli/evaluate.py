@@ -13,11 +13,11 @@ from dorothie_gym.cli.options import Maps
 from dorothie_gym.cli.output import Facts, check_file, fail, print_json, reporting_errors, stderr, wide_stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.benchmark.labels import CorpusLabels, Split
-    from dorothie_gym.benchmark.predictions import TaskPredictions
-    from dorothie_gym.benchmark.table import ResultsTable
-    from dorothie_gym.recording.corpus import Corpus
-    from dorothie_gym.recording.visibility import Task
+    from dorothie_gym.archive.corpus import Corpus
+    from dorothie_gym.archive.visibility import Task
+    from dorothie_gym.evaluation.teacher_forced.labels import CorpusLabels, Split
+    from dorothie_gym.evaluation.teacher_forced.predictions import TaskPredictions
+    from dorothie_gym.evaluation.teacher_forced.table import ResultsTable
 
 DETAILED = 2
 """Largest number of models that are shown in detail."""
@@ -58,11 +58,11 @@ def evaluate(
             fail("--save writes the predictions of a trivial baseline; add --model majority or --model random")
         check_file(save)
     with reporting_errors():
-        from dorothie_gym.benchmark.labels import labels_of
-        from dorothie_gym.benchmark.prediction_reader import read_about
-        from dorothie_gym.benchmark.table import evaluate_predictions
+        from dorothie_gym.archive.corpus import Corpus
         from dorothie_gym.errors import PredictionError
-        from dorothie_gym.recording.corpus import Corpus
+        from dorothie_gym.evaluation.teacher_forced.labels import labels_of
+        from dorothie_gym.evaluation.teacher_forced.prediction_reader import read_about
+        from dorothie_gym.evaluation.teacher_forced.table import evaluate_predictions
 
         chosen, part = _tasks(tasks), _split(split)
         if floor is not None:
@@ -76,7 +76,7 @@ def evaluate(
             about = {str(path): page for path in files if (page := read_about(path))}
             table = evaluate_predictions(read, labels, about=about)
             if out is not None:
-                from dorothie_gym.benchmark.report import write_report
+                from dorothie_gym.evaluation.teacher_forced.report import write_report
 
                 write_report(table, out)
         except PredictionError as error:
@@ -88,7 +88,7 @@ def evaluate(
 
 
 def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]:
-    from dorothie_gym.benchmark.prediction_reader import read_predictions
+    from dorothie_gym.evaluation.teacher_forced.prediction_reader import read_predictions
 
     read = [given for given in read_predictions(*files) if given.task in tasks]
     if files and not read:
@@ -100,10 +100,10 @@ def _read(files: Sequence[Path], tasks: Sequence[Task]) -> list[TaskPredictions]
 def _floor(
     name: str, corpus: Corpus, labels: CorpusLabels, seeds: range, tasks: Sequence[Task], save: Path | None
 ) -> list[TaskPredictions]:
-    from dorothie_gym.benchmark.labels import ALL, labels_of
-    from dorothie_gym.benchmark.predictions import write_predictions
-    from dorothie_gym.benchmark.trivial_baselines import predict_floor
     from dorothie_gym.errors import SessionError
+    from dorothie_gym.evaluation.teacher_forced.labels import ALL, labels_of
+    from dorothie_gym.evaluation.teacher_forced.predictions import write_predictions
+    from dorothie_gym.evaluation.teacher_forced.trivial_baselines import predict_floor
 
     try:
         train = labels_of(corpus, "train")
@@ -121,7 +121,7 @@ def _floor(
 
 
 def _tasks(text: str) -> tuple[Task, ...]:
-    from dorothie_gym.recording.visibility import Task
+    from dorothie_gym.archive.visibility import Task
 
     names = [name.strip().lower() for name in text.split(",")]
     if names == ["all"]:
@@ -133,7 +133,7 @@ def _tasks(text: str) -> tuple[Task, ...]:
 
 
 def _split(text: str) -> Split:
-    from dorothie_gym.benchmark.labels import SPLITS
+    from dorothie_gym.evaluation.teacher_forced.labels import SPLITS
 
     for split in SPLITS:
         if split == text:
@@ -142,7 +142,7 @@ def _split(text: str) -> Split:
 
 
 def _check_floor(name: str) -> None:
-    from dorothie_gym.benchmark.trivial_baselines import make_floor
+    from dorothie_gym.evaluation.teacher_forced.trivial_baselines import make_floor
 
     try:
         make_floor(name)
@@ -152,7 +152,7 @@ def _check_floor(name: str) -> None:
 
 def _default_sessions() -> Path:
     from dorothie_gym.errors import CacheError
-    from dorothie_gym.rollout.corpus_cache import default_corpus
+    from dorothie_gym.evaluation.rollout.corpus_cache import default_corpus
 
     try:
         return default_corpus()
@@ -164,7 +164,7 @@ def _flat(table: ResultsTable) -> Facts:
     """Returns the scores of a single run over all parts; skipped points are unscored or scored in part."""
     if len(table.runs) != 1:
         return {}
-    from dorothie_gym.benchmark.labels import ALL
+    from dorothie_gym.evaluation.teacher_forced.labels import ALL
 
     run = table.runs[0]
     scores = run.parts[ALL]
@@ -179,7 +179,7 @@ def _flat(table: ResultsTable) -> Facts:
 
 
 def _show(table: ResultsTable, out: Path | None) -> None:
-    from dorothie_gym.benchmark.terminal import print_counts, print_details, print_table
+    from dorothie_gym.evaluation.teacher_forced.terminal import print_counts, print_details, print_table
 
     console = wide_stdout()
     if len(table.models) > DETAILED:

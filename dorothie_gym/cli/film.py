@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.angles import wrap_radians
 from dorothie_gym.cli.output import VideoWriter, add_sound, video_writer
-from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.render_view import RenderView
-from dorothie_gym.rendering.scene import Actor, Scene, SpokenLine
-from dorothie_gym.rendering.session_scene import scene_of
-from dorothie_gym.rendering.session_views import SessionRenderer
+from dorothie_gym.pictures.views.scene import Actor, Scene, SpokenLine
+from dorothie_gym.pictures.views.session_scene import scene_of
+from dorothie_gym.pictures.views.session_views import SessionRenderer
+from dorothie_gym.session.live_session import LiveSession
+from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:
-    from dorothie_gym.audio import Samples
-    from dorothie_gym.camera.body_snapshots import BodySnapshot
+    from dorothie_gym.pictures.camera.body_snapshots import BodySnapshot
+    from dorothie_gym.support.audio import Samples
 
 FRAMES_PER_SECOND = 10
 """Frame rate of the video."""
@@ -92,8 +92,8 @@ class Film:
         self._last = scene
 
     def _add_sound(self) -> None:
-        from dorothie_gym.audio import encode_wav
-        from dorothie_gym.recording.sound import mixed_track
+        from dorothie_gym.archive.sound import mixed_track
+        from dorothie_gym.support.audio import encode_wav
 
         # the first picture is that of the beginning of the session
         track = mixed_track(self._spoken, 0.0, self.frames / FRAMES_PER_SECOND)
@@ -109,7 +109,7 @@ class Film:
 
 def spoken_pieces(engine: SessionEngine) -> Iterator[tuple[float, Samples]]:
     """Yields the start of each span that was delivered last [s], and its audio; the spans of an utterance follow on."""
-    from dorothie_gym.audio import SAMPLE_RATE
+    from dorothie_gym.support.audio import SAMPLE_RATE
 
     ends: dict[object, float] = {}
     for event in engine.last_events:
@@ -132,7 +132,7 @@ class _Windscreen:
     """Camera on the car of a session in progress, at its decisions and between them."""
 
     def __init__(self, session: LiveSession, size: tuple[int, int]) -> None:
-        from dorothie_gym.camera.session_pictures import windscreen_camera
+        from dorothie_gym.pictures.camera.session_pictures import windscreen_camera
 
         self._world = session.world
         self._camera = windscreen_camera(session.world.town, session.scenario, session.config, size)
@@ -150,7 +150,7 @@ class _Windscreen:
             scene: of that time, with the pose of the car.
             share: of the time.
         """
-        from dorothie_gym.camera.body_snapshots import bodies_between
+        from dorothie_gym.pictures.camera.body_snapshots import bodies_between
 
         world, now = self._world, self._moment()
         height = self._last.height + share * (now.height - self._last.height)
@@ -164,7 +164,7 @@ class _Windscreen:
         ).rgb
 
     def _moment(self) -> _Moment:
-        from dorothie_gym.camera.body_snapshots import snapshot_of
+        from dorothie_gym.pictures.camera.body_snapshots import snapshot_of
 
         return _Moment(snapshot_of(self._world.actors.arrays), float(self._world.car.height))
 

@@ -22,10 +22,10 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
-from dorothie_gym.processors import available_processors
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.rollout.frame_export import ExportedSession, FrameExport
+    from dorothie_gym.evaluation.rollout.frame_export import ExportedSession, FrameExport
 
 
 def frames(
@@ -69,8 +69,8 @@ def frames(
 
 def _export(rate: float, size: str, outputs: str | None, layout: str) -> FrameExport:
     """Returns the settings of a command line; exits where one is wrong."""
-    from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
-    from dorothie_gym.rollout.frame_export import FrameExport, FrameLayout
+    from dorothie_gym.evaluation.rollout.frame_export import FrameExport, FrameLayout
+    from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
 
     width, cross, height = size.partition("x")
     if not (cross and width.isdecimal() and height.isdecimal()):
@@ -93,10 +93,10 @@ def _export(rate: float, size: str, outputs: str | None, layout: str) -> FrameEx
 def _write(
     path: Path, out: Path, export: FrameExport, maps: tuple[str | None, Path | None], workers: int, *, quiet: bool
 ) -> list[ExportedSession]:
+    from dorothie_gym.archive.corpus import Corpus
     from dorothie_gym.errors import ProcessError
-    from dorothie_gym.recording.corpus import Corpus
-    from dorothie_gym.rollout.frame_export import export_frames
-    from dorothie_gym.rollout.replay import ReplaySources
+    from dorothie_gym.evaluation.rollout.frame_export import export_frames
+    from dorothie_gym.evaluation.rollout.replay import ReplaySources
 
     corpus = Corpus.load(path, maps=maps[1])
     if out.resolve() == path.resolve() or path.resolve() in out.resolve().parents:

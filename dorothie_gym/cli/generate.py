@@ -20,11 +20,11 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
-from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.processors import available_processors
+from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.rollout.corpus_generation import Generated
+    from dorothie_gym.evaluation.rollout.corpus_generation import Generated
 
 
 def generate(
@@ -45,7 +45,7 @@ def generate(
     """
     with reporting_errors():
         from dorothie_gym.errors import ProcessError
-        from dorothie_gym.rollout.corpus_generation import generate_corpus
+        from dorothie_gym.evaluation.rollout.corpus_generation import generate_corpus
 
         config = env_config(max_seconds, word_errors, perception, speech)
         try:
@@ -87,7 +87,7 @@ def _exit_interrupted(
     perception: PerceptionModel,
     speech: bool,
 ) -> None:
-    from dorothie_gym.rollout.corpus_generation import finished_sessions
+    from dorothie_gym.evaluation.rollout.corpus_generation import finished_sessions
 
     done = finished_sessions(out, sessions=sessions, seed=seed)
     command = f"dorothie-gym generate --sessions {sessions} --seed {seed} --out {out}"

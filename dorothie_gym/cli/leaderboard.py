@@ -23,8 +23,8 @@ from dorothie_gym.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from dorothie_gym.rollout.closed_loop.leaderboard import LeaderboardEntry
-    from dorothie_gym.rollout.closed_loop.leaderboard_rows import LeaderboardPlan
+    from dorothie_gym.evaluation.closed_loop.leaderboard import LeaderboardEntry
+    from dorothie_gym.evaluation.closed_loop.leaderboard_rows import LeaderboardPlan
 
 PAGE = Path("leaderboard.md")
 """Default page of the leaderboard, in the present folder."""
@@ -88,8 +88,8 @@ def leaderboard(
     """
     with reporting_errors():
         from dorothie_gym.errors import RolloutError
-        from dorothie_gym.rollout.closed_loop.leaderboard import figures_sha256, leaderboard_page, read_entries
-        from dorothie_gym.rollout.closed_loop.leaderboard_chart import draw_leaderboard
+        from dorothie_gym.evaluation.closed_loop.leaderboard import figures_sha256, leaderboard_page, read_entries
+        from dorothie_gym.evaluation.closed_loop.leaderboard_chart import draw_leaderboard
 
         if out.suffix != ".md":
             fail(f"{out}: the page is Markdown; give a name that ends in .md")
@@ -120,7 +120,7 @@ def leaderboard(
 
 
 def _print(entries: Sequence[LeaderboardEntry], out: Path, picture: Path) -> None:
-    from dorothie_gym.rollout.closed_loop.leaderboard import labels_of
+    from dorothie_gym.evaluation.closed_loop.leaderboard import labels_of
 
     console, labels = stdout(), labels_of(entries)
     for entry in entries:
@@ -137,9 +137,9 @@ def _checked(
     """Returns the rollouts with the outcome of their check; exits if one has faults."""
     from dorothie_gym.cli.warm_up import compile_first
     from dorothie_gym.errors import ProcessError, RolloutError
-    from dorothie_gym.processors import available_processors
-    from dorothie_gym.rollout.closed_loop import submission
-    from dorothie_gym.rollout.closed_loop.leaderboard import checked_entries
+    from dorothie_gym.evaluation.closed_loop import submission
+    from dorothie_gym.evaluation.closed_loop.leaderboard import checked_entries
+    from dorothie_gym.support.processors import available_processors
 
     try:
         compile_first(pictures=False)
@@ -159,9 +159,9 @@ def _plan(
     """Returns the rollouts to be played; exits if a name or file is unknown."""
     from dorothie_gym.cli.language_model import AnswerTime, LanguageModelOptions
     from dorothie_gym.cli.options import env_config, find_cast
+    from dorothie_gym.evaluation.closed_loop.leaderboard_rows import LeaderboardPlan, usual_rows
     from dorothie_gym.maps.catalogue import load_town
     from dorothie_gym.ontology.roles import Role
-    from dorothie_gym.rollout.closed_loop.leaderboard_rows import LeaderboardPlan, usual_rows
 
     for file in imported:
         load_town(file)
@@ -200,8 +200,8 @@ def _check_weights(plan: LeaderboardPlan, folder: Path) -> None:
 def _play(plan: LeaderboardPlan, folder: Path, workers: int | None, ray: str | None, *, quiet: bool) -> None:
     from dorothie_gym.cli.warm_up import compile_first
     from dorothie_gym.errors import ProcessError
-    from dorothie_gym.processors import available_processors
-    from dorothie_gym.rollout.closed_loop.many_rollouts import roll_out_all
+    from dorothie_gym.evaluation.closed_loop.many_rollouts import roll_out_all
+    from dorothie_gym.support.processors import available_processors
 
     try:
         compile_first(pictures=False)

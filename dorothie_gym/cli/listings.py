@@ -55,7 +55,7 @@ def towns(
         facts = describe(loaded)
         faults = check_town(loaded) if check else ()
         if picture is not None:
-            from dorothie_gym.rendering.map_sheet import town_picture
+            from dorothie_gym.pictures.maps.map_sheet import town_picture
 
             with stderr().status(f"drawing {loaded.name}, a few seconds"):
                 town_picture(loaded, picture, fold=fold_of(loaded.name))

@@ -15,13 +15,13 @@ from rich.table import Table
 from rich.text import Text
 
 from dorothie_gym.cli.output import Facts
-from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus
-from dorothie_gym.recording.events import Event, EventType, move_record
-from dorothie_gym.recording.json_io import Fields
-from dorothie_gym.rendering.exception_words import exception_words
+from dorothie_gym.pictures.views.exception_words import exception_words
+from dorothie_gym.session.live_session import LiveSession
+from dorothie_gym.session.recording.events import Event, EventType, move_record
+from dorothie_gym.session.recording.json_io import Fields
+from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.tasks.state import TaskState
 
 if TYPE_CHECKING:

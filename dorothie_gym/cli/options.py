@@ -12,15 +12,15 @@ from typer.core import TyperCommand, TyperGroup
 
 from dorothie_gym.cli.completion import complete_policy, complete_storyboard, complete_town
 from dorothie_gym.cli.output import exit_interrupted, fail
-from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.interruption import message, raising_interrupts
-from dorothie_gym.render_view import RenderView
+from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.support.interruption import message, raising_interrupts
+from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:
     from dorothie_gym.cli.language_model import LanguageModelOptions
-    from dorothie_gym.engine.config import EnvConfig
     from dorothie_gym.ontology.roles import Role
     from dorothie_gym.policies.policy_loader import Player
+    from dorothie_gym.session.config import EnvConfig
 
 
 def needs(extra: str) -> str:
@@ -138,15 +138,15 @@ def env_config(
         speech: whether they speak; a word error rate is then refused.
         pictures: whether they observe the picture of the car's camera.
     """
-    from dorothie_gym.engine.camera_config import CameraConfig
-    from dorothie_gym.engine.channel_kind import ChannelKind
-    from dorothie_gym.engine.config import EnvConfig
+    from dorothie_gym.session.camera_config import CameraConfig
+    from dorothie_gym.session.channel_kind import ChannelKind
+    from dorothie_gym.session.config import EnvConfig
 
     if speech and word_errors is not None:
         fail("--word-errors is for simulated recognition; leave it out with --speech, where speech is recognised")
     if speech:
         from dorothie_gym.errors import SpeechError
-        from dorothie_gym.optional_modules import check_installed
+        from dorothie_gym.support.optional_modules import check_installed
 
         try:
             check_installed()
@@ -196,7 +196,7 @@ def find_cast(
 
 def _check_loads(player: Player, role: Role) -> None:
     """Makes a policy once, so that a damaged file or a missing package is reported before the first session."""
-    from dorothie_gym.spaces.limits import SpaceLimits
+    from dorothie_gym.session.spaces.limits import SpaceLimits
 
     try:
         player.make(role, SpaceLimits())

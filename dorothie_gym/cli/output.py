@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 
 from dorothie_gym.errors import SpeechError, one_line
-from dorothie_gym.interruption import exit_code
+from dorothie_gym.support.interruption import exit_code
 
 if TYPE_CHECKING:
     import numpy as np

@@ -47,12 +47,12 @@ from dorothie_gym.cli.output import (
     wide_stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
-from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.processors import available_processors
+from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.rollout.closed_loop.results import RolloutResult
-    from dorothie_gym.rollout.closed_loop.running import RolloutSettings
+    from dorothie_gym.evaluation.closed_loop.results import RolloutResult
+    from dorothie_gym.evaluation.closed_loop.running import RolloutSettings
 
 
 def rollout(
@@ -92,7 +92,7 @@ def rollout(
     The table does not depend on the number of workers. After an interruption it prints the command that resumes.
     """
     with reporting_errors():
-        from dorothie_gym.rollout.closed_loop.running import RolloutSettings, parse_towns
+        from dorothie_gym.evaluation.closed_loop.running import RolloutSettings, parse_towns
 
         asked = LanguageModelOptions(
             url=llm_url,
@@ -115,7 +115,7 @@ def rollout(
     if as_json:
         print_json(result.to_json())
         return
-    from dorothie_gym.rollout.closed_loop.results import print_result
+    from dorothie_gym.evaluation.closed_loop.results import print_result
 
     console = wide_stdout()
     print_result(result, console)
@@ -125,7 +125,7 @@ def rollout(
 
 def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | None, *, quiet: bool) -> RolloutResult:
     from dorothie_gym.errors import ProcessError
-    from dorothie_gym.rollout.closed_loop.running import roll_out
+    from dorothie_gym.evaluation.closed_loop.running import roll_out
 
     folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-rollout-")) if out is None else out
     try:
@@ -144,8 +144,8 @@ def _play(settings: RolloutSettings, out: Path | None, workers: int, ray: str | 
 
 
 def _exit_interrupted(folder: Path, settings: RolloutSettings) -> None:
-    from dorothie_gym.rollout.closed_loop.results import RESULT_FILE, read_result
-    from dorothie_gym.rollout.closed_loop.running import command_of
+    from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, read_result
+    from dorothie_gym.evaluation.closed_loop.running import command_of
 
     done = len(read_result(folder).rows) if (folder / RESULT_FILE).is_file() else 0
     exit_interrupted(

@@ -49,14 +49,14 @@ from dorothie_gym.cli.output import (
     stdout,
 )
 from dorothie_gym.cli.warm_up import compile_first
-from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.render_view import RenderView
+from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:
     from dorothie_gym.cli.film import Film
     from dorothie_gym.cli.live import Pace
-    from dorothie_gym.engine.session_engine import SessionEngine
-    from dorothie_gym.engine.session_log import SessionSummary
+    from dorothie_gym.session.session_engine import SessionEngine
+    from dorothie_gym.session.session_log import SessionSummary
 
 PICTURE = Path("dorothie.png")
 """Picture that is written where none is asked for."""
@@ -182,8 +182,8 @@ def _check_outputs(plan: _Plan) -> None:
 
 def _play(plan: _Plan, *, quiet: bool) -> Facts:
     """Plays the session and returns what --json writes."""
-    from dorothie_gym.engine.session_engine import SessionEngine
-    from dorothie_gym.rollout.play import play_session
+    from dorothie_gym.evaluation.rollout.play import play_session
+    from dorothie_gym.session.session_engine import SessionEngine
 
     cast = find_cast(*plan.players, plan.language_model)
     filmed = plan.video is not None and plan.view is not RenderView.MAP
@@ -252,8 +252,8 @@ def _exit_interrupted(engine: SessionEngine, plan: _Plan) -> None:
 
 def draw_session(engine: SessionEngine, path: Path) -> None:
     """Draws the whole town at the end of the session, with route and dialogue."""
-    from dorothie_gym.rendering.frames import PICTURE_SIZE, SceneRenderer
-    from dorothie_gym.rendering.session_scene import scene_of
+    from dorothie_gym.pictures.views.frames import PICTURE_SIZE, SceneRenderer
+    from dorothie_gym.pictures.views.session_scene import scene_of
 
     scenario = engine.scenario
     caption = f"{engine.town.name} · {scenario.storyboard.name} · seed {scenario.seed}"

@@ -22,17 +22,17 @@ from dorothie_gym.cli.output import (
     stdout,
     video_writer,
 )
-from dorothie_gym.processors import available_processors
-from dorothie_gym.render_view import RenderView
+from dorothie_gym.support.processors import available_processors
+from dorothie_gym.support.render_view import RenderView
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dorothie_gym.recording.comparison import Difference
-    from dorothie_gym.recording.session import Session
-    from dorothie_gym.rendering.playback import Playback
-    from dorothie_gym.rollout.replay import ReplayCheck, ReplaySources
+    from dorothie_gym.archive.comparison import Difference
+    from dorothie_gym.evaluation.rollout.replay import ReplayCheck, ReplaySources
+    from dorothie_gym.pictures.views.playback import Playback
+    from dorothie_gym.session.recording.session import Session
 
 DIFFERENT = 1
 """Exit code where a session differs from its replay, or from another session."""
@@ -70,7 +70,7 @@ def replay(
         fail("--check and --video exclude each other; give one of them")
     if video is not None:
         check_video(video)
-    from dorothie_gym.rollout.replay import ReplaySources
+    from dorothie_gym.evaluation.rollout.replay import ReplaySources
 
     sources = ReplaySources(town=town, maps=maps, storyboard=storyboard)
     with reporting_errors():
@@ -81,8 +81,8 @@ def replay(
 
 
 def _check(path: Path, sources: ReplaySources, workers: int | None, *, as_json: bool) -> None:
-    from dorothie_gym.recording.corpus import Corpus
-    from dorothie_gym.rollout.replay import check_replays
+    from dorothie_gym.archive.corpus import Corpus
+    from dorothie_gym.evaluation.rollout.replay import check_replays
 
     checks = []
     for check in check_replays(
@@ -117,8 +117,8 @@ def _check_line(check: ReplayCheck) -> str:
 
 
 def _play_back(path: Path, sources: ReplaySources, fps: float, video: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.recording.corpus import read_session
-    from dorothie_gym.rendering.playback import Playback
+    from dorothie_gym.archive.corpus import read_session
+    from dorothie_gym.pictures.views.playback import Playback
 
     session = read_session(path, maps=sources.maps)
     playback = Playback(session, sources.town_of(session))
@@ -141,7 +141,7 @@ def _play_back(path: Path, sources: ReplaySources, fps: float, video: Path | Non
 
 
 def _write_video(playback: Playback, fps: float, video: Path) -> int:
-    from dorothie_gym.rendering.frames import SceneRenderer
+    from dorothie_gym.pictures.views.frames import SceneRenderer
 
     renderer = SceneRenderer()
     return _write(video, fps, (renderer.draw(scene) for scene in playback.scenes(fps)), playback.count(fps))
@@ -178,7 +178,7 @@ def _write(video: Path, fps: float, frames: Iterable[NDArray[np.uint8]], count: 
 
 
 def _show_window(playback: Playback, fps: float) -> int:
-    from dorothie_gym.rendering.frames import HumanWindow, SceneRenderer
+    from dorothie_gym.pictures.views.frames import HumanWindow, SceneRenderer
 
     renderer = SceneRenderer()
     try:
@@ -223,7 +223,7 @@ def film(
     A spoken session is filmed with its sound.
     """
     check_video(out)
-    from dorothie_gym.rollout.replay import ReplaySources
+    from dorothie_gym.evaluation.rollout.replay import ReplaySources
 
     with reporting_errors():
         facts = _film(path, ReplaySources(town=town, maps=maps), out, view, fps)
@@ -236,10 +236,10 @@ def film(
 
 
 def _film(path: Path, sources: ReplaySources, out: Path, view: RenderView, fps: float) -> Facts:
+    from dorothie_gym.archive.corpus import read_session
     from dorothie_gym.cli.warm_up import compile_first
-    from dorothie_gym.recording.corpus import read_session
-    from dorothie_gym.rendering.playback import Playback
-    from dorothie_gym.rendering.session_views import SessionRenderer
+    from dorothie_gym.pictures.views.playback import Playback
+    from dorothie_gym.pictures.views.session_views import SessionRenderer
     from dorothie_gym.sim.config import FRAME_RATE
 
     session = read_session(path, maps=sources.maps)
@@ -249,8 +249,8 @@ def _film(path: Path, sources: ReplaySources, out: Path, view: RenderView, fps: 
         frames: Iterable[NDArray[np.uint8]] = (renderer.draw(scene) for scene in playback.scenes(fps))
         count, first = playback.count(fps), playback.first_frame
     else:
-        from dorothie_gym.camera.recorded_pictures import RecordedPictures
-        from dorothie_gym.engine.camera_config import CameraConfig
+        from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
+        from dorothie_gym.session.camera_config import CameraConfig
 
         compile_first(pictures=True)
         pictures = RecordedPictures(session, town, CameraConfig(width=size[0], height=size[1]))
@@ -276,8 +276,8 @@ def _sound_file(session: Session, start: float, seconds: float) -> Iterator[Path
     if not session.audio:
         yield None
         return
-    from dorothie_gym.audio import encode_wav
-    from dorothie_gym.recording.sound import sound_track
+    from dorothie_gym.archive.sound import sound_track
+    from dorothie_gym.support.audio import encode_wav
 
     with tempfile.TemporaryDirectory(prefix="dorothie_gym.") as folder:
         file = Path(folder) / "sound.wav"
@@ -297,7 +297,7 @@ def compare(
 
     Sessions of folders are compared with those of the same path. The exit code is 1 if any of them differs.
     """
-    from dorothie_gym.recording.comparison import compare_folders
+    from dorothie_gym.archive.comparison import compare_folders
 
     rows: list[tuple[str, Difference | None]] = []
     with reporting_errors():

@@ -16,7 +16,7 @@ from dorothie_gym.cli.options import Maps
 from dorothie_gym.cli.output import FAILED, check_file, fail, reporting_errors, stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.audio import Samples
+    from dorothie_gym.support.audio import Samples
 
 PLAYERS: Final[Sequence[Sequence[str]]] = (
     ("pw-play",),
@@ -53,8 +53,8 @@ def show(
         _play(session, play, out, maps)
         return
     with reporting_errors():
-        from dorothie_gym.analysis.transcript import markdown
-        from dorothie_gym.recording.corpus import read_session
+        from dorothie_gym.archive.corpus import read_session
+        from dorothie_gym.evaluation.analysis.transcript import markdown
 
         page = "\n".join(markdown(read_session(path, maps=maps)) for path in session)
         if out is not None:
@@ -74,9 +74,9 @@ def _play(sessions: Sequence[Path], wanted: str, out: Path | None, maps: Path | 
             fail(f"{out}: sound is written as WAV; give a name that ends in .wav")
         check_file(out)
     with reporting_errors():
-        from dorothie_gym.audio import encode_wav
-        from dorothie_gym.recording.corpus import read_session
-        from dorothie_gym.recording.sound import utterance_audio
+        from dorothie_gym.archive.corpus import read_session
+        from dorothie_gym.archive.sound import utterance_audio
+        from dorothie_gym.support.audio import encode_wav
 
         number, span = int(found[1]), None if found[2] is None else int(found[2])
         samples = utterance_audio(read_session(sessions[0], maps=maps), number, span)
@@ -88,7 +88,7 @@ def _play(sessions: Sequence[Path], wanted: str, out: Path | None, maps: Path | 
 
 def _play_aloud(samples: Samples) -> None:
     """Plays audio with the first player of `PLAYERS` on the search path that can; fails if there is none."""
-    from dorothie_gym.audio import SAMPLE_RATE, encode_wav
+    from dorothie_gym.support.audio import SAMPLE_RATE, encode_wav
 
     commands = [(path, *options) for name, *options in PLAYERS if (path := shutil.which(name)) is not None]
     if not commands:

@@ -10,7 +10,7 @@ from rich.table import Table
 from dorothie_gym.cli.output import Facts, print_json, session_progress, wide_stdout
 
 if TYPE_CHECKING:
-    from dorothie_gym.recording.corpus import Corpus
+    from dorothie_gym.archive.corpus import Corpus
 
 _SHARES: Final = (
     ("somebody speaks, share of the time", "speech_share"),
@@ -23,7 +23,7 @@ _ERRORS: Final = (("speaker", "by_speaker"), ("noise", "by_noise"), ("word", "by
 
 def show_speech(corpus: Corpus, *, as_json: bool) -> None:
     """Prints the statistics of a corpus."""
-    from dorothie_gym.analysis.speech_stats import speech_stats_of
+    from dorothie_gym.evaluation.analysis.speech_stats import speech_stats_of
 
     with session_progress(quiet=as_json) as on_session:
         figures: Facts = speech_stats_of(corpus, on_session).to_json()
@@ -88,7 +88,7 @@ def _errors(figures: Facts) -> Table | None:
 
 
 def _published(figures: Facts) -> Table:
-    from dorothie_gym.analysis.speech_stats import figure_at
+    from dorothie_gym.evaluation.analysis.speech_stats import figure_at
 
     shown = Table(box=None, pad_edge=False)
     for title in ("published", "there", "here"):

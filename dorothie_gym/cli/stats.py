@@ -23,7 +23,7 @@ from dorothie_gym.cli.output import (
 from dorothie_gym.cli.speech_table import show_speech
 
 if TYPE_CHECKING:
-    from dorothie_gym.recording.corpus import Corpus
+    from dorothie_gym.archive.corpus import Corpus
 
 PICTURE = Path("statistics.png")
 """Default file of `--picture`."""
@@ -99,7 +99,7 @@ def stats(
         picture = PICTURE if picture == Path(OWN_NAME) else picture
         check_picture(picture)
     with reporting_errors():
-        from dorothie_gym.recording.corpus import Corpus
+        from dorothie_gym.archive.corpus import Corpus
 
         if kappa is not None:
             _kappa(*kappa, maps, as_json=as_json)
@@ -135,11 +135,11 @@ def _check_choice(folder: Path | None, kappa: object, **chosen: bool) -> None:
 
 
 def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.analysis.corpus_stats import corpus_stats_of
+    from dorothie_gym.evaluation.analysis.corpus_stats import corpus_stats_of
 
     census = corpus_stats_of(corpus)
     if picture is not None:
-        from dorothie_gym.analysis.profiles import draw_profiles
+        from dorothie_gym.evaluation.analysis.profiles import draw_profiles
 
         draw_profiles(census.profiles, census.counts.heading, corpus.root.resolve().name, picture)
     table = census.to_json()
@@ -161,7 +161,7 @@ def _count(corpus: Corpus, picture: Path | None, *, as_json: bool) -> None:
 
 
 def _table2(table: Facts) -> Table:
-    from dorothie_gym.analysis.corpus_stats import PAPER
+    from dorothie_gym.evaluation.analysis.corpus_stats import PAPER
 
     shown = Table(box=None, pad_edge=False)
     for title in ("", "here", "paper", "per session here", "in the paper"):
@@ -187,7 +187,7 @@ def _per_session(value: float, sessions: float, key: str) -> str:
 
 
 def _folds(folds: Mapping[str, int]) -> Table:
-    from dorothie_gym.recording.corpus import PAPER_FOLDS
+    from dorothie_gym.archive.corpus import PAPER_FOLDS
 
     shown = Table(box=None, pad_edge=False)
     for title in ("fold", "sessions", "paper"):
@@ -198,7 +198,7 @@ def _folds(folds: Mapping[str, int]) -> Table:
 
 
 def _anchors(anchors: Facts) -> Table:
-    from dorothie_gym.analysis.corpus_stats import ANCHOR_TOLERANCE
+    from dorothie_gym.evaluation.analysis.corpus_stats import ANCHOR_TOLERANCE
 
     shown = Table(box=None, pad_edge=False)
     for title in ("majority baselines", "here", "allowed", "paper", "unseen"):
@@ -217,7 +217,7 @@ def _anchors(anchors: Facts) -> Table:
 
 
 def _diversity(diversity: Facts) -> Table:
-    from dorothie_gym.analysis.diversity import has_language_models
+    from dorothie_gym.evaluation.analysis.diversity import has_language_models
 
     shown = Table(box=None, pad_edge=False)
     shown.add_column("diversity of the dialogue")
@@ -242,7 +242,7 @@ def _percent(share: float | None) -> str:
 
 
 def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.analysis.corpus_stats import phenomena_of
+    from dorothie_gym.evaluation.analysis.corpus_stats import phenomena_of
 
     rows = phenomena_of(corpus)
     if as_json:
@@ -260,8 +260,8 @@ def _phenomena(corpus: Corpus, *, as_json: bool) -> None:
 
 
 def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.analysis.behaviour import verdicts_of
-    from dorothie_gym.analysis.intervals import RESAMPLES
+    from dorothie_gym.evaluation.analysis.behaviour import verdicts_of
+    from dorothie_gym.evaluation.analysis.intervals import RESAMPLES
 
     verdicts = verdicts_of(corpus)
     if as_json:
@@ -284,7 +284,7 @@ def _behaviour(corpus: Corpus, *, as_json: bool) -> None:
 
 
 def _talk(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.analysis.truth_checks.checks import talk_checks_of
+    from dorothie_gym.evaluation.analysis.truth_checks.checks import talk_checks_of
 
     with session_progress(quiet=as_json) as on_session:
         found = talk_checks_of(corpus, on_session)
@@ -302,7 +302,7 @@ def _talk(corpus: Corpus, *, as_json: bool) -> None:
 
 
 def _check(corpus: Corpus, *, as_json: bool) -> None:
-    from dorothie_gym.analysis.corpus_stats import faults_of_corpus
+    from dorothie_gym.evaluation.analysis.corpus_stats import faults_of_corpus
 
     found = faults_of_corpus(corpus)
     faulty = {name: faults for name, faults in found.items() if faults}
@@ -330,8 +330,8 @@ def _show_faults(faulty: Mapping[str, Sequence[str]], sessions: int) -> None:
 
 
 def _kappa(first: Path, second: Path, maps: Path | None, *, as_json: bool) -> None:
-    from dorothie_gym.analysis.agreement import agreement
-    from dorothie_gym.recording.corpus import read_session
+    from dorothie_gym.archive.corpus import read_session
+    from dorothie_gym.evaluation.analysis.agreement import agreement
 
     found = agreement(read_session(first, maps=maps), read_session(second, maps=maps))
     if as_json:

@@ -14,7 +14,7 @@ from dorothie_gym.cli.serving import LOCAL, PORT, Host, Port, address, check_lib
 from dorothie_gym.cli.warm_up import compile_first
 
 if TYPE_CHECKING:
-    from dorothie_gym.studies.study import Study
+    from dorothie_gym.lab.studies.study import Study
 
 study = typer.Typer(help="Studies with people in the browser, from consent to completion code.", no_args_is_help=True)
 
@@ -34,12 +34,12 @@ def init(
     """Write an example study to change: two conditions, consent, instructions, questionnaires, debriefing."""
     from importlib.resources import files
 
-    from dorothie_gym.files import write_atomically
+    from dorothie_gym.support.files import write_atomically
 
     if file.exists():
         fail(f"{file}: exists; give the name of a new file")
     with reporting_errors():
-        example = files("dorothie_gym.studies") / "data" / "example.yaml"
+        example = files("dorothie_gym.lab.studies") / "data" / "example.yaml"
         write_atomically(file, example.read_text(encoding="utf-8"))
     stdout().print(f"{file} is an example. Change it, then: dorothie-gym study check {file}", soft_wrap=True)
 
@@ -47,7 +47,7 @@ def init(
 @study.command()
 def check(file: StudyFile, as_json: AsJson = False) -> None:
     """Check a study file, and the towns, storyboards and policies that it names; print the order of conditions."""
-    from dorothie_gym.studies.study_file import check_sources, read_study
+    from dorothie_gym.lab.studies.study_file import check_sources, read_study
 
     with reporting_errors():
         found = read_study(file)
@@ -65,7 +65,7 @@ def check(file: StudyFile, as_json: AsJson = False) -> None:
 
 
 def _facts(found: Study) -> Facts:
-    from dorothie_gym.studies.assignment import Assigner
+    from dorothie_gym.lab.studies.assignment import Assigner
 
     assigner = Assigner(found)
     slots = [assigner.slot(number) for number in range(assigner.block_size)]
@@ -97,9 +97,9 @@ def run(
     After a crash or Ctrl-C, the same command goes on: people are where they were.
     """
     check_libraries("study run")
-    from dorothie_gym.studies.folder import running_study
-    from dorothie_gym.studies.server import StudyServer
-    from dorothie_gym.studies.study_file import check_sources, read_study
+    from dorothie_gym.lab.studies.folder import running_study
+    from dorothie_gym.lab.studies.server import StudyServer
+    from dorothie_gym.lab.studies.study_file import check_sources, read_study
 
     with reporting_errors():
         check_sources(read_study(file), file)
@@ -113,14 +113,14 @@ def run(
             print_json({"link": link, "experimenter": experimenter, "data": str(out)})
         else:
             logging.basicConfig(format="%(asctime)s %(message)s", datefmt="%H:%M:%S")
-            logging.getLogger("dorothie_gym.studies").setLevel(logging.INFO)
+            logging.getLogger("dorothie_gym.lab.studies").setLevel(logging.INFO)
             _print_links(found, link, out)
             stdout().print(f"Experimenter (works once): {experimenter}", soft_wrap=True)
         serve(server.app(), listener, host)
 
 
 def _print_links(found: Study, link: str, out: Path) -> None:
-    from dorothie_gym.studies.study import Admission
+    from dorothie_gym.lab.studies.study import Admission
 
     screen, names = stdout(), found.recruitment.parameters
     if found.recruitment.admission is Admission.INVITED:
@@ -141,8 +141,8 @@ def invite(
     """Print links of which each admits one person once; only their hashes are stored."""
     import contextlib
 
-    from dorothie_gym.studies.folder import check_folder
-    from dorothie_gym.studies.records import StudyRecords
+    from dorothie_gym.lab.studies.folder import check_folder
+    from dorothie_gym.lab.studies.records import StudyRecords
 
     with reporting_errors():
         check_folder(folder)
@@ -165,11 +165,11 @@ def readmit(
     """Print a link with which a person goes on in another browser, once; the old browser is then shut out."""
     import contextlib
 
-    from dorothie_gym.studies.entrance import Entrance
-    from dorothie_gym.studies.folder import check_folder
-    from dorothie_gym.studies.record_types import STUDY_FILE
-    from dorothie_gym.studies.records import StudyRecords
-    from dorothie_gym.studies.study_file import read_study
+    from dorothie_gym.lab.studies.entrance import Entrance
+    from dorothie_gym.lab.studies.folder import check_folder
+    from dorothie_gym.lab.studies.record_types import STUDY_FILE
+    from dorothie_gym.lab.studies.records import StudyRecords
+    from dorothie_gym.lab.studies.study_file import read_study
 
     with reporting_errors():
         check_folder(folder)
@@ -191,7 +191,7 @@ def export(
     as_json: AsJson = False,
 ) -> None:
     """Write pseudonymous tables as CSV, and as Parquet: participants, answers, stages, sessions, utterances."""
-    from dorothie_gym.studies.export import export_study
+    from dorothie_gym.lab.studies.export import export_study
 
     with reporting_errors():
         rows = export_study(folder, out)
@@ -208,10 +208,10 @@ def delete(
     as_json: AsJson = False,
 ) -> None:
     """Delete everything of a person; the server must be stopped. Exports made before still have the person."""
-    from dorothie_gym.studies.erasure import erase, find_traces, finish_erasures, is_unfinished
-    from dorothie_gym.studies.folder import open_study
-    from dorothie_gym.studies.record_types import STUDY_FILE
-    from dorothie_gym.studies.study_file import read_study
+    from dorothie_gym.lab.studies.erasure import erase, find_traces, finish_erasures, is_unfinished
+    from dorothie_gym.lab.studies.folder import open_study
+    from dorothie_gym.lab.studies.record_types import STUDY_FILE
+    from dorothie_gym.lab.studies.study_file import read_study
 
     with reporting_errors(), open_study(folder) as records:
         unfinished = is_unfinished(records)

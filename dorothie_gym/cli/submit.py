@@ -19,10 +19,10 @@ from dorothie_gym.cli.output import (
     session_progress,
     stdout,
 )
-from dorothie_gym.processors import available_processors
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
-    from dorothie_gym.rollout.closed_loop.submission import SubmissionCheck
+    from dorothie_gym.evaluation.closed_loop.submission import SubmissionCheck
 
 FAULTY = 1
 """Exit code for a rollout that cannot be submitted."""
@@ -57,9 +57,9 @@ def submit(
     if check is None:
         check_file(out)
     with reporting_errors():
-        from dorothie_gym.files import write_atomically
-        from dorothie_gym.recording.json_io import to_page
-        from dorothie_gym.rollout.closed_loop import submission
+        from dorothie_gym.evaluation.closed_loop import submission
+        from dorothie_gym.session.recording.json_io import to_page
+        from dorothie_gym.support.files import write_atomically
 
         found = _check(folder, None if sample == ALL else int(sample), seed, workers, quiet=as_json)
         faults = found.faults
@@ -89,7 +89,7 @@ def submit(
 def _check(folder: Path, sample: int | None, seed: int | None, workers: int | None, *, quiet: bool) -> SubmissionCheck:
     from dorothie_gym.cli.warm_up import compile_first
     from dorothie_gym.errors import ProcessError
-    from dorothie_gym.rollout.closed_loop import submission
+    from dorothie_gym.evaluation.closed_loop import submission
 
     try:
         compile_first(pictures=False)

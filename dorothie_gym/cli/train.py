@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dorothie_gym.baselines.experiment import Experiment
     from dorothie_gym.baselines.model_zoo import ModelEntry
     from dorothie_gym.baselines.trainer import Epoch
-    from dorothie_gym.benchmark.table import ResultsTable
+    from dorothie_gym.evaluation.teacher_forced.table import ResultsTable
 
 RUNS = Path("runs")
 """Default folder of trainings; it contains one folder per corpus."""
@@ -210,8 +210,8 @@ def table(
     with _reporting_errors():
         from dorothie_gym.baselines.experiment import PREDICTIONS, gather_table, table_experiments
         from dorothie_gym.baselines.model_zoo import ROWS, find_row
-        from dorothie_gym.benchmark.predictions import write_predictions
-        from dorothie_gym.benchmark.report import write_report
+        from dorothie_gym.evaluation.teacher_forced.predictions import write_predictions
+        from dorothie_gym.evaluation.teacher_forced.report import write_report
 
         rows = ROWS if models == "all" else [find_row(name.strip()) for name in models.split(",")]
         folder, where = _places(corpus, out)
@@ -236,7 +236,7 @@ def table(
 def _run(jobs: Sequence[Experiment], workers: int | None, *, quiet: bool) -> list[Facts]:
     """Runs the trainings, and returns their results in the same order."""
     from dorothie_gym.baselines.experiment import run_experiments
-    from dorothie_gym.processors import available_processors
+    from dorothie_gym.support.processors import available_processors
 
     _name_former_trainings(jobs)
     found: dict[Path, Facts] = {}
@@ -307,7 +307,7 @@ def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
     folder = corpus
     if folder is None:
         from dorothie_gym.errors import CacheError
-        from dorothie_gym.rollout.corpus_cache import default_corpus
+        from dorothie_gym.evaluation.rollout.corpus_cache import default_corpus
 
         try:
             folder = default_corpus()
@@ -319,7 +319,7 @@ def _places(corpus: Path | None, out: Path | None) -> tuple[Path, Path]:
 
 
 def _show(table: ResultsTable) -> None:
-    from dorothie_gym.benchmark.terminal import print_table
+    from dorothie_gym.evaluation.teacher_forced.terminal import print_table
 
     console = wide_stdout()
     print_table(table, console)

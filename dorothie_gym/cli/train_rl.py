@@ -15,7 +15,7 @@ from dorothie_gym.cli.completion import complete_algorithm, complete_env
 from dorothie_gym.cli.options import AsJson, Ray
 from dorothie_gym.cli.output import FAILED, exit_interrupted, fail, print_json, reporting_errors, stderr, stdout
 from dorothie_gym.cli.warm_up import compile_first
-from dorothie_gym.processors import available_processors
+from dorothie_gym.support.processors import available_processors
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.rl.run import OnProgress, OnStage, TrainingEvaluation, TrainingResult

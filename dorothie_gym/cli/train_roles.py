@@ -97,7 +97,7 @@ def train_role(
     model: str, corpus: Path, out: Path, *, seeds: int, workers: int | None, as_json: bool
 ) -> None:  # fmt: skip
     """Trains players of a role with several seeds, each in a folder of its own, and prints how to play them."""
-    from dorothie_gym.processors import available_processors
+    from dorothie_gym.support.processors import available_processors
 
     found: list[tuple[Path, RoleReport]] = []
     try:

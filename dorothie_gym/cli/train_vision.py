@@ -43,7 +43,7 @@ def train_vision(
     """Trains a vision model with several seeds, tests it, and prints its figures beside the paper's."""
     from dorothie_gym.baselines.trainer import device as best_device
     from dorothie_gym.baselines.vision.experiment import VisionExperiment, check_experiment, run_vision_experiment
-    from dorothie_gym.processors import available_processors
+    from dorothie_gym.support.processors import available_processors
 
     if inputs is not None and model != "detr":
         fail("--inputs is for detr only")

@@ -14,7 +14,7 @@ def warm_up(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
 ) -> None:
     """Compile the simulation for this machine; later commands start at once."""
-    from dorothie_gym.compilation.cache import compiled_folder
+    from dorothie_gym.support.compilation.cache import compiled_folder
 
     folder = compiled_folder()
     if folder is None:
@@ -39,8 +39,8 @@ def compile_first(*, batches: bool = False, pictures: bool = False) -> None:
         batches: whether batches of the navigation environments are needed.
         pictures: whether the first-person camera is needed.
     """
-    from dorothie_gym.engine import warm_up as sessions
     from dorothie_gym.envs import warm_up as navigation
+    from dorothie_gym.session import warm_up as sessions
 
     batches = batches and not navigation.is_warm()
     pictures = pictures and not _is_camera_warm()
@@ -49,7 +49,7 @@ def compile_first(*, batches: bool = False, pictures: bool = False) -> None:
 
 
 def _is_camera_warm() -> bool:
-    from dorothie_gym.camera import warm_up as pictures  # imported here: most commands draw no pictures
+    from dorothie_gym.pictures.camera import warm_up as pictures  # imported here: most commands draw no pictures
 
     return pictures.is_warm()
 
@@ -67,8 +67,8 @@ def compile_with_progress(*, everything: bool = False, batches: bool, pictures: 
     """
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from dorothie_gym.engine import warm_up as sessions
     from dorothie_gym.envs import warm_up as navigation
+    from dorothie_gym.session import warm_up as sessions
 
     console, begun = stderr(), 0
     columns = (
@@ -91,7 +91,7 @@ def compile_with_progress(*, everything: bool = False, batches: bool, pictures: 
             navigation.warm_up(show)
             total, begun = total + begun, 0
         if pictures:
-            from dorothie_gym.camera import warm_up as camera
+            from dorothie_gym.pictures.camera import warm_up as camera
 
             camera.warm_up(show)
     return total + begun

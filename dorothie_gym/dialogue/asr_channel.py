@@ -14,7 +14,6 @@ import numpy as np
 from rapidfuzz import process
 from rapidfuzz.distance import Levenshtein
 
-from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.conversation import Span, Utterance
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.dialogue.entity_recognition import sound_of
@@ -30,6 +29,7 @@ from dorothie_gym.dialogue.recognition_errors import (
 from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.support.copying import shared
 
 _WORD = re.compile(r"[A-Za-z][A-Za-z']*")
 _CANDIDATES = 6

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.support.copying import shared
 
 WORDS_PER_SECOND = 2.7
 """Speaking rate [words/s]; ordinary speech has 2 to 3 words per second (design, Time)."""

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.propositions import Proposition
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove, walk
 from dorothie_gym.ontology.slots import SlotValue
+from dorothie_gym.support.copying import shared
 
 
 class CommunicativeFunction(enum.StrEnum):

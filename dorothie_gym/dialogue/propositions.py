@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
-from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.errors import did_you_mean
 from dorothie_gym.ontology.slots import (
@@ -29,6 +28,7 @@ from dorothie_gym.ontology.slots import (
     StreetName,
 )
 from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter
+from dorothie_gym.support.copying import shared
 
 
 class Asked(enum.Enum):

@@ -13,11 +13,11 @@ from importlib import resources
 from types import MappingProxyType
 from typing import Final, Self
 
-from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.lexicon import load_lexicon
 from dorothie_gym.dialogue.talk_files import read_talk_files
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import Slot
+from dorothie_gym.support.copying import shared
 
 PROFILE_FILE: Final = "recognition_errors.json"
 """Data file of the measured profile, written by `benchmarks/recognition_errors.py`."""

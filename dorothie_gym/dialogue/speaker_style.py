@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.lexicon import read_data, strings
 from dorothie_gym.dialogue.phrases import Register
 from dorothie_gym.errors import PhraseFileError
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.spellings import parse_role
+from dorothie_gym.support.copying import shared
 
 _SHARES = ("chattiness", "indirectness", "anaphora", "disfluency", "repairs", "habit", "addressing")
 

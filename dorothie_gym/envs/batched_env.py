@@ -10,14 +10,14 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from dorothie_gym.copying import Restorable
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_batch import SessionBatch
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.town import Town
-from dorothie_gym.processors import available_processors
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_batch import SessionBatch
+from dorothie_gym.support.copying import Restorable
+from dorothie_gym.support.processors import available_processors
 
 Towns: TypeAlias = "str | Path | Town | Sequence[str | Path | Town]"
 """A town, or several that the environments of a batch play in turn."""

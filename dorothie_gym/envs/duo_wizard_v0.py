@@ -15,20 +15,20 @@ from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
-from dorothie_gym.copying import Restorable, State
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.engine.scenario import ResetOptions, Scenario, scenario_option
-from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.engine.session_log import SessionSummary
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES
-from dorothie_gym.recording.events import Event
-from dorothie_gym.recording.header import SessionHeader
-from dorothie_gym.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space
-from dorothie_gym.spaces.limits import UNBOUNDED, SpaceLimits
-from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.live_session import LiveSession
+from dorothie_gym.session.recording.events import Event
+from dorothie_gym.session.recording.header import SessionHeader
+from dorothie_gym.session.scenario import ResetOptions, Scenario, scenario_option
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.session_log import SessionSummary
+from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space
+from dorothie_gym.session.spaces.limits import UNBOUNDED, SpaceLimits
+from dorothie_gym.session.spaces.observations import Observation
+from dorothie_gym.support.copying import Restorable, State
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 _METADATA: dict[str, object] = {"name": "duo_wizard_v0", **METADATA, "is_parallelizable": True}
@@ -49,14 +49,15 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
     `participant`, `co_wizard`, `ad_wizard`; all act at the same time, twice per simulated second.
 
     ## Observation Space
-    A `Dict` of fixed-shape arrays and texts for each role: see `dorothie_gym.spaces.observation_space`. Utterances of
-    the others are observed at the decision after their last word. The Co-Wizard does not observe hidden landmarks, the
-    task, or arrivals; the participant does not observe the options of the Ad-Wizard.
+    A `Dict` of fixed-shape arrays and texts for each role: see `dorothie_gym.session.spaces.observation_space`.
+    Utterances of the others are observed at the decision after their last word. The Co-Wizard does not observe hidden
+    landmarks, the task, or arrivals; the participant does not observe the options of the Ad-Wizard.
 
     ## Action Space
-    A `Dict` for each role: see `ParticipantAction`, `CoWizardAction` and `AdWizardAction` in `dorothie_gym.spaces`,
-    which encode and decode it. `info["action_mask"]` has the same fields. A well-formed action that cannot be carried
-    out is refused, reported in `info["refused"]` and counted; a malformed one raises `ValueError` with the field.
+    A `Dict` for each role: see `ParticipantAction`, `CoWizardAction` and `AdWizardAction` in
+    `dorothie_gym.session.spaces`, which encode and decode it. `info["action_mask"]` has the same fields. A well-formed
+    action that cannot be carried out is refused, reported in `info["refused"]` and counted; a malformed one raises
+    `ValueError` with the field.
 
     ## Rewards
     Weighted terms (`RewardWeights`): subgoals reached, success, collisions caused by the ego, time, and each role's

@@ -9,7 +9,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.action_values import as_array
+from dorothie_gym.archive.prediction_points import WAY_LENGTH, PointView, history_angle
+from dorothie_gym.archive.recorded_perception import ObjectKind, last_perceived
+from dorothie_gym.archive.visibility import Task
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS, U_TURN_ANGLE, PhysicalAction
@@ -17,16 +19,14 @@ from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import StreetName
 from dorothie_gym.ontology.spellings import parse_landmark, parse_street
-from dorothie_gym.recording.events import MoveRecord
-from dorothie_gym.recording.prediction_points import WAY_LENGTH, PointView, history_angle
-from dorothie_gym.recording.recorded_perception import ObjectKind, last_perceived
-from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.visibility import Task
+from dorothie_gym.session.recording.events import MoveRecord
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.spaces.actions import NO_MOVE, ActionMapping
+from dorothie_gym.session.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
+from dorothie_gym.session.spaces.limits import TEXT_CHARACTERS, SpaceLimits
+from dorothie_gym.session.spaces.observations import MAX_UTTERANCE, LandmarkColumn, Observation
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.spaces.actions import NO_MOVE, ActionMapping
-from dorothie_gym.spaces.fields import Column, FieldSpec, choice, choices, dict_space, flags, real, text
-from dorothie_gym.spaces.limits import TEXT_CHARACTERS, SpaceLimits
-from dorothie_gym.spaces.observations import MAX_UTTERANCE, LandmarkColumn, Observation
+from dorothie_gym.support.action_values import as_array
 
 HISTORY_LENGTH: Final = 16
 """Number of latest moves and physical actions in an observation."""
@@ -36,7 +36,7 @@ SPEAKERS: Final = (Role.PARTICIPANT, Role.CO_WIZARD)
 
 
 class HistoryObjectColumn(Column):
-    """Columns of `objects` in the history space, in the order of `dorothie_gym.recording.OBJECT_VALUES`."""
+    """Columns of `objects` in the history space, in the order of `dorothie_gym.archive.OBJECT_VALUES`."""
 
     DISTANCE = 0, "m", "distance from the car; for a traffic light, from its stop line"
     BEARING = 1, "deg", "bearing relative to the heading of the car, positive left"

@@ -9,9 +9,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym.action_values import real_numbers
-from dorothie_gym.engine.camera_config import CameraConfig
-from dorothie_gym.engine.scenario import ResetOptions
 from dorothie_gym.envs.navigation.cameras import DriverObservation, driver_space
 from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights, weights_of
 from dorothie_gym.envs.navigation.continuous_control import CONTINUOUS_FIELD_SPECS, CONTINUOUS_FIELDS
@@ -20,8 +17,11 @@ from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.navigation.observation_vector import Vector
-from dorothie_gym.spaces.actions import StepInfo
-from dorothie_gym.spaces.fields import FieldSpec, signal
+from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.scenario import ResetOptions
+from dorothie_gym.session.spaces.actions import StepInfo
+from dorothie_gym.session.spaces.fields import FieldSpec, signal
+from dorothie_gym.support.action_values import real_numbers
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 __all__ = [

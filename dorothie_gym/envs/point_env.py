@@ -13,20 +13,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from dorothie_gym.copying import Restorable
-from dorothie_gym.engine.scenario import ResetOptions
-from dorothie_gym.envs.history_space import (
-    act_space,
-    check_action,
-    decision_space,
-    encode_objects,
-    encode_view,
-    history_space,
-)
-from dorothie_gym.input_files import settings_of
-from dorothie_gym.maps.town import Town
-from dorothie_gym.ontology.dialogue_acts import LABELS
-from dorothie_gym.recording.prediction_points import (
+from dorothie_gym.archive.prediction_points import (
     ANGLE_TOLERANCE,
     DecisionPoint,
     InferencePoint,
@@ -35,11 +22,24 @@ from dorothie_gym.recording.prediction_points import (
     angle_error,
     final_view,
 )
-from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.visibility import Task
-from dorothie_gym.spaces.actions import ActionDict, ActionMapping, StepInfo
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.archive.visibility import Task
+from dorothie_gym.envs.history_space import (
+    act_space,
+    check_action,
+    decision_space,
+    encode_objects,
+    encode_view,
+    history_space,
+)
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.dialogue_acts import LABELS
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.scenario import ResetOptions
+from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import Observation
+from dorothie_gym.support.copying import Restorable
+from dorothie_gym.support.input_files import settings_of
 
 Label: TypeAlias = dict[str, int | NDArray[np.int8]]
 """Correct prediction of a point, in the action space of the task."""

@@ -8,12 +8,13 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import camera, rendering  # lazy: most sessions are never drawn
-from dorothie_gym.copying import CachedViews
-from dorothie_gym.engine.live_session import LiveSession
+from dorothie_gym import pictures as rendering  # lazy: most sessions are never drawn
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.render_view import RenderView, checked_view
-from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.pictures import camera  # lazy: most sessions are never drawn
+from dorothie_gym.session.live_session import LiveSession
+from dorothie_gym.session.spaces.observations import Observation
+from dorothie_gym.support.copying import CachedViews
+from dorothie_gym.support.render_view import RenderView, checked_view
 
 RENDER_MODES: Final[tuple[str, ...]] = ("human", "rgb_array")
 """Render modes of the environments that play sessions."""

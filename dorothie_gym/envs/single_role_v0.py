@@ -11,19 +11,19 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from dorothie_gym.copying import Restorable, Unchanged
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_option
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
-from dorothie_gym.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space, noop
-from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space, noop
+from dorothie_gym.session.spaces.observations import Observation
+from dorothie_gym.support.copying import Restorable, Unchanged
+from dorothie_gym.support.time_limit import TimeLimitedEnv, decisions_in
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
-from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
 
 class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
@@ -37,10 +37,11 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
     One: the agent plays `role`.
 
     ## Observation Space
-    The `Dict` of the role, see `dorothie_gym.spaces.observation_space`.
+    The `Dict` of the role, see `dorothie_gym.session.spaces.observation_space`.
 
     ## Action Space
-    The `Dict` of the role, see `ParticipantAction`, `CoWizardAction` and `AdWizardAction` in `dorothie_gym.spaces`.
+    The `Dict` of the role, see `ParticipantAction`, `CoWizardAction` and `AdWizardAction` in
+    `dorothie_gym.session.spaces`.
     `info["action_mask"]` has the same fields: `action_space.sample(mask=info["action_mask"])`. An action that cannot be
     carried out is refused and reported in `info["refused"]`; a malformed one raises `ValueError` with the field.
     `dorothie_gym.flatten` makes both spaces flat.

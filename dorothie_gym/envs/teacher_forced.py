@@ -11,7 +11,12 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from dorothie_gym.benchmark.metrics import (
+from dorothie_gym.archive.corpus import Corpus, CorpusEntry, Fold
+from dorothie_gym.archive.prediction_points import DecisionPoint, InferencePoint, Point, task_points
+from dorothie_gym.archive.visibility import Task
+from dorothie_gym.envs.point_env import PointEnv
+from dorothie_gym.errors import SessionError
+from dorothie_gym.evaluation.teacher_forced.metrics import (
     ActionAccuracy,
     ArgumentAccuracy,
     JointAccuracy,
@@ -19,19 +24,19 @@ from dorothie_gym.benchmark.metrics import (
     SlotF1,
     SlotScorePaper,
 )
-from dorothie_gym.benchmark.predictions import ActionPredictions, ActPredictions, act_labels, action_labels
-from dorothie_gym.copying import CachedViews
-from dorothie_gym.engine.scenario import ResetOptions, check_options
-from dorothie_gym.envs.point_env import PointEnv
-from dorothie_gym.errors import SessionError
+from dorothie_gym.evaluation.teacher_forced.predictions import (
+    ActionPredictions,
+    ActPredictions,
+    act_labels,
+    action_labels,
+)
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.maps.town import Town
-from dorothie_gym.recording.corpus import Corpus, CorpusEntry, Fold
-from dorothie_gym.recording.prediction_points import DecisionPoint, InferencePoint, Point, task_points
-from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.visibility import Task
-from dorothie_gym.spaces.actions import ActionMapping, StepInfo
-from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.scenario import ResetOptions, check_options
+from dorothie_gym.session.spaces.actions import ActionMapping, StepInfo
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.support.copying import CachedViews
 
 DEFAULT: Final = "default"
 """Name of the corpus that is generated once and kept in the user's cache folder."""
@@ -53,7 +58,7 @@ class TeacherForcedEnv(PointEnv):
     predictions do not affect them (teacher forcing).
 
     ## Observation Space
-    A `Dict` with the history recorded before the point, see `dorothie_gym.recording.visibility` for its extent and
+    A `Dict` with the history recorded before the point, see `dorothie_gym.archive.visibility` for its extent and
     `history_fields` for the fields. Moves and actions are sorted newest first.
 
     ## Rewards
@@ -195,7 +200,7 @@ def _sessions(corpus: Corpus | Path | str | Sequence[Session], split: str) -> Se
     """Returns the sessions of a split, or entries that load them."""
     if isinstance(corpus, str) and corpus == DEFAULT:
         # Imported here: the simulation is slow to import, and only the default corpus needs it.
-        from dorothie_gym.rollout.corpus_cache import default_corpus
+        from dorothie_gym.evaluation.rollout.corpus_cache import default_corpus
 
         corpus = default_corpus()
     if isinstance(corpus, Path | str):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dorothie_gym.archive.visibility import Task
 from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
-from dorothie_gym.recording.visibility import Task
 
 
 class UfNEnv(TeacherForcedEnv):

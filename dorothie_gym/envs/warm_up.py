@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from dorothie_gym.compilation.dispatcher import CompiledFunction
-from dorothie_gym.engine.warm_up import TOWN, Progress, reporting
 from dorothie_gym.envs.navigation.steps import act_share, guide_share
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
+from dorothie_gym.session.warm_up import TOWN, Progress, reporting
+from dorothie_gym.support.compilation.dispatcher import CompiledFunction
 
 
 def is_warm() -> bool:

@@ -20,10 +20,7 @@ from typing import Any, TypeAlias, TypedDict, get_type_hints
 import msgspec
 import numpy as np
 
-from dorothie_gym import angles, portable_arrays, portable_math
 from dorothie_gym.errors import InputFileError, TownArchiveError, one_line
-from dorothie_gym.files import PART
-from dorothie_gym.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, read_file
 from dorothie_gym.maps.model import (
     NO_STREET,
     Array,
@@ -40,7 +37,10 @@ from dorothie_gym.maps.model import (
 )
 from dorothie_gym.maps.town import MAX_EXTENT, Town
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
-from dorothie_gym.user_cache import cache_folder, discard, read_signed, remove, write_signed
+from dorothie_gym.support import angles, portable_arrays, portable_math
+from dorothie_gym.support.files import PART
+from dorothie_gym.support.input_files import ARRAY_ERRORS, MAX_OPENDRIVE, MIB, read_file
+from dorothie_gym.support.user_cache import cache_folder, discard, read_signed, remove, write_signed
 
 ARCHIVE_FORMAT = 1
 """Version of the archive format; raise it when the same town would be written differently."""
@@ -310,7 +310,7 @@ def arithmetic_sources() -> list[tuple[str, bytes]]:
     """Returns names and contents of the modules that compute elementary functions for this and other packages."""
     own = {f"{module.__name__}.py": module.__file__ for module in (angles, portable_arrays, portable_math)}
     found = [(name, Path(file).read_bytes()) for name, file in own.items() if file is not None]
-    return found + package_sources("dorothie_gym.compilation")
+    return found + package_sources("dorothie_gym.support.compilation")
 
 
 def package_sources(package: str) -> list[tuple[str, bytes]]:

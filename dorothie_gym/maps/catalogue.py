@@ -13,12 +13,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from dorothie_gym.errors import InputFileError, TownError, did_you_mean
-from dorothie_gym.files import JsonValue
-from dorothie_gym.input_files import MAX_OPENDRIVE, check_file
 from dorothie_gym.maps import opendrive, yaml  # lazy: their parsers are slow to import
 from dorothie_gym.maps.cache import through_cache
 from dorothie_gym.maps.model import LaneLink, SignalKind
 from dorothie_gym.maps.town import Town, check_extent
+from dorothie_gym.support.files import JsonValue
+from dorothie_gym.support.input_files import MAX_OPENDRIVE, check_file
 
 SEEN_TOWNS: tuple[str, ...] = ("midtown", "millbrook", "northgate")
 """Training towns (in the paper: CARLA's Town01, Town03 and Town05)."""

@@ -11,10 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from dorothie_gym import portable_arrays as pn
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import allocating, compiled
-from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.maps.polyline import (
     HEADING,
@@ -29,6 +25,10 @@ from dorothie_gym.maps.polyline import (
     value_at,
 )
 from dorothie_gym.maps.town import Town
+from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import allocating, compiled
+from dorothie_gym.support.copying import shared
 
 WIDEST_MEDIAN = 13.0
 """Largest distance between the centre lines [m]: across a median, but not across a park."""

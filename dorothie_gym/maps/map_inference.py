@@ -14,9 +14,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from dorothie_gym import portable_arrays as pn
-from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import NO_STREET, Array, Lane, LaneLink, Site, Street
+from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support.angles import wrap_degrees
 
 # Largest change of direction at which a street continues across a junction [degrees].
 STREET_BEND = 35.0

@@ -14,8 +14,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_arrays as pn
-from dorothie_gym.copying import shared
+from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support.copying import shared
 
 Array: TypeAlias = NDArray[np.float64]
 

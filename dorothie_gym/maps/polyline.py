@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import allocating
 from dorothie_gym.maps.model import Array, Lane
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import allocating
 
 IntArray = NDArray[np.int64]
 

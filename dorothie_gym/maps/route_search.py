@@ -7,8 +7,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.route_arrays import SETTLED, UNREACHED, PlaceRecord, RouteSearch
 from dorothie_gym.maps.routing_graph import (
@@ -26,6 +24,8 @@ from dorothie_gym.maps.routing_graph import (
     cell_at,
     drive_on,
 )
+from dorothie_gym.support.compilation import compiled, inlined
+from dorothie_gym.support.compilation.records import RecordArray
 
 # --- Start and goal of a search ---------------------------------------------------------------------------------------
 

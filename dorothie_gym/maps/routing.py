@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from dorothie_gym.compilation.records import RecordArray, argument, empty_records, fields, filled_records, plain
 from dorothie_gym.maps.model import NO_JUNCTION, LinkType
 from dorothie_gym.maps.route_arrays import LegRecord, RouteSearch, empty_search, place_records
 from dorothie_gym.maps.route_search import find_costs, find_departures, find_route
@@ -37,6 +36,7 @@ from dorothie_gym.maps.routing_graph import (
     routing_graph,
 )
 from dorothie_gym.maps.town import Town
+from dorothie_gym.support.compilation.records import RecordArray, argument, empty_records, fields, filled_records, plain
 
 __all__ = [
     "CELL",

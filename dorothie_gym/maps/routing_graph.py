@@ -10,14 +10,22 @@ from typing import NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled
-from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray, argument, empty_records, record_dtype
-from dorothie_gym.copying import shared
 from dorothie_gym.maps.lane_neighbours import across, oncoming_lanes
 from dorothie_gym.maps.model import Array, LinkType
 from dorothie_gym.maps.polyline import IntArray, LaneTable
 from dorothie_gym.maps.town import Town
+from dorothie_gym.support.compilation import compiled
+from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import (
+    Flag,
+    Float,
+    Int32,
+    RecordArray,
+    argument,
+    empty_records,
+    record_dtype,
+)
+from dorothie_gym.support.copying import shared
 
 
 class LaneEntry(enum.StrEnum):

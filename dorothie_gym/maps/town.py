@@ -8,8 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.copying import digest_of, shared
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.lane_graph import LaneGraph, build_lane_graph
 from dorothie_gym.maps.model import (
@@ -25,6 +23,8 @@ from dorothie_gym.maps.model import (
     Street,
 )
 from dorothie_gym.maps.traffic_lights import LightColour, LightProgramme
+from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.copying import digest_of, shared
 
 MAX_EXTENT = 20_000.0
 """Largest extent of a town along x and y [m]; the index of its lanes takes 250 MB there."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array, Junction, Lane, LaneLink, Signal, SignalKind
 from dorothie_gym.maps.right_of_way import FACING, LEFTWARD, opposition, turn_into
 from dorothie_gym.maps.traffic_lights import LightPhase, LightProgramme
+from dorothie_gym.support import portable_arrays as pn
 
 THROUGH_GREEN = 20.0
 """Green of facing approaches [s]: ten cars per lane at a headway of 2 s (Highway Capacity Manual)."""

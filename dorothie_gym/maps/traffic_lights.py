@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 
-from dorothie_gym.copying import shared
+from dorothie_gym.support.copying import shared
 
 _SHORTLY = 1e-6  # [s] more than rounding moves the end of a phase
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.model import NO_STREET, SignalKind
 from dorothie_gym.maps.town import Town
+from dorothie_gym.support import portable_math as pm
 
 CORNER_DISTANCE = 60.0
 """Distance to the middle of a junction within which a place is near the corner [m]: half a block of the towns."""

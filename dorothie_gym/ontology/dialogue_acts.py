@@ -10,10 +10,10 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Self, TypeAlias
 
-from dorothie_gym.copying import shared
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.slots import SLOT_VALUES, Slot, SlotValue
 from dorothie_gym.ontology.vocabulary import LabelledInt, unknown_spelling
+from dorothie_gym.support.copying import shared
 
 
 class DialogueMove(LabelledInt):

@@ -11,17 +11,17 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation.records import Rows
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar, weather
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception, story_exception, task_message
-from dorothie_gym.spaces.actions import ActionDict, AdWizardAction, LanePosition
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping, PropColumn
+from dorothie_gym.session.spaces.actions import ActionDict, AdWizardAction, LanePosition
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping, PropColumn
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation.records import Rows
 
 
 class Trick(enum.StrEnum):

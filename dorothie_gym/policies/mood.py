@@ -5,8 +5,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.support import portable_math as pm
 
 HALF_LIFE = 120.0
 """Time in which half of a deviation from the usual mood is gone [s]; set by hand."""

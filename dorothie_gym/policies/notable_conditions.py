@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 
-from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
@@ -22,7 +21,8 @@ from dorothie_gym.policies.observation_parser import SeenObject, scalar, weather
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import DENSE, FAR_SIGHT, Limit
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.observations import ObservationMapping
+from dorothie_gym.support.angles import wrap_degrees
 
 
 def _turned(azimuth: float) -> float:

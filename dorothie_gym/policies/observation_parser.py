@@ -10,8 +10,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation.records import Rows
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_spans
 from dorothie_gym.dialogue.nlu import ParsedText, understand
 from dorothie_gym.maps.town import Town
@@ -20,13 +18,15 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, WeatherParameter
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
-from dorothie_gym.spaces.observations import (
+from dorothie_gym.session.spaces.observations import (
     LandmarkColumn,
     ObjectColumn,
     ObservationMapping,
     SubgoalColumn,
     heard_acts,
 )
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation.records import Rows
 
 PARAMETERS = tuple(WeatherParameter)
 

@@ -11,9 +11,9 @@ from typing import Final
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.errors import did_you_mean
 from dorothie_gym.policies.speech_timing import Delivery
+from dorothie_gym.support import portable_math as pm
 
 
 class Directions(enum.StrEnum):

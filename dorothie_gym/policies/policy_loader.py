@@ -12,7 +12,6 @@ from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from dorothie_gym.errors import MAX_SHOWN, InputFileError, PolicyLoadError, did_you_mean, short_repr
-from dorothie_gym.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard
@@ -23,7 +22,8 @@ from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy
 from dorothie_gym.policies.pretrained import check_fits, is_pretrained, names_for, pretrained_folder
 from dorothie_gym.policies.trivial import LaneFollowPolicy, RandomPolicy, SilentPolicy
-from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.support.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
 
 POLICY_NAMES = ("scripted", "silent", "random")
 """Names that `make_policy` accepts for every role."""

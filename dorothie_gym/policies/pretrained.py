@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Final
 
 from dorothie_gym.errors import PolicyLoadError
-from dorothie_gym.input_files import MAX_SMALL_JSON, checked, raising, read_json
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.support.input_files import MAX_SMALL_JSON, checked, raising, read_json
 
 PREFIX: Final = "pretrained:"
 """First part of the names of shipped models."""

@@ -7,8 +7,6 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.route_arrays import LegRecord, place_records
@@ -28,8 +26,10 @@ from dorothie_gym.policies.route_legs import (
     needs_switch,
 )
 from dorothie_gym.policies.route_tables import default_successor, is_choice, route_tables
+from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.ego.limits import PLANNED_BRAKING
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.compilation.records import RecordArray
 
 ASTRAY = 3
 """Number of decisions off the route after which it has been left."""

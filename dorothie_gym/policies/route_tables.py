@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.compilation.records import Int32, RecordArray, argument, filled_records
-from dorothie_gym.copying import shared
 from dorothie_gym.maps.polyline import IntArray
 from dorothie_gym.maps.routing_graph import NONE, RoutingLane, routing_graph
 from dorothie_gym.maps.town import Town
+from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import Int32, RecordArray, argument, filled_records
+from dorothie_gym.support.copying import shared
 
 
 class ExitRecord:

@@ -25,7 +25,7 @@ from dorothie_gym.policies.mood import Happening, Mood
 from dorothie_gym.policies.persona import Persona
 from dorothie_gym.policies.policy import DECISION_INTERVAL, DecisionClock, replace
 from dorothie_gym.policies.speech_timing import Delivery
-from dorothie_gym.spaces.actions import Speech
+from dorothie_gym.session.spaces.actions import Speech
 
 LONGEST_BREATH = 3
 """Largest number of acts that are worded together."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.dialogue.conversation import WORDS_PER_SECOND, speech_seconds
+from dorothie_gym.support import portable_math as pm
 
 FULL_TURN = 7
 """Words from which on a turn is spoken at the speaker's full rate; shorter ones are slower (Yuan et al., 2006)."""

@@ -6,13 +6,13 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
 from dorothie_gym.policies.observation_parser import SeenLandmark, SeenSubgoal, read_landmarks, read_subgoals
-from dorothie_gym.spaces.actions import AdWizardAction
-from dorothie_gym.spaces.limits import MESSAGE_LENGTH
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.actions import AdWizardAction
+from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH
+from dorothie_gym.session.spaces.observations import ObservationMapping
+from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks.parsing import is_shipped_story
 from dorothie_gym.tasks.storyboard import BECAUSE
 

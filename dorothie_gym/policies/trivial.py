@@ -11,10 +11,10 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.policy import Policy, replace
+from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical, action_space, noop
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ExitColumn, ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import ActionDict, CoWizardAction, Physical, action_space, noop
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ExitColumn, ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,9 +13,9 @@ from typing import Final
 
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import is_dark, is_foggy, is_rainy, scalar
+from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.sensing.visibility import SHORTEST_SIGHT
 from dorothie_gym.sim.weather import Weather
-from dorothie_gym.spaces.observations import ObservationMapping
 
 FAR_SIGHT: Final = 60.0
 """Range of sight from which on an agent sees far enough [m]: it stops in time from 45 km/h."""

@@ -9,7 +9,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from dorothie_gym.copying import CachedViews
 from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.bodies import Bodies, Pedestrian, Prop, TrafficVehicle
 from dorothie_gym.sim.population import (
@@ -26,6 +25,7 @@ from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
 from dorothie_gym.sim.traffic.parameters import CYCLIST_SHARE, CYCLIST_SPEEDS
 from dorothie_gym.sim.traffic.respawn import is_free
+from dorothie_gym.support.copying import CachedViews
 
 MORE = 8
 """Rows by which the arrays grow when all are taken."""

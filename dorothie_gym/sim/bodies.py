@@ -19,8 +19,6 @@ import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.objects import Obstacle, RoadObject
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation.records import record_dtype
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.world_exceptions import PropKind
 from dorothie_gym.sim.network.lane import PolylineLane
@@ -45,6 +43,8 @@ from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.route import extend, take
 from dorothie_gym.sim.traffic.vehicle_models import slip_of, steering_angle
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation.records import record_dtype
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.road import TownRoad

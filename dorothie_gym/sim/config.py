@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dorothie_gym.copying import shared
+from dorothie_gym.support.copying import shared
 
 FRAME_RATE = 30
 """Physics substeps, and frames of a recording, a second (paper, appendix B.2)."""

@@ -14,8 +14,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import CachedViews
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.network import TownNetwork
@@ -24,6 +22,8 @@ from dorothie_gym.sim.state.ego_records import EventRecord
 from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.sensing_records import BreachRecord
 from dorothie_gym.sim.state.world_arrays import WorldArrays
+from dorothie_gym.support.compilation.records import plain
+from dorothie_gym.support.copying import CachedViews
 
 
 class WorldEventKind(enum.StrEnum):

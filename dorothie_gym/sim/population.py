@@ -7,9 +7,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, direct
-from dorothie_gym.compilation.records import RecordArray, empty_records, plain
 from dorothie_gym.maps.lane_neighbours import rightmost
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
@@ -35,6 +32,9 @@ from dorothie_gym.sim.traffic.parameters import (
     CYCLIST_WIDTH,
 )
 from dorothie_gym.sim.traffic.respawn import SHORTEST, is_clear_of_people, is_free, new_key, put_on_lane
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, direct
+from dorothie_gym.support.compilation.records import RecordArray, empty_records, plain
 
 STREET_WAY_REACH = 1.0
 """Distance to the way beside a street within which a pedestrian is placed on it [m]."""

@@ -13,8 +13,8 @@ import numpy as np
 from numba.np.random._constants import fi_double, ki_double, wi_double, ziggurat_nor_inv_r, ziggurat_nor_r
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.body_records import RandomBody, RandomStream

@@ -14,8 +14,6 @@ from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Landmark, RoadObject
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.bodies import Bodies, TrafficVehicle
 from dorothie_gym.sim.collisions import OrientedBox, boxes_touch
@@ -29,6 +27,8 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.step import step_around, update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.respawn import new_key, put_on_lane
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.copying import CachedViews
 
 
 class TownRoad(CachedViews, Road):

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.collisions import collide
 from dorothie_gym.sim.ego.decision_setup import prepare
@@ -27,6 +25,8 @@ from dorothie_gym.sim.traffic.respawn import tow
 from dorothie_gym.sim.traffic.route import locate
 from dorothie_gym.sim.traffic.vehicle_models import move, slip_of
 from dorothie_gym.sim.traffic_rules import watch
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

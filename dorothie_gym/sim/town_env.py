@@ -25,10 +25,6 @@ from highway_env.vehicle.controller import ControlledVehicle
 from highway_env.vehicle.objects import Landmark
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_arrays as pn
-from dorothie_gym.action_values import real_numbers, whole_number
-from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import CachedViews, Restorable
 from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.model import Array
@@ -40,7 +36,11 @@ from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import CLEAR_OF_CAR
-from dorothie_gym.time_limit import TimeLimited, steps_until
+from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support.action_values import real_numbers, whole_number
+from dorothie_gym.support.compilation.records import plain
+from dorothie_gym.support.copying import CachedViews, Restorable
+from dorothie_gym.support.time_limit import TimeLimited, steps_until
 
 ROUNDS = 8
 """Largest number of rounds in which vehicles and pedestrians too close to the ego are placed again."""

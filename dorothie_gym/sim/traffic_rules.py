@@ -10,8 +10,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.network.lane_lookup import LOOKUP_CELL, closest_segment, coordinates, value_near
@@ -21,6 +19,8 @@ from dorothie_gym.sim.state.town_arrays import OFF_ROAD_MARGIN
 from dorothie_gym.sim.state.town_records import LaneRecord, StopLineRecord
 from dorothie_gym.sim.traffic.junctions import colour_at
 from dorothie_gym.sim.traffic.parameters import AT_LINE, TRAFFIC_STANDING
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -12,7 +12,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.sim.sensing.visibility import (
     CLOUDBURST,
@@ -23,6 +22,7 @@ from dorothie_gym.sim.sensing.visibility import (
     fog_extinction,
     rain_extinction,
 )
+from dorothie_gym.support import portable_math as pm
 
 WET_LOSS = 0.3
 """Share of the dry road's grip that a wet road lacks: measured coefficients are 0.8 to 1.0 dry and 0.7 to 0.8 wet

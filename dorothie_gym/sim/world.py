@@ -9,9 +9,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import direct
-from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import CachedViews, Restorable
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
@@ -37,6 +34,9 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
 from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
 from dorothie_gym.sim.weather import Weather, Wind
 from dorothie_gym.sim.world_start import OwnArrays, WorldSeeds, start_world
+from dorothie_gym.support.compilation import direct
+from dorothie_gym.support.compilation.records import plain
+from dorothie_gym.support.copying import CachedViews, Restorable
 
 _step_share = direct(step_share)
 

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dorothie_gym.compilation.records import plain
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.manoeuvres import BEGIN
 from dorothie_gym.sim.ego.planner import request_path
@@ -16,6 +15,7 @@ from dorothie_gym.sim.sensing.localizer import switch_on
 from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import empty_world, sow
+from dorothie_gym.support.compilation.records import plain
 
 POPULATION_SEEDS = 1 << 62
 """Upper bound of the seeds of populations."""

@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_arrays as pn
-from dorothie_gym import portable_math as pm
-from dorothie_gym.audio import SAMPLE_RATE, Samples
-from dorothie_gym.engine.cabin import CabinState, noise_levels
+from dorothie_gym.session.cabin import CabinState, noise_levels
+from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.audio import SAMPLE_RATE, Samples
 
 LONG_TERM_SLOPE: Final = -9.0
 """Slope of speech above 500 Hz [dB per octave], roughly that of Byrne et al., JASA 96, 1994."""

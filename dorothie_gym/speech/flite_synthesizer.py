@@ -13,9 +13,9 @@ from typing import Final
 
 import numpy as np
 
-from dorothie_gym.audio import LONGEST, Samples, checked_samples
 from dorothie_gym.errors import SpeechError, one_line
 from dorothie_gym.speech.synthesizer import check_request, check_script, chosen_voice
+from dorothie_gym.support.audio import LONGEST, Samples, checked_samples
 
 _TIMEOUT: Final = 30.0
 """Time that the program may take [s]; a sentence takes less than 0.1 s."""
@@ -67,7 +67,7 @@ class FliteSynthesizer:
 
 def _read_wav(content: bytes, wanted: int) -> Samples:
     """Returns the samples of a WAV file of 16 bits at a rate."""
-    from dorothie_gym.audio import resample
+    from dorothie_gym.support.audio import resample
 
     with wave.open(io.BytesIO(content)) as file:
         rate = file.getframerate()

@@ -11,10 +11,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from dorothie_gym.audio import Samples, trimmed
 from dorothie_gym.errors import SpeechError
-from dorothie_gym.optional_modules import speech_module
 from dorothie_gym.speech.synthesizer import check_request, check_script, chosen_voice
+from dorothie_gym.support.audio import Samples, trimmed
+from dorothie_gym.support.optional_modules import speech_module
 
 VOICE: Final = "heart"
 """The voice in the package. Its others would be downloaded and are not offered."""

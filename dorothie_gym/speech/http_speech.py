@@ -9,12 +9,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from dorothie_gym.audio import LONGEST, SAMPLE_RATE, Samples, checked_samples, encode_wav, resample
 from dorothie_gym.errors import SpeechError, one_line
-from dorothie_gym.optional_modules import speech_module
 from dorothie_gym.speech.recognizer import Recognition, RecognizedWord, single_hypothesis
 from dorothie_gym.speech.spoken_form import spoken_words
 from dorothie_gym.speech.synthesizer import check_request
+from dorothie_gym.support.audio import LONGEST, SAMPLE_RATE, Samples, checked_samples, encode_wav, resample
+from dorothie_gym.support.optional_modules import speech_module
 
 TIMEOUT: Final = 30.0
 """Time for an answer of the server [s]."""
@@ -154,7 +154,7 @@ def _transcription(body: bytes) -> Recognition:
 
 def parse_answer(body: bytes) -> dict[str, Any]:
     """Returns the JSON object of an answer; raises `SpeechError` if it is none."""
-    from dorothie_gym.input_files import parse_json
+    from dorothie_gym.support.input_files import parse_json
 
     try:
         answer = parse_json(body.decode("utf-8"), "the server's answer")

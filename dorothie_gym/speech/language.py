@@ -21,7 +21,7 @@ from dorothie_gym.speech.pronunciation import dictionary_text, pronunciations, r
 from dorothie_gym.speech.punctuation import PunctuationModel
 from dorothie_gym.speech.spoken_form import spoken_tokens, spoken_words
 from dorothie_gym.speech.trigrams import estimate
-from dorothie_gym.user_cache import cache_folder, read_signed, write_signed
+from dorothie_gym.support.user_cache import cache_folder, read_signed, write_signed
 
 TRANSCRIPT_WEIGHT: Final = 3.0
 """Weight of a transcript relative to a sentence of the grammar, whose frequencies are not those of talk."""

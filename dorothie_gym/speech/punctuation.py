@@ -13,9 +13,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.speech.spoken_form import PUNCTUATION
 from dorothie_gym.speech.trigrams import END, START, Trigrams, estimate
+from dorothie_gym.support import portable_math as pm
 
 _BETWEEN: Final = ("", ",", ".", "?")
 _BEHIND: Final = (".", "?")

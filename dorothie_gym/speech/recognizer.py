@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from dorothie_gym.audio import Samples
-from dorothie_gym.copying import shared
+from dorothie_gym.support.audio import Samples
+from dorothie_gym.support.copying import shared
 
 
 @shared

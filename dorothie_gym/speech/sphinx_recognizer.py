@@ -10,14 +10,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.audio import SAMPLE_RATE, Samples, checked_samples, resample, to_pcm
 from dorothie_gym.errors import SpeechError
-from dorothie_gym.optional_modules import speech_module
 from dorothie_gym.speech.hibari_synthesizer import hibari
 from dorothie_gym.speech.language import SpokenLanguage, load_language
 from dorothie_gym.speech.recognizer import Hypothesis, Recognition, RecognizedWord
 from dorothie_gym.speech.spoken_form import spoken_words
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.audio import SAMPLE_RATE, Samples, checked_samples, resample, to_pcm
+from dorothie_gym.support.optional_modules import speech_module
 
 FRAMES_PER_SECOND: Final = 100
 """Frames of the recogniser per second."""

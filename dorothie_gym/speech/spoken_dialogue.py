@@ -8,21 +8,21 @@ from typing import Final
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.audio import SAMPLE_RATE, Samples
-from dorothie_gym.copying import shared
 from dorothie_gym.dialogue.asr_channel import UNCLASSIFIED, OpenMoves
 from dorothie_gym.dialogue.conversation import SHORTEST_SPAN, Span, Utterance
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
-from dorothie_gym.engine.cabin import CabinState, signal_to_noise
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.session.cabin import CabinState, signal_to_noise
 from dorothie_gym.speech.backends import find_recognizer, find_synthesizer
 from dorothie_gym.speech.cabin_noise import cabin_noise, mixed
 from dorothie_gym.speech.recognizer import Recognition
 from dorothie_gym.speech.spoken_form import spoken_words
 from dorothie_gym.speech.spoken_understanding import audible, readable
 from dorothie_gym.speech.synthesizer import Voice, say
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.audio import SAMPLE_RATE, Samples
+from dorothie_gym.support.copying import shared
 
 VOICE_RATE: Final = 3.6
 """Speaking rate of the synthesised voice [words/s], by which the rate of a session is divided; measured on 150 spans of

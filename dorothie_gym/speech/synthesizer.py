@@ -9,9 +9,9 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from dorothie_gym.audio import Samples
-from dorothie_gym.copying import shared
 from dorothie_gym.errors import SpeechError, did_you_mean, short_repr
+from dorothie_gym.support.audio import Samples
+from dorothie_gym.support.copying import shared
 
 SLOWEST, FASTEST = 0.5, 2.0
 """Range of relative speaking rates; beyond it, synthesisers drop or smear sounds."""

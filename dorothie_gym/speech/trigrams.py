@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from dorothie_gym import portable_math as pm
+from dorothie_gym.support import portable_math as pm
 
 START, END = "<s>", "</s>"
 """Tokens before and behind each sentence."""

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from dorothie_gym.audio import SAMPLE_RATE, Samples, checked_samples, resample
 from dorothie_gym.errors import SpeechError
-from dorothie_gym.optional_modules import speech_module
 from dorothie_gym.speech.recognizer import Hypothesis, Recognition, RecognizedWord
 from dorothie_gym.speech.spoken_form import spoken_words
+from dorothie_gym.support.audio import SAMPLE_RATE, Samples, checked_samples, resample
+from dorothie_gym.support.optional_modules import speech_module
 
 WEIGHTS_FILE: Final = "model.bin"
 """File with the weights in a folder for faster-whisper (CTranslate2's format)."""

@@ -9,9 +9,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.errors import StoryboardError
 from dorothie_gym.ontology.slots import LandmarkName
+from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks.catalogue import LandmarkKind, catalogue, categories, find_kind, kinds_in, map_labels
 from dorothie_gym.tasks.storyboard import (
     Dependent,

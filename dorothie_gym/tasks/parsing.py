@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from dorothie_gym.errors import InputFileError, StoryboardError, did_you_mean
-from dorothie_gym.files import JsonValue
-from dorothie_gym.input_files import MAX_SMALL_JSON, parse_json, read_text
+from dorothie_gym.support.files import JsonValue
+from dorothie_gym.support.input_files import MAX_SMALL_JSON, parse_json, read_text
 from dorothie_gym.tasks.binding import cast, longest_values
 from dorothie_gym.tasks.catalogue import find_kind
 from dorothie_gym.tasks.storyboard import (

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Protocol
 
-from dorothie_gym.copying import shared
 from dorothie_gym.ontology.slots import LandmarkName
 from dorothie_gym.ontology.world_exceptions import ExceptionKind
+from dorothie_gym.support.copying import shared
 
 MESSAGE_LENGTH = 240
 """Greatest length of a message of the Ad-Wizard [characters]."""

@@ -7,19 +7,19 @@ import tempfile
 from pathlib import Path
 from typing import TypeVar
 
-from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.archive.comparison import first_difference
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.evaluation.rollout.replay import resimulate
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.lint import check_town as town_faults
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, Policy, policy_inputs
 from dorothie_gym.policies.policy_loader import make_policy
-from dorothie_gym.recording.comparison import first_difference
-from dorothie_gym.recording.session import Session
-from dorothie_gym.rollout.replay import resimulate
-from dorothie_gym.spaces.actions import ActionDict
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.spaces.actions import ActionDict
+from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 from dorothie_gym.testing.playing import first_unequal, play_scripted
 

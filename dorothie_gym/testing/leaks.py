@@ -8,18 +8,18 @@ from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from dorothie_gym.camera.scenery.landmarks import landmark_key
-from dorothie_gym.camera.session_camera import SessionCamera
-from dorothie_gym.camera.session_pictures import camera_of
-from dorothie_gym.camera.visibility import PERCEPTION_CAMERA
-from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.engine.pictures import FIELDS, OBSERVERS
-from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.spaces.actions import noop
+from dorothie_gym.pictures.camera.scenery.landmarks import landmark_key
+from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.session_pictures import camera_of
+from dorothie_gym.pictures.camera.visibility import PERCEPTION_CAMERA
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.pictures import FIELDS, OBSERVERS
+from dorothie_gym.session.scenario import Scenario, draw_scenario
+from dorothie_gym.session.spaces.actions import noop
 from dorothie_gym.tasks.storyboard import TaskMessages
 from dorothie_gym.testing.playing import (
     ByAgent,

@@ -8,10 +8,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.policies.policy_loader import make_policy
-from dorothie_gym.spaces.actions import ActionDict, ActionMapping
+from dorothie_gym.session.scenario import Scenario
+from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping
 
 ByAgent: TypeAlias = dict[str, ActionDict]
 """Observations, infos or actions of all agents."""

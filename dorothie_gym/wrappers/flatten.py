@@ -12,10 +12,10 @@ from gymnasium.core import ActType, ObsType
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from dorothie_gym.action_values import whole_numbers
-from dorothie_gym.spaces.actions import StepInfo
-from dorothie_gym.spaces.fields import AnySpace
-from dorothie_gym.spaces.flat import Flat, FlatActions, FlatMask, FlatObservations, Unflattened
+from dorothie_gym.session.spaces.actions import StepInfo
+from dorothie_gym.session.spaces.fields import AnySpace
+from dorothie_gym.session.spaces.flat import Flat, FlatActions, FlatMask, FlatObservations, Unflattened
+from dorothie_gym.support.action_values import whole_numbers
 
 AnyEnv: TypeAlias = gym.Env[Any, Any]
 """Environment whose spaces are not known statically."""

@@ -12,9 +12,9 @@ from pettingzoo import ParallelEnv
 
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.spaces.actions import ActionDict, StepInfo, noop
-from dorothie_gym.spaces.flat import Flat, FlatActions, FlatObservations
-from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.session.spaces.actions import ActionDict, StepInfo, noop
+from dorothie_gym.session.spaces.flat import Flat, FlatActions, FlatObservations
+from dorothie_gym.session.spaces.observations import Observation
 
 FlatVector: TypeAlias = NDArray[np.float32]
 

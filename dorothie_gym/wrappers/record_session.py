@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 from pettingzoo.utils import BaseParallelWrapper
 
-from dorothie_gym.engine.recorder import SessionRecorder
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from dorothie_gym.recording.events import Event
-from dorothie_gym.recording.header import SessionHeader
-from dorothie_gym.recording.writer import SessionWriter
-from dorothie_gym.spaces.actions import ActionDict, StepInfo
-from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.session.recorder import SessionRecorder
+from dorothie_gym.session.recording.events import Event
+from dorothie_gym.session.recording.header import SessionHeader
+from dorothie_gym.session.recording.writer import SessionWriter
+from dorothie_gym.session.spaces.actions import ActionDict, StepInfo
+from dorothie_gym.session.spaces.observations import Observation
 
 ResetResult: TypeAlias = tuple[dict[str, Observation], dict[str, StepInfo]]
 StepResult: TypeAlias = tuple[

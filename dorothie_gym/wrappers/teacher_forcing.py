@@ -10,7 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.engine.recorder import LightStates, actors_around
+from dorothie_gym.archive.prediction_points import Point, task_points
+from dorothie_gym.archive.visibility import Task
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.point_env import PointEnv
 from dorothie_gym.errors import SessionError, StateError
@@ -18,14 +19,13 @@ from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
 from dorothie_gym.policies.policy_loader import make_policy
-from dorothie_gym.recording.events import Event
-from dorothie_gym.recording.prediction_points import Point, task_points
-from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.surroundings import Rows, SceneTable, Surroundings, light_rows, weather_rows
-from dorothie_gym.recording.trajectory import trajectory_of
-from dorothie_gym.recording.visibility import Task
-from dorothie_gym.spaces.actions import StepInfo
-from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.session.recorder import LightStates, actors_around
+from dorothie_gym.session.recording.events import Event
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.recording.surroundings import Rows, SceneTable, Surroundings, light_rows, weather_rows
+from dorothie_gym.session.recording.trajectory import trajectory_of
+from dorothie_gym.session.spaces.actions import StepInfo
+from dorothie_gym.session.spaces.limits import SpaceLimits
 
 MAX_SILENT_SESSIONS = 20
 """Largest number of consecutive sessions without a point of the task before an error is raised."""
@@ -43,7 +43,7 @@ class TeacherForcing(PointEnv):
     and is rewarded for the agreement with the policy, whose action is executed. Every seed yields another session.
 
     ## Observation Space
-    `history_space` of the task, as in `dorothie_gym.benchmark.TeacherForcedEnv`: the history before the point.
+    `history_space` of the task, as in `UfN-v0`, `RfN-v0` and `NfD-v0`: the history before the point.
 
     ## Action Space
     UfN, RfN: `move` Discrete(15), `slots` MultiBinary(69). NfD: `action` Discrete(6), `angle` Discrete(360,

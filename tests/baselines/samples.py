@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 from dorothie_gym.baselines.model_io import Labels, join, tensor
-from dorothie_gym.benchmark.features import Batch, BatchSpec, TownGraph
+from dorothie_gym.evaluation.teacher_forced.features import Batch, BatchSpec, TownGraph
 
 TEXTS = 40
 

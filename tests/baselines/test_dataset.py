@@ -5,7 +5,7 @@ import pytest
 from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.encoders import text_encoder
 from dorothie_gym.errors import SessionError
-from tests.benchmark.corpora import corpus
+from tests.evaluation.teacher_forced.corpora import corpus
 
 
 def test_objects_of_the_camera_make_another_dataset_of_the_same_corpus(tmp_path: Path) -> None:

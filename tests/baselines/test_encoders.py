@@ -19,7 +19,7 @@ from dorothie_gym.baselines.encoders import (
 )
 from dorothie_gym.baselines.encoders.encoder import Vectors
 from dorothie_gym.errors import EncoderError
-from tests.cache_damage import DAMAGES
+from tests.support.cache_damage import DAMAGES
 
 SENTENCES = ("turn left at the market", "turn right at the market", "where is my house", "")
 

@@ -4,8 +4,8 @@ import pytest
 
 from dorothie_gym.baselines.model_zoo import ALL_ROWS, CAMERA_ROWS, FORMER_COMMANDS, ROWS, SIZES, find_row, stored_row
 from dorothie_gym.baselines.toto import ALL_CHANNELS, Channel
-from dorothie_gym.benchmark import paper_figures
-from dorothie_gym.benchmark.paper_comparison import COUNTERPARTS, paper_name
+from dorothie_gym.evaluation.teacher_forced import paper_figures
+from dorothie_gym.evaluation.teacher_forced.paper_comparison import COUNTERPARTS, paper_name
 
 
 def test_every_row_of_the_papers_table_has_one_counterpart():

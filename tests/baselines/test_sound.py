@@ -28,7 +28,7 @@ from dorothie_gym.baselines.model_zoo import find_row, make_model  # noqa: E402
 from dorothie_gym.baselines.toto import TOTOConfig  # noqa: E402
 from dorothie_gym.errors import EncoderError, SessionError  # noqa: E402
 from dorothie_gym.speech import find_synthesizer, say  # noqa: E402
-from tests.recording.spoken import spoken_session  # noqa: E402
+from tests.session.recording.spoken import spoken_session  # noqa: E402
 
 
 def tone(frequency: float, seconds: float = 1.0) -> NDArray[np.float32]:

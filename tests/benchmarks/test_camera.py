@@ -12,14 +12,14 @@ from benchmarks.camera import EVERYTHING, RGB, measure
 from benchmarks.commands import app
 from benchmarks.opengl_reference import opengl_reference
 from benchmarks.report import camera_report, draw
-from dorothie_gym.camera.pose import pose_on_car
-from dorothie_gym.camera.scene_cache import town_scene
-from dorothie_gym.camera.session_camera import SessionCamera
-from dorothie_gym.camera.town_scene import SessionScene
-from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import ObjectClass
+from dorothie_gym.pictures.camera.pose import pose_on_car
+from dorothie_gym.pictures.camera.scene_cache import town_scene
+from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.town_scene import SessionScene
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.session_engine import SessionEngine
 
 SMALL = ["--town", "brookside", "--vehicles", "3", "--pedestrians", "2", "--seconds", "2", "--repeats", "1"]
 ROW = {"width", "height", "outputs", "antialias", "milliseconds", "milliseconds_p99", "milliseconds_drive"}

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 pytest.importorskip("torch", reason="needs the extra 'baselines'")
 
 from benchmarks.commands import app
-from dorothie_gym.rollout import generate_corpus
+from dorothie_gym.evaluation.rollout import generate_corpus
 
 
 @pytest.mark.slow

@@ -13,8 +13,8 @@ from rapidfuzz.distance import Levenshtein
 
 from dorothie_gym.dialogue import AsrChannel, Loudness, WordClass, measured_errors, word_class
 from dorothie_gym.dialogue.recognition_errors import LOUD_BELOW, MODERATE_BELOW
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.ontology import Role
+from dorothie_gym.session.config import EnvConfig
 from tests.dialogue.test_asr_channel import SAID
 
 
@@ -76,7 +76,7 @@ def test_speakers_and_noise_change_the_error_rate_as_measured() -> None:
 
 def test_profile_is_written_by_its_script(tmp_path: Path) -> None:
     from benchmarks.recognition_errors import profile
-    from dorothie_gym.analysis.word_errors import WordErrorCounts, WordErrors
+    from dorothie_gym.evaluation.analysis.word_errors import WordErrorCounts, WordErrors
 
     counts = WordErrorCounts()
     counts.speakers[Role.PARTICIPANT] += WordErrors(words=5000, substitutions=200, deletions=100, insertions=100)

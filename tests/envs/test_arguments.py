@@ -11,8 +11,8 @@ from gymnasium.envs.registration import EnvSpec
 
 import dorothie_gym
 from dorothie_gym import CameraConfig, CameraOutput, EnvConfig, NavigationWeights, SpaceLimits, WorldConfig
-from tests.recording.builders import session
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import session
+from tests.session.recording.dialogues import talk
 
 
 @pytest.mark.parametrize(

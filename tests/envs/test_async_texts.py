@@ -10,10 +10,10 @@ import pytest
 from gymnasium.wrappers import FilterObservation, FrameStackObservation
 
 import dorothie_gym
-from dorothie_gym.recording import Task
+from dorothie_gym.archive import Task
 from tests.envs.test_gymnasium_api import IDS
-from tests.recording.builders import session
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import session
+from tests.session.recording.dialogues import talk
 
 TASKS = ("dorothie_gym/UfN-v0", "dorothie_gym/RfN-v0", "dorothie_gym/NfD-v0")
 STEPS = 24

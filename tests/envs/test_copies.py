@@ -11,17 +11,17 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.envs import duo_wizard_v0
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.errors import StateError
 from dorothie_gym.ontology import AGENT_ROLES, DialogueAct, DialogueMove, ExceptionKind, Sensor
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces import AdWizardAction, ParticipantAction, Speech, noop
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.sim.world import World
-from dorothie_gym.spaces import AdWizardAction, ParticipantAction, Speech, noop
-from tests.recording.builders import session
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import session
+from tests.session.recording.dialogues import talk
 
 CONFIG = EnvConfig(world=WorldConfig(vehicles=20, pedestrians=20), word_error_rate=0.2, max_seconds=600.0)
 

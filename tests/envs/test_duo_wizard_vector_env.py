@@ -15,15 +15,15 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 
-from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv
 from dorothie_gym.ontology import AGENT_ROLES, ExceptionKind, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.spaces import noop
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.spaces import noop
 from tests.envs.test_navigation_vector_env import check_equal
 
 AGENTS = [str(role) for role in AGENT_ROLES]
@@ -301,7 +301,7 @@ import hashlib
 from dorothie_gym import DuoWizardVectorEnv, EnvConfig
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.spaces import noop
+from dorothie_gym.session.spaces import noop
 env = DuoWizardVectorEnv(2, threads=1, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=2)))
 idle = {str(role): noop(role, env.limits) for role in AGENT_ROLES}
 observations, infos = env.reset(seed=3)

@@ -7,8 +7,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import dorothie_gym
-from tests.recording.builders import session
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import session
+from tests.session.recording.dialogues import talk
 
 IDS = sorted(name for name in gym.registry if name.startswith("dorothie_gym/"))
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.sim.config import WorldConfig
 from tests.envs.sessions_played import digest, play_at_random, play_by_script
 

@@ -13,8 +13,8 @@ from gymnasium.vector import AutoresetMode
 
 import dorothie_gym
 from dorothie_gym import DuoWizardEnv, DuoWizardVectorEnv, EnvConfig, IdenticalSpaces, TeacherForcing
-from tests.recording.builders import session
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import session
+from tests.session.recording.dialogues import talk
 
 Info = Mapping[str, Any]
 

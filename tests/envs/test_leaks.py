@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.scenario import draw_scenario
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import ExceptionKind, Role
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.scenario import draw_scenario
+from dorothie_gym.session.spaces import AdWizardAction, SubgoalColumn, noop
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.spaces import AdWizardAction, SubgoalColumn, noop
 from dorothie_gym.tasks import with_reason
 from dorothie_gym.testing.leaks import with_hidden_landmarks_moved, with_other_tasks
 from dorothie_gym.testing.playing import play_again

@@ -19,8 +19,8 @@ from gymnasium.error import ResetNeeded
 
 import dorothie_gym
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
-from tests.recording.builders import session
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import session
+from tests.session.recording.dialogues import talk
 
 SEED = int(os.environ.get("DOROTHIE_GYM_FUZZ_SEED", "17"))
 

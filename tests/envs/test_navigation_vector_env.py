@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from dorothie_gym.engine.observations import LazyObservations
 from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
 from dorothie_gym.envs.navigation_continuous_vector_env import NavigationContinuousVectorEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
@@ -19,8 +18,9 @@ from dorothie_gym.ontology import Role
 from dorothie_gym.policies.ad_wizard import AdWizardState, ScriptedAdWizard
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY
 from dorothie_gym.policies.policy import policy_seed
+from dorothie_gym.session.observations import LazyObservations
+from dorothie_gym.session.spaces import AdWizardAction, Observation, SpaceLimits
 from dorothie_gym.sim.state.codes import Walk
-from dorothie_gym.spaces import AdWizardAction, Observation, SpaceLimits
 from tests.envs.navigation_drivers import drive, obey
 from tests.malformed.memory import peak_memory
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dorothie_gym import IdenticalSpaces
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs import duo_wizard_v0
+from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.sim.config import WorldConfig
 
 with warnings.catch_warnings():

@@ -17,15 +17,15 @@ import pettingzoo
 import pytest
 
 from dorothie_gym import DuoWizardEnv, DuoWizardVectorEnv, load_town
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import StateError
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES
-from dorothie_gym.spaces import noop
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces import noop
 from tests.envs.test_copies import Player, assert_equal
-from tests.recording.builders import session
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import session
+from tests.session.recording.dialogues import talk
 
 
 @pytest.fixture(scope="module")
@@ -209,7 +209,7 @@ import hashlib, pickle, sys
 import numpy as np
 from dorothie_gym import DuoWizardEnv
 from dorothie_gym.ontology import AGENT_ROLES
-from dorothie_gym.spaces import noop
+from dorothie_gym.session.spaces import noop
 state = pickle.load(sys.stdin.buffer)
 env = DuoWizardEnv("brookside")
 env.reset(seed=1)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 import dorothie_gym
 from dorothie_gym import EnvConfig, WorldConfig, make_policy
-from dorothie_gym.engine.camera_config import CameraConfig, CameraMount
-from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.ontology import DialogueAct, DialogueMove, Role
-from dorothie_gym.rendering import palette
-from dorothie_gym.rendering.palette import Colour
-from dorothie_gym.spaces import ParticipantAction, Speech, noop
+from dorothie_gym.pictures import palette
+from dorothie_gym.pictures.palette import Colour
+from dorothie_gym.session.camera_config import CameraConfig, CameraMount
+from dorothie_gym.session.scenario import Scenario, draw_scenario
+from dorothie_gym.session.spaces import ParticipantAction, Speech, noop
 from dorothie_gym.testing.leaks import with_hidden_landmarks_moved, with_other_tasks
 
 CONFIG = EnvConfig(world=WorldConfig(vehicles=4, pedestrians=2))
@@ -92,7 +92,7 @@ def test_the_three_roles_see_different_pictures_of_one_session() -> None:
 
 
 def test_participant_sees_its_tasks_and_the_co_wizard_has_none() -> None:
-    from dorothie_gym.rendering.role_scene import RoleView
+    from dorothie_gym.pictures.views.role_scene import RoleView
 
     env = pettingzoo.make("parallel", "dorothie_gym/DuoWizard-v0")
     observations, _ = env.reset(seed=7)
@@ -140,7 +140,7 @@ def test_declared_frame_rate_is_that_of_the_decisions(name: str, arguments: dict
 
 
 def test_window_is_paced_at_the_frame_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    from dorothie_gym.rendering import frames
+    from dorothie_gym.pictures.views import frames
 
     rates = []
     monkeypatch.setattr(frames.HumanWindow, "show", lambda self, frame, rate=0.0: rates.append(rate))

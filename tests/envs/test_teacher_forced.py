@@ -13,17 +13,17 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
+from dorothie_gym.archive import Corpus
 from dorothie_gym.envs.nfd_v0 import NfDEnv
 from dorothie_gym.envs.rfn_v0 import RfNEnv
 from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
 from dorothie_gym.envs.ufn_v0 import UfNEnv
 from dorothie_gym.errors import SessionError
 from dorothie_gym.ontology import DialogueMove, PhysicalAction, Role
-from dorothie_gym.recording import Corpus
-from dorothie_gym.spaces import NO_MOVE, LandmarkColumn, SpaceLimits
-from tests.recording.builders import physical, session, utterance, write
-from tests.recording.dialogues import DONE, OKAY, STREET, TO_KFC, talk
-from tests.recording.sdn.builders import hub, release, sample
+from dorothie_gym.session.spaces import NO_MOVE, LandmarkColumn, SpaceLimits
+from tests.archive.sdn.builders import hub, release, sample
+from tests.session.recording.builders import physical, session, utterance, write
+from tests.session.recording.dialogues import DONE, OKAY, STREET, TO_KFC, talk
 
 ENVS = [UfNEnv, RfNEnv, NfDEnv]
 
@@ -244,9 +244,9 @@ def test_error_names_wrong_argument() -> None:
 
 def test_the_default_corpus_is_the_cached_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path / "cached", talk())
-    corpus = types.ModuleType("dorothie_gym.rollout.corpus_cache")
+    corpus = types.ModuleType("dorothie_gym.evaluation.rollout.corpus_cache")
     corpus.default_corpus = lambda: tmp_path  # type: ignore[attr-defined]  # an attribute of an empty module
-    monkeypatch.setitem(sys.modules, "dorothie_gym.rollout.corpus_cache", corpus)
+    monkeypatch.setitem(sys.modules, "dorothie_gym.evaluation.rollout.corpus_cache", corpus)
     assert UfNEnv().reset(seed=0)[1]["session"] == "cached"
     assert gym.make("dorothie_gym/UfN-v0", corpus="default").reset(seed=0)[1]["session"] == "cached"
 

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.archive import Corpus
+from dorothie_gym.evaluation.rollout import play_session
+from dorothie_gym.evaluation.rollout.minari_export import MINARI_FOLDER, export_minari
+from dorothie_gym.evaluation.rollout.role_episodes import role_episodes
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.recording import Corpus
-from dorothie_gym.rollout import play_session
-from dorothie_gym.rollout.minari_export import MINARI_FOLDER, export_minari
-from dorothie_gym.rollout.role_episodes import role_episodes
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
 
 PAGE = Path(__file__).parents[2] / "docs" / "integrations.md"
 LIBRARIES = {"SuperSuit": "supersuit", "RLlib": "ray.rllib", "TorchRL": "torchrl", "BenchMARL": "benchmarl"}

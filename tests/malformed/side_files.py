@@ -8,10 +8,10 @@ from pathlib import Path
 
 
 def make_annotations(folder: Path) -> None:
-    from dorothie_gym.annotation.formats import Format, export_annotation
-    from dorothie_gym.annotation.links import keep_links
-    from dorothie_gym.annotation.workplace import Seat, SeatKind
-    from tests.annotation.builders import annotate, random_annotation, recorded
+    from dorothie_gym.lab.annotation.formats import Format, export_annotation
+    from dorothie_gym.lab.annotation.links import keep_links
+    from dorothie_gym.lab.annotation.workplace import Seat, SeatKind
+    from tests.lab.annotation.builders import annotate, random_annotation, recorded
 
     one, text = recorded(folder / "one")
     for seed, name in enumerate(("anna", "ben", "adjudicated")):
@@ -22,11 +22,12 @@ def make_annotations(folder: Path) -> None:
 
 
 def read_annotations(folder: Path) -> None:
-    from dorothie_gym.annotation.corpus_agreement import corpus_agreement
-    from dorothie_gym.annotation.formats import import_annotation
-    from dorothie_gym.annotation.links import read_links
+    from dorothie_gym.archive import Corpus
     from dorothie_gym.errors import DorothieGymError
-    from dorothie_gym.recording import Corpus, Session
+    from dorothie_gym.lab.annotation.corpus_agreement import corpus_agreement
+    from dorothie_gym.lab.annotation.formats import import_annotation
+    from dorothie_gym.lab.annotation.links import read_links
+    from dorothie_gym.session.recording import Session
 
     refusals: list[DorothieGymError] = []
     session = None
@@ -62,8 +63,8 @@ def make_cassette(folder: Path) -> None:
 
 
 def read_cassette(folder: Path) -> None:
+    from dorothie_gym.evaluation.closed_loop.usage import read_usage
     from dorothie_gym.policies.language_model.cassette import Cassette
-    from dorothie_gym.rollout.closed_loop.usage import read_usage
 
     Cassette(folder / "tape.jsonl").find({"model": "m", "seed": 1})
     read_usage(folder)
@@ -72,13 +73,13 @@ def read_cassette(folder: Path) -> None:
 def make_study(folder: Path) -> None:
     from importlib.resources import files
 
-    example = files("dorothie_gym.studies") / "data" / "example.yaml"
+    example = files("dorothie_gym.lab.studies") / "data" / "example.yaml"
     (folder / "study.yaml").write_text(example.read_text(encoding="utf-8"), encoding="utf-8")
 
 
 def read_study(folder: Path) -> None:
-    from dorothie_gym.studies.assignment import Assigner
-    from dorothie_gym.studies.study_file import check_sources, read_study
+    from dorothie_gym.lab.studies.assignment import Assigner
+    from dorothie_gym.lab.studies.study_file import check_sources, read_study
 
     file = folder / "study.yaml"
     study = read_study(file)

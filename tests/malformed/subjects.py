@@ -24,8 +24,8 @@ from tests.malformed.side_files import (
 )
 from tests.maps import opendrive_text as xodr
 from tests.maps.yaml_text import MIDTOWN
-from tests.recording.builders import write
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import write
+from tests.session.recording.dialogues import talk
 
 if TYPE_CHECKING:
     from dorothie_gym.baselines.rl import Training
@@ -50,27 +50,27 @@ class Subject:
 
 
 def _release(folder: Path) -> None:
-    from tests.recording.sdn.builders import release
+    from tests.archive.sdn.builders import release
 
     release(folder / "one")
 
 
 def _sample(folder: Path) -> None:
-    from tests.recording.sdn.builders import sample
+    from tests.archive.sdn.builders import sample
 
     sample(folder / "one")
 
 
 def _hub(folder: Path) -> None:
-    from tests.recording.sdn.builders import hub
+    from tests.archive.sdn.builders import hub
 
     hub(folder / "one")
 
 
 def _native(folder: Path) -> None:
     from dorothie_gym.ontology import Role
-    from dorothie_gym.recording import SeatEvent, SeatEventKind, SeatLogWriter
-    from tests.recording.test_scene import record
+    from dorothie_gym.session.recording import SeatEvent, SeatEventKind, SeatLogWriter
+    from tests.session.recording.test_scene import record
 
     write(folder / "one", talk(), config={"world": {"vehicles": 3}, "rewards": {"time": -0.1}, "max_seconds": 60.0})
     record(folder / "two", finish=True)
@@ -80,11 +80,12 @@ def _native(folder: Path) -> None:
 
 
 def _read_sessions(folder: Path) -> None:
-    from dorothie_gym.analysis.transcript import transcript_lines
-    from dorothie_gym.benchmark import labels_of
-    from dorothie_gym.benchmark.features import columns_of
+    from dorothie_gym.archive import Corpus
     from dorothie_gym.errors import DorothieGymError
-    from dorothie_gym.recording import Corpus, Session, read_seat_log
+    from dorothie_gym.evaluation.analysis.transcript import transcript_lines
+    from dorothie_gym.evaluation.teacher_forced import labels_of
+    from dorothie_gym.evaluation.teacher_forced.features import columns_of
+    from dorothie_gym.session.recording import Session, read_seat_log
 
     labels_of(folder, "all")
     for entry in Corpus.load(folder).entries:
@@ -103,8 +104,8 @@ def _read_sessions(folder: Path) -> None:
 
 def _replay_config(session: object) -> None:
     from dorothie_gym.errors import SessionError
-    from dorothie_gym.recording import Session
-    from dorothie_gym.rollout.replay import config_of
+    from dorothie_gym.evaluation.rollout.replay import config_of
+    from dorothie_gym.session.recording import Session
 
     assert isinstance(session, Session)
     try:
@@ -114,14 +115,14 @@ def _replay_config(session: object) -> None:
 
 
 def _corpus(folder: Path) -> None:
-    from dorothie_gym.recording import Corpus
-    from tests.benchmark.corpora import corpus
+    from dorothie_gym.archive import Corpus
+    from tests.evaluation.teacher_forced.corpora import corpus
 
     Corpus.load(corpus(folder / "corpus", ("train", "test/seen"))).write_manifest()
 
 
 def _read_corpus(folder: Path) -> None:
-    from dorothie_gym.recording import Corpus
+    from dorothie_gym.archive import Corpus
 
     corpus = Corpus.load(folder / "corpus")
     corpus.verify()
@@ -130,15 +131,15 @@ def _read_corpus(folder: Path) -> None:
 
 
 def _predictions(folder: Path) -> None:
-    from dorothie_gym.benchmark import labels_of, write_predictions
-    from tests.benchmark.corpora import corpus, oracle
+    from dorothie_gym.evaluation.teacher_forced import labels_of, write_predictions
+    from tests.evaluation.teacher_forced.corpora import corpus, oracle
 
     labels = labels_of(corpus(folder / ".corpus", ("test/seen",)), "all")
     write_predictions(folder / "p.parquet", oracle(labels), about={"encoder": "hashing", "sizes": [1, 2]})
 
 
 def _read_predictions(folder: Path) -> None:
-    from dorothie_gym.benchmark import evaluate_predictions, labels_of, read_about, read_predictions
+    from dorothie_gym.evaluation.teacher_forced import evaluate_predictions, labels_of, read_about, read_predictions
 
     path = folder / "p.parquet"
     about = {str(path): read_about(path)}
@@ -210,12 +211,12 @@ def _read_storyboard(folder: Path) -> None:
 
 def _rollout(folder: Path) -> None:
     from dorothie_gym import __version__
+    from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutRow, RolloutSettings
+    from dorothie_gym.evaluation.closed_loop.session_record import MetException
     from dorothie_gym.ontology import ExceptionKind, Role
     from dorothie_gym.policies import ALL_SCRIPTED, Player
-    from dorothie_gym.recording import FORMAT_VERSION
-    from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutRow, RolloutSettings
-    from dorothie_gym.rollout.closed_loop.session_record import MetException
-    from tests.rollout.closed_loop.drives import record
+    from dorothie_gym.session.recording import FORMAT_VERSION
+    from tests.evaluation.closed_loop.drives import record
 
     player = Player(name="ppo", training={"steps": 50_000, "seconds": 1200.0})
     made = RolloutSettings(cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, sessions=3)
@@ -235,9 +236,9 @@ def _rollout(folder: Path) -> None:
 def _read_rollout(folder: Path) -> None:
     from rich.console import Console
 
-    from dorothie_gym.rollout.closed_loop.leaderboard import leaderboard_page, read_entries
-    from dorothie_gym.rollout.closed_loop.results import print_result
-    from dorothie_gym.rollout.folder import locked_folder
+    from dorothie_gym.evaluation.closed_loop.leaderboard import leaderboard_page, read_entries
+    from dorothie_gym.evaluation.closed_loop.results import print_result
+    from dorothie_gym.evaluation.rollout.folder import locked_folder
 
     entries = read_entries([folder])
     leaderboard_page(entries)
@@ -348,7 +349,7 @@ def _benchmark_model(folder: Path) -> None:
 def _read_models(role: str, folder: Path) -> None:
     from dorothie_gym.ontology import Role
     from dorothie_gym.policies import find_player
-    from dorothie_gym.spaces import SpaceLimits
+    from dorothie_gym.session.spaces import SpaceLimits
 
     for path in sorted(folder.iterdir()):
         find_player(str(path), Role(role)).make(Role(role), SpaceLimits())
@@ -363,11 +364,11 @@ _read_co_wizards, _read_participants, _read_ad_wizards = (
 
 
 def _cache(folder: Path) -> None:
-    from dorothie_gym.benchmark.features import columns_of
-    from dorothie_gym.benchmark.features.corpus_columns import write_columns
+    from dorothie_gym.evaluation.teacher_forced.features import columns_of
+    from dorothie_gym.evaluation.teacher_forced.features.corpus_columns import write_columns
     from dorothie_gym.maps import load_town
     from dorothie_gym.maps.cache import pack
-    from tests.recording.test_scene import record
+    from tests.session.recording.test_scene import record
 
     with np.load(io.BytesIO(pack(load_town("brookside"), "key"))) as archive:
         (folder / "document.json").write_bytes(archive["document"].tobytes())
@@ -381,10 +382,10 @@ def _cache(folder: Path) -> None:
 def _read_cache(folder: Path) -> None:
     import hashlib
 
-    from dorothie_gym.benchmark.features import points
-    from dorothie_gym.benchmark.features.corpus_columns import read_columns
+    from dorothie_gym.archive import Task
     from dorothie_gym.errors import DorothieGymError
-    from dorothie_gym.recording import Task
+    from dorothie_gym.evaluation.teacher_forced.features import points
+    from dorothie_gym.evaluation.teacher_forced.features.corpus_columns import read_columns
 
     try:
         _unpack(folder)
@@ -432,14 +433,14 @@ def _unpack(folder: Path) -> None:
 
 
 def _audio(folder: Path) -> None:
-    from dorothie_gym.audio import encode_flac
+    from dorothie_gym.support.audio import encode_flac
 
     tone = np.sin(np.arange(4000) * 0.2).astype(np.float32)
     (folder / "speech.flac").write_bytes(encode_flac(tone))
 
 
 def _read_audio(folder: Path) -> None:
-    from dorothie_gym.audio import read_audio
+    from dorothie_gym.support.audio import read_audio
 
     read_audio(folder / "speech.flac")
 

@@ -20,12 +20,12 @@ from typer.testing import CliRunner
 
 from dorothie_gym.cli.app import app
 from dorothie_gym.ontology import Role
-from tests.benchmark.corpora import corpus
+from tests.evaluation.teacher_forced.corpora import corpus
 from tests.malformed.memory import peak_memory
 from tests.malformed.mutation import mutate_folder
 from tests.malformed.subjects import SUBJECTS
-from tests.recording.builders import utterance, write
-from tests.recording.dialogues import TO_KFC, talk
+from tests.session.recording.builders import utterance, write
+from tests.session.recording.dialogues import TO_KFC, talk
 
 DEPTH = "[" * 100_000
 LONG = "9" * 5000
@@ -115,7 +115,7 @@ def test_small_file_of_predictions_cannot_stand_for_gigabytes(column: str, tmp_p
     pq.write_table(table, tmp_path / "p.parquet", compression="zstd", dictionary_pagesize_limit=2**30)
     assert (tmp_path / "p.parquet").stat().st_size < 1_000_000
     script = (
-        "import sys; from pathlib import Path; from dorothie_gym.benchmark import read_predictions\n"
+        "import sys; from pathlib import Path; from dorothie_gym.evaluation.teacher_forced import read_predictions\n"
         "from tests.malformed.memory import peak_memory\n"
         "try:\n    read_predictions(Path(sys.argv[1]))\nexcept ValueError as error:\n    print(error)\n"
         "print(peak_memory())"
@@ -144,8 +144,8 @@ def test_twenty_thousand_moves_in_one_exchange_are_refused_at_once(tmp_path: Pat
     ],
 )  # fmt: skip
 def test_replay_refuses_a_config_of_wrong_types(config: dict[str, Any], tmp_path: Path) -> None:
-    from dorothie_gym.recording import Decision, Session
-    from tests.recording.builders import session
+    from dorothie_gym.session.recording import Decision, Session
+    from tests.session.recording.builders import session
 
     made = session(talk(), town="brookside", config=config)
     with_decisions = Session(**{**vars(made), "decisions": (Decision(frame=15, actions={}),)})
@@ -209,7 +209,7 @@ def test_model_folder_cannot_ask_for_absurd_networks(fields: dict[str, Any], nam
 
 
 def test_repeated_column_of_an_sdn_trajectory_is_refused(tmp_path: Path) -> None:
-    from tests.recording.sdn.builders import release
+    from tests.archive.sdn.builders import release
 
     path = release(tmp_path / "corpus/one") / "trajectory.csv"
     header, *rows = path.read_text().splitlines()

@@ -13,7 +13,7 @@ from dorothie_gym.maps import Town, load_town
 from dorothie_gym.maps import cache as cache_module
 from dorothie_gym.maps.cache import compiler_digest, through_cache
 from dorothie_gym.maps.yaml import read_yaml_town
-from dorothie_gym.user_cache import CACHE_VARIABLE
+from dorothie_gym.support.user_cache import CACHE_VARIABLE
 
 from .same_town import town_bits
 
@@ -110,7 +110,7 @@ def test_the_compiler_s_digest_covers_all_of_our_modules_that_compile() -> None:
     loaded = json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout)
     names = ["_registration", "_startup", "_version", "copying", "errors", "files", "input_files", "user_cache"]
     without_effect = {f"dorothie_gym.{name}" for name in names}
-    covered = ("dorothie_gym.maps", "dorothie_gym.compilation")
+    covered = ("dorothie_gym.maps", "dorothie_gym.support.compilation")
     others = {m for m in loaded if not m.startswith(covered)} - without_effect
     assert others == {f"dorothie_gym.{name}" for name in ("angles", "portable_arrays", "portable_math")}
 

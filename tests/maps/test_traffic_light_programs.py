@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps import Lane, LinkType, Town, load_town
 from dorothie_gym.maps.model import Signal, SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
@@ -27,6 +26,7 @@ from dorothie_gym.maps.traffic_light_programs import (
     yellow_time,
 )
 from dorothie_gym.maps.traffic_lights import LightColour, LightPhase, LightProgramme
+from dorothie_gym.support.angles import wrap_degrees
 from tests.maps.crossings import LIGHT, STOP, Arm, Crossing, meeting, town_of
 from tests.maps.opendrive_text import shared_map
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import LinkType, SignalKind
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.yaml import read_yaml_town, schema
+from dorothie_gym.support.angles import wrap_degrees
 
 VILLAGE = """\
 name: village

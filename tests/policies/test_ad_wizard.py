@@ -5,15 +5,15 @@ import pytest
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import ExceptionKind, Role
 from dorothie_gym.policies import ScriptedAdWizard, Trick
 from dorothie_gym.policies.ad_wizard import idle_until
 from dorothie_gym.policies.task_exceptions import task_message
-from dorothie_gym.recording import EventType, Session
-from dorothie_gym.spaces import AdWizardAction, SpaceLimits, noop, plain_text
-from dorothie_gym.spaces.limits import MESSAGE_LENGTH
+from dorothie_gym.session.recording import EventType, Session
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces import AdWizardAction, SpaceLimits, noop, plain_text
+from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH
 from dorothie_gym.tasks import TaskState, bind, load_template, parse_template, template_names
 from tests.policies.walk import play
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from dorothie_gym.dialogue import Direction, Wording, word_act
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import (
     ActionValue,
@@ -18,8 +17,9 @@ from dorothie_gym.ontology import (
 )
 from dorothie_gym.policies import ScriptedCoWizard
 from dorothie_gym.policies.co_wizard.state import Wish
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.spaces import NO_MOVE, CoWizardAction, ParticipantAction, Speech, noop
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces import NO_MOVE, CoWizardAction, ParticipantAction, Speech, noop
 
 
 class Talk:

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from dorothie_gym.analysis.truth_checks.session_world import SessionWorld
-from dorothie_gym.analysis.truth_checks.truth import is_true
 from dorothie_gym.dialogue import Direction, Predicate, Proposition
+from dorothie_gym.evaluation.analysis.truth_checks.session_world import SessionWorld
+from dorothie_gym.evaluation.analysis.truth_checks.truth import is_true
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.ontology import LandmarkName, Role, StreetName
-from dorothie_gym.recording.header import LandmarkRow
-from tests.benchmark.features.played import play
+from dorothie_gym.session.recording.header import LandmarkRow
+from tests.evaluation.teacher_forced.features.played import play
 
 P = Predicate
 ABOUT_PLACES = (P.LOCATED, P.NEAR, P.LOOKS)

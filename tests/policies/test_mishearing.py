@@ -20,7 +20,7 @@ from dorothie_gym.policies.co_wizard.repairs import check_goal, expects_stop, no
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.participant.replies import listen
 from dorothie_gym.policies.speech import IN_A_ROW, remark
-from dorothie_gym.spaces import Speech
+from dorothie_gym.session.spaces import Speech
 from tests.policies.said import with_words
 from tests.policies.test_co_wizard import Talk
 from tests.policies.test_repairs import Human

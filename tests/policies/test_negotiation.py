@@ -7,7 +7,7 @@ from dorothie_gym.maps.routing import router
 from dorothie_gym.ontology import DialogueAct, DialogueMove, GoalStatus, LandmarkName, Slot, StreetName
 from dorothie_gym.policies.co_wizard.state import CoWizardState
 from dorothie_gym.policies.route_progress import first_new_street
-from dorothie_gym.spaces import Speech
+from dorothie_gym.session.spaces import Speech
 from tests.policies.test_co_wizard import Talk
 from tests.policies.test_repairs import Human
 

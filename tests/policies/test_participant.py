@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology import ActionValue, Role, Slot
 from dorothie_gym.policies import ScriptedParticipant
 from dorothie_gym.policies.participant.config import ParticipantStyle
-from dorothie_gym.spaces import ParticipantAction
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.spaces import ParticipantAction
 from tests.policies.walk import play
 
 BY_GOALS = ParticipantStyle(guides=0.0, names_goal=1.0, names_street=0.5, hurries=1.0, patience=10.0, chat=1e4)

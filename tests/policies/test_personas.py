@@ -16,7 +16,7 @@ from dorothie_gym.policies.mood import HALF_LIFE, Happening, Mood
 from dorothie_gym.policies.participant.config import ParticipantStyle
 from dorothie_gym.policies.persona import SHARES, Directions, Driving, Persona, parse_traits
 from dorothie_gym.policies.speech import SpeechState, remark
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.session.spaces import SpaceLimits
 from tests.policies.test_repairs import Human
 
 SEEDS = range(400)

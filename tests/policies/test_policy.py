@@ -4,7 +4,7 @@ import pytest
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import POLICY_NAMES, make_policy
-from dorothie_gym.spaces import SpaceLimits, action_space, decode_action, noop, observation_space
+from dorothie_gym.session.spaces import SpaceLimits, action_space, decode_action, noop, observation_space
 
 ROLES = (Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD)
 LIMITS = SpaceLimits()

@@ -17,7 +17,7 @@ from dorothie_gym.policies import (
     policy_loader,
     register_loader,
 )
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.session.spaces import SpaceLimits
 
 LIMITS = SpaceLimits()
 

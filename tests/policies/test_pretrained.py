@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from dorothie_gym.analysis.intervals import wilson_interval
 from dorothie_gym.cli import app
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import PolicyLoadError
+from dorothie_gym.evaluation.analysis.intervals import wilson_interval
+from dorothie_gym.evaluation.closed_loop import RolloutResult, RolloutSettings, roll_out
 from dorothie_gym.maps.catalogue import SEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import (
@@ -28,8 +28,8 @@ from dorothie_gym.policies import (
     pretrained_names,
 )
 from dorothie_gym.policies.pretrained import names_for
-from dorothie_gym.rollout.closed_loop import RolloutResult, RolloutSettings, roll_out
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.spaces import SpaceLimits
 
 LIMIT = 10_000_000
 """Largest size of all shipped models [bytes]."""

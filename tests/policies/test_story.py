@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.analysis.truth_checks.checks import mentions_story
 from dorothie_gym.dialogue import Predicate
+from dorothie_gym.evaluation.analysis.truth_checks.checks import mentions_story
 from dorothie_gym.ontology import DialogueMove, Role
-from dorothie_gym.recording import Session
+from dorothie_gym.session.recording import Session
 from dorothie_gym.tasks.purposes import read_purpose
-from tests.analysis.builders import M, drive, human
-from tests.benchmark.features.played import play
+from tests.evaluation.analysis.builders import M, drive, human
+from tests.evaluation.teacher_forced.features.played import play
 
 
 @pytest.fixture(scope="module")

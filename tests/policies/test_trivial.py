@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role
 from dorothie_gym.policies import LaneFollowPolicy, make_policy
-from dorothie_gym.rollout import play_session
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.spaces import ExitColumn, SpaceLimits, decode_action
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces import ExitColumn, SpaceLimits, decode_action
 
 
 def decide(motion: Motion, *angles: float) -> Any:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import Policy, make_policy
-from dorothie_gym.recording import Event
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording import Event
 
 
 @dataclass

@@ -16,9 +16,9 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from dorothie_gym.cli import app
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.rollout import generate_corpus
-from dorothie_gym.rollout.closed_loop.submission import LeaderboardProtocol, check_submission
+from dorothie_gym.evaluation.closed_loop.submission import LeaderboardProtocol, check_submission
+from dorothie_gym.evaluation.rollout import generate_corpus
+from dorothie_gym.session.config import EnvConfig
 from tests.portability.parts import Values, group, table_content, without_versions
 
 WIDTH = "100"

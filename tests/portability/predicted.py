@@ -12,7 +12,7 @@ from dorothie_gym.baselines.dataset import TEST, Dataset
 from dorothie_gym.baselines.experiment import Experiment, task_predictions
 from dorothie_gym.baselines.model_zoo import build_model
 from dorothie_gym.baselines.trainer import predict
-from dorothie_gym.benchmark import write_predictions
+from dorothie_gym.evaluation.teacher_forced import write_predictions
 from dorothie_gym.policies.pretrained import pretrained_folder
 
 

@@ -13,20 +13,21 @@ import gymnasium as gym
 import numpy as np
 
 from dorothie_gym import make_policy
-from dorothie_gym.engine.camera_config import CameraConfig
-from dorothie_gym.engine.channel_kind import ChannelKind
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.archive import Corpus, first_difference
 from dorothie_gym.envs.duo_wizard_vector_env import DuoWizardVectorEnv
+from dorothie_gym.evaluation.rollout import play_session, resimulate
+from dorothie_gym.evaluation.rollout.role_episodes import role_episodes
 from dorothie_gym.maps import Town, load_town, town_names
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies.pretrained import pretrained_card, pretrained_names
-from dorothie_gym.recording import Corpus, Session, first_difference
-from dorothie_gym.recording.file_names import AUDIO_FOLDER
-from dorothie_gym.rollout import play_session, resimulate
-from dorothie_gym.rollout.role_episodes import role_episodes
-from tests.console.people import Table
+from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.channel_kind import ChannelKind
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.recording import Session
+from dorothie_gym.session.recording.file_names import AUDIO_FOLDER
+from dorothie_gym.session.session_engine import SessionEngine
+from tests.lab.console.people import Table
 from tests.maps.opendrive_text import MAPS
 from tests.maps.yaml_text import MIDTOWN, written
 from tests.portability.curved_map import curved_map

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy._core._multiarray_umath as numpy_features  # not public: numpy has no other list of its routines
 import pytest
 
-from dorothie_gym.compilation import compiled_folder
-from dorothie_gym.user_cache import CACHE_VARIABLE
+from dorothie_gym.support.compilation import compiled_folder
+from dorothie_gym.support.user_cache import CACHE_VARIABLE
 from tests.portability.digests import frozen
 from tests.portability.parts import part_names
 

@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import SignalKind
 from dorothie_gym.maps.right_of_way import right_of_way
@@ -25,6 +24,7 @@ from dorothie_gym.sim.state.world_arrays import WorldArrays, grown
 from dorothie_gym.sim.step import update_lane
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.world import World
+from dorothie_gym.support.compilation.records import RecordArray
 from tests.sim.crossings import ARMS, across, crossing, lit, lit_crossing, way_in, way_out
 from tests.sim.driving import ALONE, network, run
 

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.compilation.records import empty_records
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology import WeatherParameter
 from dorothie_gym.sim.ego.limits import MAX_BRAKING
@@ -22,6 +21,7 @@ from dorothie_gym.sim.sensing.perception import (
 from dorothie_gym.sim.sensing.visibility import CLEAR_SIGHT, DENSEST_FOG, SHORTEST_SIGHT, Visibility
 from dorothie_gym.sim.state.sensing_records import EyeRecord
 from dorothie_gym.sim.weather import WET_LOSS, Weather
+from dorothie_gym.support.compilation.records import empty_records
 
 P = WeatherParameter
 SHARES = st.floats(0.0, 1.0)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from dorothie_gym.audio import checked_samples, encode_flac, encode_wav, read_audio, resample, trimmed
 from dorothie_gym.errors import AudioError
+from dorothie_gym.support.audio import checked_samples, encode_flac, encode_wav, read_audio, resample, trimmed
 
 
 def tone(seconds: float, rate: int, frequency: float = 440.0) -> np.ndarray:

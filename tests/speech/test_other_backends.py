@@ -9,10 +9,10 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from dorothie_gym.audio import resample
 from dorothie_gym.errors import SpeechError
 from dorothie_gym.speech import WhisperRecognizer, find_recognizer, find_synthesizer
 from dorothie_gym.speech.flite_synthesizer import FliteSynthesizer
+from dorothie_gym.support.audio import resample
 
 
 def test_weights_are_found_and_checked(tmp_path: Path) -> None:

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.audio import resample
 from dorothie_gym.dialogue import is_partly_inaudible
 from dorothie_gym.dialogue.conversation import INAUDIBLE
 from dorothie_gym.errors import AudioError, SpeechError
@@ -34,7 +33,8 @@ from dorothie_gym.speech import (
 )
 from dorothie_gym.speech.language import load_language
 from dorothie_gym.speech.synthesizer import SLOWEST
-from tests.cache_damage import DAMAGES
+from dorothie_gym.support.audio import resample
+from tests.support.cache_damage import DAMAGES
 
 TEXT = "Take the second left onto Bonisteel, we need to go to the KFC."
 

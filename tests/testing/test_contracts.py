@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.policy import policy_inputs
-from dorothie_gym.recording import Session
-from dorothie_gym.rollout import play_session
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording import Session
+from dorothie_gym.session.spaces import ActionDict, noop
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.spaces import ActionDict, noop
 from dorothie_gym.testing import check_observations_do_not_leak, check_policy, check_session, check_town
 from dorothie_gym.testing.playing import first_unequal
 from tests.maps.damaged_towns import with_lane

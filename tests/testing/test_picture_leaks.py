@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.camera.camera_perception import CameraPerception
-from dorothie_gym.camera.scenery import landmarks as landmark_models
-from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.perception_model import PerceptionModel
-from dorothie_gym.engine.scenario import draw_scenario
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS, load_town
+from dorothie_gym.pictures.camera.camera_perception import CameraPerception
+from dorothie_gym.pictures.camera.scenery import landmarks as landmark_models
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.scenario import draw_scenario
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.testing.leaks import check_hidden_landmarks, check_observations_do_not_leak
 from dorothie_gym.testing.playing import play_scripted
@@ -102,7 +102,7 @@ def test_a_shadow_of_a_landmark_would_be_found(monkeypatch: pytest.MonkeyPatch) 
     def unnamed(landmarks: Any, lots: Any, ground: Any) -> Any:
         return landmark_models.joined([form(mark.name, lots[mark.site], ground) for mark in landmarks])
 
-    monkeypatch.setattr("dorothie_gym.camera.town_scene.build_landmarks", unnamed)
+    monkeypatch.setattr("dorothie_gym.pictures.camera.town_scene.build_landmarks", unnamed)
     env = DuoWizardEnv("brookside", config=SYMBOLIC)
     with pytest.raises(AssertionError, match=r"the picture \w+ of participant differs"):
         check_hidden_landmarks(env, play_scripted, 1, 60)

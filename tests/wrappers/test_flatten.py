@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dorothie_gym.envs.single_role_v0 import SingleRole
 from dorothie_gym.ontology import AGENT_ROLES, Role
-from dorothie_gym.spaces import NO_MOVE, SpaceLimits, action_space, decode_action
+from dorothie_gym.session.spaces import NO_MOVE, SpaceLimits, action_space, decode_action
 from dorothie_gym.wrappers.flatten import FlattenAction, FlattenObservation, flatten
 
 QUIET: dict[str, str] = {role: "silent" for role in AGENT_ROLES}

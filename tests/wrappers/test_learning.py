@@ -9,8 +9,8 @@ import gymnasium as gym
 import pytest
 
 import dorothie_gym
-from tests.recording.builders import session
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import session
+from tests.session.recording.dialogues import talk
 
 QUIET = {"participant": "silent", "ad_wizard": "silent"}
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
 from dorothie_gym.errors import SessionError
-from dorothie_gym.recording import Event, Session, SessionHeader
+from dorothie_gym.session.recording import Event, Session, SessionHeader
 from dorothie_gym.wrappers.record_session import RecordSession
-from tests.recording.builders import header, rows
-from tests.recording.dialogues import talk
+from tests.session.recording.builders import header, rows
+from tests.session.recording.dialogues import talk
 
 ROOT = Path(__file__).parents[2]
 PERIOD = 15  # frames a decision

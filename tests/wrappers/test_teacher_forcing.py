@@ -10,16 +10,17 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from dorothie_gym import EnvConfig, TeacherForcing, flatten
+from dorothie_gym.archive import PointView, Task, task_points
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.nfd_v0 import NfDEnv
 from dorothie_gym.envs.rfn_v0 import RfNEnv
 from dorothie_gym.envs.teacher_forced import TeacherForcedEnv
 from dorothie_gym.envs.ufn_v0 import UfNEnv
 from dorothie_gym.errors import SessionError
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
-from dorothie_gym.recording import PointView, Session, Task, task_points
-from dorothie_gym.rollout import play_session
+from dorothie_gym.session.recording import Session
 
 SEED = 3
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.dialogue.realization_context import Direction
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
@@ -14,8 +13,9 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.feasibility import can_switch_lane, can_turn_round, u_turn_start
 from dorothie_gym.policies.route_legs import SAME_WAY
 from dorothie_gym.policies.route_progress import Choice, direction_of, lanes_beside
+from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import Physical
+from dorothie_gym.support.angles import wrap_degrees
 
 AT_END: Final = 6.0
 """Distance to a junction below which a standing car has no room to drive up to it [m]."""

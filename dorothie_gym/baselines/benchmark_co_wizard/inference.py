@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 import torch
 
+from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines.benchmark_co_wizard.history import History
 from dorothie_gym.baselines.checkpoints import ModelCard, restore, sha256_of
 from dorothie_gym.baselines.dataset import Dataset
@@ -22,13 +23,12 @@ from dorothie_gym.baselines.model_io import Examples, Inputs, Labels, Predicted
 from dorothie_gym.baselines.model_zoo import build_model, refresh_text_tables, stored_row
 from dorothie_gym.baselines.toto.config import TOTOConfig
 from dorothie_gym.baselines.toto.model import TOTO
-from dorothie_gym.benchmark.features.columns import Columns
-from dorothie_gym.benchmark.features.point_table import PointTable, points
-from dorothie_gym.benchmark.features.session_columns import town_graph
 from dorothie_gym.errors import CheckpointError, DorothieGymError, ModelFileError, one_line
-from dorothie_gym.input_files import MAX_WEIGHTS, check_file, raising
+from dorothie_gym.evaluation.teacher_forced.features.columns import Columns
+from dorothie_gym.evaluation.teacher_forced.features.point_table import PointTable, points
+from dorothie_gym.evaluation.teacher_forced.features.session_columns import town_graph
 from dorothie_gym.maps.town import Town
-from dorothie_gym.recording.visibility import Task
+from dorothie_gym.support.input_files import MAX_WEIGHTS, check_file, raising
 
 _TOWNS: Final = 4
 """Largest number of towns that a model is kept ready for."""

@@ -9,16 +9,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.benchmark.features.incremental import ObservedFrame
-from dorothie_gym.engine.recorder import LightStates
+from dorothie_gym.evaluation.teacher_forced.features.incremental import ObservedFrame
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightColour
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass, StreetName
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.recording.header import LandmarkRow, SessionHeader
-from dorothie_gym.recording.surroundings import ACTOR_DTYPE, WEATHER_DTYPE, ActorKind, Rows, light_rows
+from dorothie_gym.session.recorder import LightStates
+from dorothie_gym.session.recording.header import LandmarkRow, SessionHeader
+from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, WEATHER_DTYPE, ActorKind, Rows, light_rows
+from dorothie_gym.session.spaces.observations import LandmarkColumn, ObjectColumn, ObservationMapping
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.spaces.observations import LandmarkColumn, ObjectColumn, ObservationMapping
 
 _KINDS: Final = {
     ObjectClass.VEHICLES.value: ActorKind.VEHICLE,

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from dorothie_gym.archive.visibility import Task
 from dorothie_gym.baselines.benchmark_co_wizard.action_feasibility import FeasibleAction, feasible_action
 from dorothie_gym.baselines.benchmark_co_wizard.decision_trigger import TriggerState
 from dorothie_gym.baselines.benchmark_co_wizard.history import History, HistoryTracker
@@ -30,12 +31,11 @@ from dorothie_gym.policies.observation_parser import IN_VIEW
 from dorothie_gym.policies.policy import Policy
 from dorothie_gym.policies.route_progress import default_lane_distance
 from dorothie_gym.policies.speech import SpeechState, remark
-from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
-from dorothie_gym.recording.visibility import Task
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
+from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Physical
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping, heard_acts
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import ActionDict, CoWizardAction, Physical
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping, heard_acts
 
 _DIRECTION_VALUES: Final = (ActionValue.J_TURN, ActionValue.LANE_SWITCH)
 """Slot values whose wording contains a direction."""

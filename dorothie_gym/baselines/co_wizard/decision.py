@@ -34,8 +34,8 @@ from dorothie_gym.policies.language_model.navigator import RouteStep
 from dorothie_gym.policies.observation_parser import heard_utterance
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.spaces.actions import Mental, Physical
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.actions import Mental, Physical
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 Vector = NDArray[np.float32]
 

@@ -22,7 +22,7 @@ from dorothie_gym.baselines.co_wizard.memory import Memory, initial_values
 from dorothie_gym.baselines.co_wizard.policy import LearnedCoWizard, Turn
 from dorothie_gym.baselines.co_wizard.remarks import sources
 from dorothie_gym.baselines.co_wizard.teacher import CALM, Lesson, Teacher
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.evaluation.rollout.replay import begin_replay, recorded_actions
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
@@ -31,12 +31,12 @@ from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed, replace
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.recording.header import SessionHeader
-from dorothie_gym.recording.session import Session
-from dorothie_gym.rollout.replay import begin_replay, recorded_actions
-from dorothie_gym.spaces.actions import CoWizardAction, Physical
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.recording.header import SessionHeader
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces.actions import CoWizardAction, Physical
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 CO_WIZARD: Final = Role.CO_WIZARD
 

@@ -14,7 +14,7 @@ from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Memory
 from dorothie_gym.baselines.co_wizard.remarks import Sources, form_of
 from dorothie_gym.baselines.co_wizard.teacher import Lesson
 from dorothie_gym.baselines.imitation.batches import IDLE_SHARE, UNKNOWN, TensorBatch, reals, whole
-from dorothie_gym.spaces.actions import Physical
+from dorothie_gym.session.spaces.actions import Physical
 
 
 @dataclass(frozen=True, kw_only=True)

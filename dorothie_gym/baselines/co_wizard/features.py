@@ -36,8 +36,8 @@ from dorothie_gym.policies.route_progress import (
 )
 from dorothie_gym.policies.turn_lanes import junction_meant
 from dorothie_gym.policies.view_range import Limit, camera_fault, limit_of, sight, suitable_speed
+from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import Physical
 
 HAZARDS: Final = (
     ObjectClass.TRAFFIC_LIGHT, ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC,

@@ -30,7 +30,7 @@ from dorothie_gym.policies.policy import DecisionClock, replace
 from dorothie_gym.policies.route_progress import default_lane_distance, default_lane_place
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.turn_lanes import junction_meant
-from dorothie_gym.spaces.actions import LanePosition, Mental
+from dorothie_gym.session.spaces.actions import LanePosition, Mental
 
 ORDERS: Final = (None, Direction.LEFT, Direction.RIGHT, Direction.STRAIGHT, Direction.BACK, "street")
 """Turn that was asked for: none, a direction, or only a street."""

@@ -34,9 +34,9 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import nearest_landmark, street_of
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import Remark, SpeechState
-from dorothie_gym.spaces.actions import ActionDict, CoWizardAction
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 TEMPERATURE: Final = 0.7
 """Temperature at which remarks are drawn."""

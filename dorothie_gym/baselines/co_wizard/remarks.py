@@ -18,7 +18,6 @@ from dorothie_gym.baselines.co_wizard.hearing import Utterance
 from dorothie_gym.baselines.co_wizard.memory import Memory
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
-from dorothie_gym.input_files import parse_json
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, ObjectClass, StreetName
 from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter
@@ -28,6 +27,7 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import direction_of, first_new_street
 from dorothie_gym.policies.speech import Remark
 from dorothie_gym.policies.view_range import sight, suitable_speed
+from dorothie_gym.support.input_files import parse_json
 
 _ENUMS: Final = {
     kind.__name__: kind

@@ -22,9 +22,9 @@ from dorothie_gym.policies.co_wizard.state import CoWizardState, DialogueState, 
 from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark, SpeechState
-from dorothie_gym.spaces.actions import CoWizardAction, Physical
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.actions import CoWizardAction, Physical
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 CALM = CoWizardStyle(
     echoes=0.3, checks=0.1, announces=0.0, silent=0.4, asks=0.6, proposes=0.0, mishears=0.0, careful=1.0, notices=0.9

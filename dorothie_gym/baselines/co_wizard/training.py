@@ -10,6 +10,7 @@ from typing import Final
 
 import torch
 
+from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.baselines.co_wizard.demonstrations import follow, is_held_out, practise
 from dorothie_gym.baselines.co_wizard.examples import Batch, Example, batch_of
 from dorothie_gym.baselines.co_wizard.files import (
@@ -34,11 +35,10 @@ from dorothie_gym.baselines.imitation.rounds import (
     train_in_rounds,
 )
 from dorothie_gym.baselines.imitation.supervised import fit
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
 
 _PRACTICE: Final = 29
 """Branch of the seed of the sessions of the practice."""

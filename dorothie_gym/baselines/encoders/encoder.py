@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.user_cache import read_signed, write_signed
+from dorothie_gym.support.user_cache import read_signed, write_signed
 
 if TYPE_CHECKING:
     from sklearn.feature_extraction.text import HashingVectorizer

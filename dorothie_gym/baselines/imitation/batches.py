@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from dorothie_gym.baselines.tensor_files import read_tensors, refuse_unknown, save_tensors, tensor_name
 from dorothie_gym.errors import CheckpointError, InputFileError
-from dorothie_gym.files import replacing
-from dorothie_gym.input_files import checked, parse_json, raising
+from dorothie_gym.support.files import replacing
+from dorothie_gym.support.input_files import checked, parse_json, raising
 
 UNKNOWN: Final = -1
 """Target of what is not learnt from an example."""

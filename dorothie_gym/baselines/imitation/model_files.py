@@ -13,9 +13,9 @@ from torch import nn
 
 from dorothie_gym.baselines.tensor_files import check_tensors, read_tensors, save_tensors
 from dorothie_gym.errors import InputFileError, ModelFileError, one_line
-from dorothie_gym.files import replacing
-from dorothie_gym.input_files import MAX_MODEL_JSON, checked, raising, read_json
 from dorothie_gym.policies.policy_loader import DESCRIPTION
+from dorothie_gym.support.files import replacing
+from dorothie_gym.support.input_files import MAX_MODEL_JSON, checked, raising, read_json
 
 TENSORS: Final = "model.safetensors"
 

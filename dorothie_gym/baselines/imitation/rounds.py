@@ -16,11 +16,11 @@ from typing import Final, Protocol, TypeVar
 
 import numpy as np
 
+from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.errors import SessionError
+from dorothie_gym.evaluation.rollout.folder import locked_folder
+from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.maps.catalogue import SEEN_TOWNS
-from dorothie_gym.recording.corpus import Corpus
-from dorothie_gym.rollout.folder import locked_folder
-from dorothie_gym.rollout.processes import run_tasks
 
 SETTINGS_FILE: Final = "training.json"
 LESSONS: Final = "lessons"

@@ -16,7 +16,7 @@ from torch.nn import functional as F
 
 from dorothie_gym.baselines.encoders.byte_pairs import words
 from dorothie_gym.baselines.model_io import Inputs
-from dorothie_gym.benchmark.features.columns import TownGraph
+from dorothie_gym.evaluation.teacher_forced.features.columns import TownGraph
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, LENGTH, EdgeType
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove

@@ -40,7 +40,7 @@ from dorothie_gym.baselines.toto.losses import angle_error
 from dorothie_gym.baselines.toto.model import TOTO, Tokens
 from dorothie_gym.baselines.toto.texts import FrozenTexts
 from dorothie_gym.baselines.toto.towns import POSITION_UNIT, Towns
-from dorothie_gym.benchmark.features.columns import CO_WIZARD, PARTICIPANT, Columns
+from dorothie_gym.evaluation.teacher_forced.features.columns import CO_WIZARD, PARTICIPANT, Columns
 from dorothie_gym.ontology.actions import NAVIGATION_ACTIONS
 from dorothie_gym.ontology.dialogue_acts import LABELS, DialogueMove
 

@@ -15,7 +15,7 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.observation_parser import heard_utterance
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 Vector = NDArray[np.float32]
 

@@ -19,16 +19,16 @@ from dorothie_gym.baselines.participant.memory import AVERAGE, Memory
 from dorothie_gym.baselines.participant.policy import LearnedParticipant, finished
 from dorothie_gym.baselines.participant.remarks import sources
 from dorothie_gym.baselines.participant.teacher import Lesson, Teacher
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.evaluation.rollout.replay import begin_replay, recorded_actions
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
 from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed, replace
-from dorothie_gym.recording.session import Session
-from dorothie_gym.rollout.replay import begin_replay, recorded_actions
-from dorothie_gym.spaces.actions import ActionDict, ParticipantAction
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 PARTICIPANT: Final = Role.PARTICIPANT
 

@@ -37,9 +37,9 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.participant.reactions import scene_of
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.spaces.actions import ActionDict, ParticipantAction, Speech
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction, Speech
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 TEMPERATURE = 0.5
 """Temperature at which remarks are drawn."""

@@ -18,7 +18,6 @@ from dorothie_gym.baselines.participant.records import RouteStep, is_last_stretc
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Direction, Wording
-from dorothie_gym.input_files import parse_json
 from dorothie_gym.maps.whereabouts import corner_of
 from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.slots import ActionValue, LandmarkName, ObjectClass, StreetName
@@ -31,6 +30,7 @@ from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import first_new_street
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import sight, suitable_speed
+from dorothie_gym.support.input_files import parse_json
 from dorothie_gym.tasks.landmark_designs import features_of
 
 TEXTS: Final = ("person", "item", "purpose", "reason", "feature")

@@ -16,9 +16,9 @@ from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.participant.state import ParticipantState
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import Remark
-from dorothie_gym.spaces.actions import ActionDict
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.actions import ActionDict
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)

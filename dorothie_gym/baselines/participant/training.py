@@ -10,6 +10,7 @@ from typing import Final
 
 import torch
 
+from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.baselines.co_wizard.demonstrations import is_held_out
 from dorothie_gym.baselines.imitation.batches import forms_in
 from dorothie_gym.baselines.imitation.rounds import (
@@ -29,11 +30,10 @@ from dorothie_gym.baselines.participant.files import KIND, MODEL_FORMAT, ModelPa
 from dorothie_gym.baselines.participant.fitting import loss_of
 from dorothie_gym.baselines.participant.network import Layout, ParticipantNetwork
 from dorothie_gym.baselines.participant.policy import LearnedParticipant
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import SessionError
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
 
 _PRACTICE: Final = 31
 """Branch of the seed of the sessions of the practice."""

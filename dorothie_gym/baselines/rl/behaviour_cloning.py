@@ -12,20 +12,20 @@ import torch
 from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
+from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.baselines.rl.checkpoint import Model, Network
 from dorothie_gym.baselines.rl.run import OnStage, ignore_stage
 from dorothie_gym.errors import SessionError
+from dorothie_gym.evaluation.rollout.replay import watch_session
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.actions import NavigationAction
 from dorothie_gym.policies.navigation.demonstrations import Demonstration, DemonstrationRecorder
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
-from dorothie_gym.recording.corpus import Corpus
-from dorothie_gym.recording.session import Session
-from dorothie_gym.rollout.replay import watch_session
-from dorothie_gym.spaces.actions import CoWizardAction
-from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.spaces.actions import CoWizardAction
+from dorothie_gym.session.spaces.limits import SpaceLimits
 
 NOTHING: Final = int(NavigationAction.NOTHING)
 """Number of the action "nothing" in every action space."""

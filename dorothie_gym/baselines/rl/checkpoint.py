@@ -37,9 +37,9 @@ from dorothie_gym.baselines.tensor_files import (
     save_tensors,
 )
 from dorothie_gym.errors import ModelFileError, SettingsError, one_line, short_repr
-from dorothie_gym.files import replacing
-from dorothie_gym.input_files import MAX_MODEL_JSON, checked, raising, read_json
 from dorothie_gym.policies.policy_loader import DESCRIPTION
+from dorothie_gym.support.files import replacing
+from dorothie_gym.support.input_files import MAX_MODEL_JSON, checked, raising, read_json
 
 Model: TypeAlias = Any
 """Algorithm of stable-baselines3 or sb3-contrib: algorithms differ in attributes, and sb3-contrib has no types."""

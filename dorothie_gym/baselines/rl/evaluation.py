@@ -11,11 +11,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from dorothie_gym.analysis.intervals import wilson_interval
 from dorothie_gym.baselines.rl.checkpoint import Model
 from dorothie_gym.baselines.rl.environments import EnvFactory, each_town, has_batch, make_batch, masks_of
 from dorothie_gym.baselines.rl.settings import TrainingSettings
 from dorothie_gym.baselines.rl.vector_env import MakeEnv
+from dorothie_gym.evaluation.analysis.intervals import wilson_interval
 from dorothie_gym.policies.navigation.observation_vector import Vector
 
 FIRST_SEED: Final = 1_000_000

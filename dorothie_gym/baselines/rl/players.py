@@ -18,10 +18,10 @@ from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.navigation_policy import NavigationPolicy
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.policies.policy import AnyPolicy, Policy
-from dorothie_gym.spaces.actions import ActionDict, action_space, noop
-from dorothie_gym.spaces.flat import FlatActions, FlatObservations
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping, observation_space
+from dorothie_gym.session.spaces.actions import ActionDict, action_space, noop
+from dorothie_gym.session.spaces.flat import FlatActions, FlatObservations
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping, observation_space
 
 
 def make_player(path: Path, role: Role, limits: SpaceLimits) -> AnyPolicy:

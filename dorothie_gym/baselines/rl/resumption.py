@@ -31,8 +31,8 @@ from dorothie_gym.baselines.rl.repeatable_batch import Episode, RepeatableVecEnv
 from dorothie_gym.baselines.rl.settings import Page
 from dorothie_gym.baselines.tensor_files import read_tensors, save_tensors
 from dorothie_gym.errors import InputFileError, ModelFileError, short_repr
-from dorothie_gym.files import replacing
-from dorothie_gym.input_files import MIB, parse_json, raising
+from dorothie_gym.support.files import replacing
+from dorothie_gym.support.input_files import MIB, parse_json, raising
 
 CHECKPOINT: Final = "checkpoint.safetensors"
 """File of a run with its state after the last checkpoint."""

@@ -16,9 +16,9 @@ from dorothie_gym.baselines.rl.evaluation import EpisodeStatistics
 from dorothie_gym.baselines.rl.resumption import CHECKPOINT, Checkpoint, Tensors, read_checkpoint, write_checkpoint
 from dorothie_gym.baselines.rl.settings import Page, TrainingSettings
 from dorothie_gym.errors import ModelFileError, one_line
-from dorothie_gym.files import write_atomically
-from dorothie_gym.input_files import checked, raising
 from dorothie_gym.policies.policy_loader import DESCRIPTION
+from dorothie_gym.support.files import write_atomically
+from dorothie_gym.support.input_files import checked, raising
 
 PROGRESS: Final = "progress.jsonl"
 """File of a run with a line for each evaluation."""

@@ -12,6 +12,7 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
+from dorothie_gym.archive.corpus import Fold
 from dorothie_gym.baselines.learning_curves import draw_reward_curve
 from dorothie_gym.baselines.rl.behaviour_cloning import CloningResult, CriticWarmUp, clone, read_demonstrations
 from dorothie_gym.baselines.rl.checkpoint import LinearSchedule, Model, make_model, save_model
@@ -31,7 +32,6 @@ from dorothie_gym.baselines.rl.run import (
 from dorothie_gym.baselines.rl.settings import FINAL_ENTROPY, TrainingSettings
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS
-from dorothie_gym.recording.corpus import Fold
 
 LOGGED_STEPS: Final = 1024
 """Approximate number of steps between TensorBoard records of on-policy algorithms."""

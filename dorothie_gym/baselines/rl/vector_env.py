@@ -14,8 +14,8 @@ import numpy as np
 from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from dorothie_gym.rollout.on_ray import RETRIES, connect, reason
-from dorothie_gym.rollout.processes import exit_with_parent, start_process
+from dorothie_gym.evaluation.rollout.on_ray import RETRIES, connect, reason
+from dorothie_gym.evaluation.rollout.processes import exit_with_parent, start_process
 
 AnyEnv: TypeAlias = gym.Env[Any, Any]
 """Environment with vectors as observations; its actions are numbers or vectors, and `gym.Env` is invariant in both."""

@@ -9,9 +9,9 @@ from dataclasses import fields as dataclass_fields
 from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
-from dorothie_gym.benchmark.features.batch import HISTORY, BatchSpec, HistorySizes
 from dorothie_gym.errors import InputFileError
-from dorothie_gym.input_files import checked
+from dorothie_gym.evaluation.teacher_forced.features.batch import HISTORY, BatchSpec, HistorySizes
+from dorothie_gym.support.input_files import checked
 
 
 class Channel(enum.StrEnum):

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from dorothie_gym.baselines.model_io import tensor
-from dorothie_gym.benchmark.features.columns import TownGraph
+from dorothie_gym.evaluation.teacher_forced.features.columns import TownGraph
 from dorothie_gym.maps.lane_graph import FEATURES
 
 POSITION_UNIT: Final = 100.0

@@ -18,7 +18,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dorothie_gym.angles import wrap_radians
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.trainer import BEST_FILE
 from dorothie_gym.baselines.vision.detector import KINDS, Detector
@@ -27,17 +26,18 @@ from dorothie_gym.baselines.vision.object_learner import distinct_queries, focal
 from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
 from dorothie_gym.baselines.vision.segformer import SegFormer, normalised
 from dorothie_gym.baselines.vision.solids import spaces_of
-from dorothie_gym.benchmark.features.sight import drawing_digest
-from dorothie_gym.camera.pose import View
-from dorothie_gym.camera.recorded_pictures import RecordedPictures
-from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.errors import CheckpointError
-from dorothie_gym.files import replacing
+from dorothie_gym.evaluation.teacher_forced.features.sight import drawing_digest
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
-from dorothie_gym.recording.session import Session
-from dorothie_gym.recording.surroundings import ACTOR_DTYPE, ActorKind, Rows, SceneTable
-from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
+from dorothie_gym.pictures.camera.pose import View
+from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, ActorKind, Rows, SceneTable
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
+from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.files import replacing
 
 CYCLIST_WIDTH: Final = 1.0
 """Width below which a vehicle counts as a cyclist: the detector does not tell them apart [m]."""

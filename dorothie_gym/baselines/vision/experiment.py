@@ -13,6 +13,7 @@ from typing import Any, Final, Literal, TypeAlias
 import torch
 
 from dorothie_gym._version import __version__
+from dorothie_gym.archive.corpus import Corpus
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.trainer import BEST_FILE
 from dorothie_gym.baselines.vision.detector import Detector, DetectorConfig
@@ -23,9 +24,8 @@ from dorothie_gym.baselines.vision.predicted_pixels import with_predictions
 from dorothie_gym.baselines.vision.segformer import SegFormer, SegFormerConfig
 from dorothie_gym.baselines.vision.training import Learner, OnStep, train_learner
 from dorothie_gym.errors import CheckpointError, SessionError, one_line
-from dorothie_gym.files import write_atomically
-from dorothie_gym.input_files import checked, raising
-from dorothie_gym.recording.corpus import Corpus
+from dorothie_gym.support.files import write_atomically
+from dorothie_gym.support.input_files import checked, raising
 
 Model = Literal["segformer", "detr"]
 Size = Literal["small", "paper"]

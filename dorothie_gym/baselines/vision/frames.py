@@ -20,26 +20,26 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.angles import wrap_radians
-from dorothie_gym.camera.array_cache import builder_digest
-from dorothie_gym.camera.first_person_camera import CameraFrame
-from dorothie_gym.camera.recorded_pictures import RecordedPictures
-from dorothie_gym.camera.solid_boxes import SolidBoxes
-from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.archive.corpus import Corpus, CorpusEntry
 from dorothie_gym.errors import OntologyError, SessionError
-from dorothie_gym.files import PART
-from dorothie_gym.input_files import MIB
+from dorothie_gym.evaluation.rollout.processes import run_tasks
 from dorothie_gym.maps.cache import pack, package_sources
 from dorothie_gym.maps.catalogue import find_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.spellings import parse_sensor
 from dorothie_gym.ontology.world_exceptions import Sensor
-from dorothie_gym.recording.corpus import Corpus, CorpusEntry
-from dorothie_gym.recording.events import EventType
-from dorothie_gym.recording.session import Session
-from dorothie_gym.rollout.processes import run_tasks
+from dorothie_gym.pictures.camera.array_cache import builder_digest
+from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
+from dorothie_gym.pictures.camera.recorded_pictures import RecordedPictures
+from dorothie_gym.pictures.camera.solid_boxes import SolidBoxes
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.recording.events import EventType
+from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.user_cache import (
+from dorothie_gym.support.angles import wrap_radians
+from dorothie_gym.support.files import PART
+from dorothie_gym.support.input_files import MIB
+from dorothie_gym.support.user_cache import (
     cache_folder,
     discard,
     is_sealed,
@@ -424,6 +424,6 @@ def _builder_digest() -> str:
     if scenes is None:
         raise SessionError("the sources of the camera cannot be read; no pictures can be kept for the training")
     digest = hashlib.sha256(f"{_FORMAT} {scenes} {np.__version__}\n".encode())
-    for name, text in package_sources("dorothie_gym.recording"):
+    for name, text in package_sources("dorothie_gym.archive"):
         digest.update(f"{name} {len(text)}\n".encode() + text)
     return digest.hexdigest()

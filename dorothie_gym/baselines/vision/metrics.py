@@ -19,9 +19,9 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.angles import wrap_radians
 from dorothie_gym.baselines.vision.frames import CLASSES
 from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.support.angles import wrap_radians
 
 Array = NDArray[np.float64]
 

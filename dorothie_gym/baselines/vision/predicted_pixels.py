@@ -12,7 +12,7 @@ import numpy as np
 from dorothie_gym.baselines.vision.frames import FrameSet, SessionFrames
 from dorothie_gym.baselines.vision.pixel_learner import predict_pixels
 from dorothie_gym.baselines.vision.segformer import SegFormer
-from dorothie_gym.files import replacing
+from dorothie_gym.support.files import replacing
 
 _AT_ONCE: Final = 8  # pictures
 

@@ -14,10 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled
-from dorothie_gym.compilation.records import Flag, Float, Int32, Int64, RecordArray, UInt64
-from dorothie_gym.engine.scenario import Scenario
-from dorothie_gym.engine.view_steps import write_lanes
 from dorothie_gym.maps.routing_graph import RoutingLane
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
@@ -34,12 +30,16 @@ from dorothie_gym.policies.navigation.instructor_arrays import MarkRecord
 from dorothie_gym.policies.observation_parser import place_ahead
 from dorothie_gym.policies.policy import policy_seed, replace
 from dorothie_gym.policies.task_exceptions import plays_every_exception
+from dorothie_gym.session.scenario import Scenario
+from dorothie_gym.session.spaces.actions import ActionDecoder, RoleAction
+from dorothie_gym.session.spaces.limits import STORY_LENGTH, SpaceLimits, plain_text
+from dorothie_gym.session.spaces.observations import Observation
+from dorothie_gym.session.view_steps import write_lanes
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.path_search import point_before
 from dorothie_gym.sim.randomness import POOL, draw_share, seed_stream
-from dorothie_gym.spaces.actions import ActionDecoder, RoleAction
-from dorothie_gym.spaces.limits import STORY_LENGTH, SpaceLimits, plain_text
-from dorothie_gym.spaces.observations import Observation
+from dorothie_gym.support.compilation import compiled
+from dorothie_gym.support.compilation.records import Flag, Float, Int32, Int64, RecordArray, UInt64
 from dorothie_gym.tasks.state import TaskState
 
 if TYPE_CHECKING:

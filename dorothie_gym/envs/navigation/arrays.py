@@ -8,10 +8,10 @@ from typing import Annotated, Final, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation.by_reference import by_reference, gives_row
-from dorothie_gym.compilation.records import Flag, Float, Int32, RecordArray
 from dorothie_gym.envs.navigation.ad_wizard_trigger import PlansRecord
 from dorothie_gym.maps.model import Array
+from dorothie_gym.support.compilation.by_reference import by_reference, gives_row
+from dorothie_gym.support.compilation.records import Flag, Float, Int32, RecordArray
 
 CRUISE_LIMIT: Final = 100
 """Refusal of a cruise speed out of its range; the other codes are those of `codes.Refusal`."""

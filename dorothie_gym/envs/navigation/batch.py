@@ -9,12 +9,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import direct
-from dorothie_gym.compilation.records import plain
-from dorothie_gym.engine.beliefs import goals_on_map
-from dorothie_gym.engine.live_session import world_seed_of
-from dorothie_gym.engine.observations import LazyObservations
-from dorothie_gym.engine.scenario import Scenario, draw_scenario
 from dorothie_gym.envs.navigation.ad_wizard_trigger import AdWizardTrigger, permits_changes
 from dorothie_gym.envs.navigation.arrays import EVENTS, Event, Stage, row_of
 from dorothie_gym.envs.navigation.cameras import DriverObservation, DrivingCameras
@@ -24,11 +18,17 @@ from dorothie_gym.envs.navigation.steps import act_share, guide_share
 from dorothie_gym.ontology.actions import MentalAction
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import LandmarkName
+from dorothie_gym.session.beliefs import goals_on_map
+from dorothie_gym.session.live_session import world_seed_of
+from dorothie_gym.session.observations import LazyObservations
+from dorothie_gym.session.scenario import Scenario, draw_scenario
+from dorothie_gym.session.spaces.actions import LanePosition, Mental
 from dorothie_gym.sim.batch.threads import ThreadPool
 from dorothie_gym.sim.ego.ego_controller import set_goals
 from dorothie_gym.sim.state.world_arrays import lengthened
 from dorothie_gym.sim.world_start import WorldSeeds, start_world
-from dorothie_gym.spaces.actions import LanePosition, Mental
+from dorothie_gym.support.compilation import direct
+from dorothie_gym.support.compilation.records import plain
 from dorothie_gym.tasks.state import TaskState
 
 _WAITS, _NEAR, _LOST, _TOLD = map(int, Event)

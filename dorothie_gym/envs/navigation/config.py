@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Final
 
-from dorothie_gym.copying import shared
-from dorothie_gym.engine.camera_config import CameraConfig, CameraOutput
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.input_files import settings_of
 from dorothie_gym.policies.ad_wizard import MOST_TRICKS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, MAX_SECONDS
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.support.copying import shared
+from dorothie_gym.support.input_files import settings_of
 
 TRAFFIC: Mapping[str, tuple[int, int]] = MappingProxyType(
     {"none": (0, 0), "light": (4, 2), "medium": (10, 4), "heavy": (30, 20)}

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.policies.navigation.actions import LEFT, RIGHT
@@ -20,6 +18,7 @@ from dorothie_gym.policies.navigation.observation_vector import (
     Vector,
     put,
 )
+from dorothie_gym.session.spaces.fields import share, signal, sizes
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.limits import KMH
 from dorothie_gym.sim.ego.manoeuvres import begin, plan_u_turn
@@ -27,7 +26,8 @@ from dorothie_gym.sim.ego.path_builder import point_before
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import J_TURN, LANE_SWITCH, U_TURN, Refusal
-from dorothie_gym.spaces.fields import share, signal, sizes
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

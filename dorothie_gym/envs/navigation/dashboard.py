@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.ontology.slots import ActionValue
 from dorothie_gym.policies.navigation.junction_exits import SECTORS
+from dorothie_gym.support import portable_math as pm
 
 WIDTH, HEIGHT = 84, 12
 """Size of the drawing [pixels]."""

@@ -10,9 +10,6 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.copying import Restorable
-from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.engine.scenario import ResetOptions, check_options, scenario_option, template_option
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import DriverObservation
 from dorothie_gym.envs.navigation.config import NavigationConfig
@@ -23,9 +20,12 @@ from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.spaces.actions import StepInfo
+from dorothie_gym.session.live_session import LiveSession
+from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option, template_option
+from dorothie_gym.session.spaces.actions import StepInfo
+from dorothie_gym.support.copying import Restorable
+from dorothie_gym.support.time_limit import TimeLimitedEnv, decisions_in
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
-from dorothie_gym.time_limit import TimeLimitedEnv, decisions_in
 
 Action = TypeVar("Action")
 

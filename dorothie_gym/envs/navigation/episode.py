@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled
-from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.compilation.records import Flag, Float, Int32, Int64, RecordArray, empty_records
 from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.state.codes import COLLISION
+from dorothie_gym.support.compilation import compiled
+from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import Flag, Float, Int32, Int64, RecordArray, empty_records
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

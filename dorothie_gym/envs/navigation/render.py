@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from dorothie_gym.engine.live_session import LiveSession
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.policies.navigation.instructor import words_of
+from dorothie_gym.session.live_session import LiveSession
 
 
 class DrivingView:

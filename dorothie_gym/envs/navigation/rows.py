@@ -10,11 +10,6 @@ from typing import Any, ClassVar, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import CachedViews
-from dorothie_gym.engine.live_session import LiveSession
-from dorothie_gym.engine.observations import LazyObservations
-from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.envs.navigation.ad_wizard_trigger import AdWizardTrigger
 from dorothie_gym.envs.navigation.arrays import CRUISE_LIMIT, DriveArrays, DrivingTown, row_of
 from dorothie_gym.envs.navigation.config import NavigationConfig
@@ -33,6 +28,11 @@ from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays
 from dorothie_gym.policies.navigation.junction_exits import exit_arrays
 from dorothie_gym.policies.navigation.observation_vector import HeardInstruction, Vector
 from dorothie_gym.policies.route_tables import route_tables
+from dorothie_gym.session.live_session import LiveSession
+from dorothie_gym.session.observations import LazyObservations
+from dorothie_gym.session.scenario import Scenario
+from dorothie_gym.session.spaces.actions import Mental
+from dorothie_gym.session.spaces.limits import SpaceLimits
 from dorothie_gym.sim.batch.threads import turns_of
 from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL
 from dorothie_gym.sim.ego.planner import REASONS
@@ -41,8 +41,8 @@ from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, with_room_of
-from dorothie_gym.spaces.actions import Mental
-from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.support.compilation.records import plain
+from dorothie_gym.support.copying import CachedViews
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 ROOMS: Final = ("vehicles", "pedestrians", "props", "course", "steps", "goals")

@@ -9,8 +9,6 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation.records import empty_records, plain
-from dorothie_gym.engine.scenario import Scenario
 from dorothie_gym.envs.navigation.ad_wizard_trigger import PlansRecord
 from dorothie_gym.envs.navigation.arrays import DriveArrays, DriveRecord, Stage, row_of
 from dorothie_gym.envs.navigation.config import NavigationConfig
@@ -23,12 +21,14 @@ from dorothie_gym.policies.navigation.driver_view import DriverArrays, driver_ar
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays, instructor_arrays
 from dorothie_gym.policies.navigation.observation_vector import FIELDS
+from dorothie_gym.session.scenario import Scenario
+from dorothie_gym.session.spaces.limits import SpaceLimits
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, grown, with_room_of
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world_start import OwnArrays
-from dorothie_gym.spaces.limits import SpaceLimits
+from dorothie_gym.support.compilation.records import empty_records, plain
 
 Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
 

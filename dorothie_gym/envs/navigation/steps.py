@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled, concurrent
 from dorothie_gym.envs.navigation.ad_wizard_trigger import look_for_moment
 from dorothie_gym.envs.navigation.arrays import (
     CRUISE_LIMIT,
@@ -52,6 +51,7 @@ from dorothie_gym.sim.sensing.perception import switch_lamps
 from dorothie_gym.sim.state.codes import Refusal
 from dorothie_gym.sim.step import step
 from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
+from dorothie_gym.support.compilation import compiled, concurrent
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

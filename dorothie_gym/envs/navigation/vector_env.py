@@ -16,7 +16,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from dorothie_gym.engine.scenario import Scenario, check_options, scenario_option, template_option
 from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import DriverObservation
@@ -27,9 +26,10 @@ from dorothie_gym.envs.navigation.rows import INFRACTIONS, REFUSED
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.render_view import checked_view
+from dorothie_gym.session.scenario import Scenario, check_options, scenario_option, template_option
+from dorothie_gym.support.render_view import checked_view
+from dorothie_gym.support.vector_infos import Infos, mask_of, masked_infos, seeds_of
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
-from dorothie_gym.vector_infos import Infos, mask_of, masked_infos, seeds_of
 
 LARGEST_SEED: Final = 2**31
 """Seeds of sessions that follow without a seed of their own are below."""

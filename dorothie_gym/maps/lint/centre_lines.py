@@ -9,11 +9,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_arrays as pn
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.lint.fault import CAR_WIDTH, SMALLEST_TURN, Fault, FaultKind
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.town import Town
+from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support import portable_math as pm
 
 MAX_LINK_GAP = 0.05
 """Largest distance in the plane between the ends of linked lanes [m]; a requirement of all towns."""

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.lint.fault import HALF_WIDTH, Fault, FaultKind
 from dorothie_gym.maps.lint.samples import SAME_GROUND, SAMPLE_SPACING, LaneSamples
 from dorothie_gym.maps.model import Array, Junction, Lane, Sidewalk
 from dorothie_gym.maps.town import Town
+from dorothie_gym.support import portable_arrays as pn
 
 CORNER_TURNS = np.radians([20.0, 160.0])
 """Range of turns with a corner on the inner side [rad]."""

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
+from dorothie_gym.support import portable_arrays as pn
 
 SAMPLE_SPACING = 1.0
 """Largest distance between samples of a lane [m]."""

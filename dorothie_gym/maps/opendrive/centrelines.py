@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym import portable_arrays as pn
 from dorothie_gym.errors import TownError
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.parse import MAX_NUMBER
 from dorothie_gym.maps.opendrive.records import SIDEWALK_TYPES, OpenDriveRecords, RoadRecord
 from dorothie_gym.maps.opendrive.topology import SHORTEST_LANE, Topology, runs_forward
+from dorothie_gym.support import portable_arrays as pn
 
 # Sampling distance in the file [m]: chords of a 5 m radius deviate by 1.6 mm.
 _DENSE_STEP = 0.25

@@ -8,8 +8,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from dorothie_gym import portable_arrays as pn
-from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import NO_STREET, Array, Crosswalk, Lane, Sidewalk, Signal, SignalKind
 from dorothie_gym.maps.opendrive.centrelines import RoadSamples, thin
 from dorothie_gym.maps.opendrive.records import (
@@ -20,6 +18,8 @@ from dorothie_gym.maps.opendrive.records import (
     SignalRecord,
 )
 from dorothie_gym.maps.opendrive.topology import LanePiece, Topology, runs_forward
+from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support.angles import wrap_radians
 
 # Signal types in CARLA's maps: lights as in OpenDRIVE 1.4, annex, signs by their numbers in German law.
 SIGNAL_TYPES = {

@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from dorothie_gym import portable_arrays as pn
 from dorothie_gym.maps.model import Array
+from dorothie_gym.support import portable_arrays as pn
 
 # 32 Gauss-Legendre nodes integrate cos and sin of the heading to rounding error up to four full turns per element.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)

@@ -11,7 +11,6 @@ import numpy as np
 from lxml import etree
 
 from dorothie_gym.errors import InputFileError, TownError, short_repr
-from dorothie_gym.input_files import MAX_OPENDRIVE, MAX_XML_ELEMENTS, read_file
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.opendrive.geometry import (
     NO_CUBICS,
@@ -33,6 +32,7 @@ from dorothie_gym.maps.opendrive.records import (
     SectionRecord,
     SignalRecord,
 )
+from dorothie_gym.support.input_files import MAX_OPENDRIVE, MAX_XML_ELEMENTS, read_file
 
 # Type of XML elements; the stubs of lxml name the class with an underscore.
 Element: TypeAlias = etree._Element

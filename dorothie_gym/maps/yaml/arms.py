@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import Lane
 from dorothie_gym.maps.yaml.geometry import CurveSegment, Pose
 from dorothie_gym.maps.yaml.plan import StreetPlan
 from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.angles import wrap_radians
 
 POCKET = -1
 """Number of a left-turn lane in the median."""

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.yaml.geometry import LINE_SPACING, Curve, Point, bend_stations, line, rounded, turn_at
 from dorothie_gym.maps.yaml.segments import StreetSegment
+from dorothie_gym.support import portable_math as pm
 
 STEEPEST = 0.12
 """Largest slope of a street."""

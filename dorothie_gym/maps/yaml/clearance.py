@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.yaml.arms import Arm
 from dorothie_gym.maps.yaml.centrelines import Centreline
 from dorothie_gym.maps.yaml.movements import SMALLEST_RING_TRIM, SMALLEST_TRIM, MovementPath
 from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
+from dorothie_gym.support import portable_math as pm
 
 Indices: TypeAlias = NDArray[np.int64]
 

@@ -12,7 +12,7 @@ from typing import NoReturn
 import yaml
 
 from dorothie_gym.errors import InputFileError, TownError
-from dorothie_gym.input_files import MAX_TOWN_YAML, read_file
+from dorothie_gym.support.input_files import MAX_TOWN_YAML, read_file
 
 _NULL, _BOOL, _MERGE = (f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "merge"))
 _PLAIN_NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")

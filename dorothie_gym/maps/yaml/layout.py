@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.yaml.arms import LARGEST_ANGLE, SMALLEST_ANGLE, Arm, arms_at, find_slips
 from dorothie_gym.maps.yaml.centrelines import Centreline, centreline_of
 from dorothie_gym.maps.yaml.clearance import check_clearance, check_crossings
@@ -15,6 +14,7 @@ from dorothie_gym.maps.yaml.geometry import CurveSegment, line
 from dorothie_gym.maps.yaml.movements import MovementPath, make_room, movements_at, with_pockets
 from dorothie_gym.maps.yaml.plan import JunctionPlan, StreetPlan, TownPlan
 from dorothie_gym.maps.yaml.segments import Crossing, CrossSection, StreetRun, StreetSegment, segment_of, split
+from dorothie_gym.support import portable_math as pm
 
 SMALLEST_RING = 8.0
 """Smallest radius of the innermost lane of a ring [m], for traffic that does not stop."""

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.angles import wrap_radians
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.yaml.arms import (
     LARGEST_ANGLE,
@@ -21,6 +19,8 @@ from dorothie_gym.maps.yaml.arms import (
 )
 from dorothie_gym.maps.yaml.geometry import Curve, connect
 from dorothie_gym.maps.yaml.segments import Crossing, StreetSegment
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.angles import wrap_radians
 
 STRAIGHT_BELOW = math.radians(35.0)
 """Largest change of heading of a straight movement [rad]."""

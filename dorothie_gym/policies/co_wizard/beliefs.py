@@ -9,7 +9,7 @@ from dorothie_gym.maps.routing import Place
 from dorothie_gym.ontology.actions import MentalAction
 from dorothie_gym.ontology.slots import GoalStatus, LandmarkName
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.spaces.actions import LanePosition, Mental
+from dorothie_gym.session.spaces.actions import LanePosition, Mental
 
 
 @dataclass(frozen=True, kw_only=True)

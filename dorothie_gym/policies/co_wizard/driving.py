@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.maps.traffic_lights import LightColour
@@ -28,8 +27,9 @@ from dorothie_gym.policies.route_progress import (
     streets_named,
 )
 from dorothie_gym.policies.turn_lanes import junction_meant
+from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import Physical
+from dorothie_gym.support.angles import wrap_degrees
 
 CRUISE_TOLERANCE = 2.6
 """Difference between actual and target cruise speed that is not corrected [km/h]; half a speed step of 5 km/h."""

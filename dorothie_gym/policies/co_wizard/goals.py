@@ -21,7 +21,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import SeenLandmark, landmarks_in_view, nearest_landmark
 from dorothie_gym.policies.route_progress import RouteProgress, default_lane_place, streets_named
 from dorothie_gym.policies.speech import intend
-from dorothie_gym.spaces.actions import LanePosition, Mental
+from dorothie_gym.session.spaces.actions import LanePosition, Mental
 
 _COMMON = (LandmarkName.HOUSE, LandmarkName.PERSON)
 """Names that several places bear."""

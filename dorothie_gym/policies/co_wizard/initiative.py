@@ -24,8 +24,8 @@ from dorothie_gym.policies.observation_parser import is_dark, nearest_landmark, 
 from dorothie_gym.policies.route_progress import Choice, direction_of
 from dorothie_gym.policies.speech import Remark, intend
 from dorothie_gym.policies.view_range import Limit, camera_fault, limit_of, sight, suitable_speed
+from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import Physical
 
 _HANDLED = frozenset(
     {WeatherParameter.FOG_DENSITY, WeatherParameter.PRECIPITATION, WeatherParameter.SUN_ALTITUDE_ANGLE}

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from dorothie_gym import portable_arrays as pn
 from dorothie_gym.dialogue.intentions import CommunicativeFunction
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
@@ -19,6 +18,7 @@ from dorothie_gym.policies.observation_parser import SeenObject, place_on_lanes
 from dorothie_gym.policies.route_progress import first_new_street, lanes_ahead
 from dorothie_gym.policies.speech import intend
 from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.support import portable_arrays as pn
 
 _JUST_TOLD = 8.0
 """Time for which an obstacle that the participant has reported needs no report of the car [s]."""

@@ -23,10 +23,10 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.speech import SpeechState
+from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, Mental, Physical
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import ActionDict, CoWizardAction, Mental, Physical
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping
 
 
 class ScriptedCoWizard(Policy[CoWizardState]):

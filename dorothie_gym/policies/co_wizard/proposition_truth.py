@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.maps.town import Town
 from dorothie_gym.maps.traffic_lights import LightColour
@@ -20,6 +19,7 @@ from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.travel_time import travel_time
 from dorothie_gym.policies.view_range import FAR_SIGHT, camera_fault, sight
 from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.support import portable_math as pm
 
 NAMED_ACTIONS: Final = {
     PhysicalAction.J_TURN: ActionValue.J_TURN,

@@ -17,8 +17,8 @@ from dorothie_gym.policies.observation_parser import SeenLandmark, SeenObject, r
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import Choice, next_choice
 from dorothie_gym.policies.route_tables import is_choice
+from dorothie_gym.session.spaces.observations import ExitColumn, ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.observations import ExitColumn, ObservationMapping
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
@@ -26,8 +25,9 @@ from dorothie_gym.policies.language_model.role_interface import (
 )
 from dorothie_gym.policies.observation_parser import place_on_path, read_subgoals, scalar, weather
 from dorothie_gym.policies.policy import replace
-from dorothie_gym.spaces.actions import ActionDict, AdWizardAction, LanePosition
-from dorothie_gym.spaces.observations import ObservationMapping, PropColumn
+from dorothie_gym.session.spaces.actions import ActionDict, AdWizardAction, LanePosition
+from dorothie_gym.session.spaces.observations import ObservationMapping, PropColumn
+from dorothie_gym.support import portable_math as pm
 
 AGAIN = ("60", "20", "30", "90", "120")
 """Times after which the model can ask to be asked again [s]."""

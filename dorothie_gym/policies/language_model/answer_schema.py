@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from dorothie_gym.errors import InputFileError, short_repr
-from dorothie_gym.input_files import parse_json
 from dorothie_gym.policies.language_model.faults import CallError, Fault
-from dorothie_gym.spaces.limits import plain_text
+from dorothie_gym.session.spaces.limits import plain_text
+from dorothie_gym.support.input_files import parse_json
 
 MAX_ANSWER: Final = 20_000
 """Longest answer that is read [characters]."""

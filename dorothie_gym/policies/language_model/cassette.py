@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from dorothie_gym.errors import InputFileError, PolicyLoadError
-from dorothie_gym.input_files import MAX_SESSION_TEXT, parse_json, read_text
 from dorothie_gym.policies.language_model.chat_endpoint import canonical
 from dorothie_gym.policies.language_model.faults import Fault
+from dorothie_gym.support.input_files import MAX_SESSION_TEXT, parse_json, read_text
 
 if sys.platform != "win32":
     import fcntl

@@ -13,9 +13,9 @@ from types import ModuleType
 from typing import Any, Final
 
 from dorothie_gym.errors import InputFileError, PolicyLoadError, one_line
-from dorothie_gym.files import JsonValue
-from dorothie_gym.input_files import parse_json
 from dorothie_gym.policies.language_model.faults import CallError, Fault
+from dorothie_gym.support.files import JsonValue
+from dorothie_gym.support.input_files import parse_json
 
 KEY_VARIABLE: Final = "OPENAI_API_KEY"
 """Environment variable with the secret for the header `Authorization`; unset for servers without one."""

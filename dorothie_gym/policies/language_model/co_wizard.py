@@ -32,9 +32,9 @@ from dorothie_gym.policies.language_model.role_interface import (
     with_talk,
 )
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.session.spaces.actions import ActionDict, CoWizardAction, LanePosition, Mental, Physical
+from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import ActionDict, CoWizardAction, LanePosition, Mental, Physical
-from dorothie_gym.spaces.observations import ObservationMapping
 
 REPEAT_AFTER = 3.0
 """Time after which a step that is still due is pointed out once more [s]."""

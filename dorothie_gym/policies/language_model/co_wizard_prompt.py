@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.town import Town
@@ -29,10 +28,11 @@ from dorothie_gym.policies.language_model.role_interface import (
     words_fields,
 )
 from dorothie_gym.policies.route_progress import default_lane_place, direction_of, streets_named
+from dorothie_gym.session.spaces.actions import Physical
+from dorothie_gym.session.spaces.observations import ExitColumn
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import Physical
-from dorothie_gym.spaces.observations import ExitColumn
+from dorothie_gym.support import portable_math as pm
 
 AHEAD = (5, 10, 20, 30, 50, 80)
 """Distances ahead at which a place can be marked [m]."""

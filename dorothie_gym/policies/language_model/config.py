@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
 
-from dorothie_gym.copying import shared
+from dorothie_gym.support.copying import shared
 
 URL_VARIABLE: Final = "OPENAI_BASE_URL"
 """Environment variable with the address of the endpoint, where none is given; as of OpenAI's own client."""

@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from dorothie_gym.copying import shared
 from dorothie_gym.errors import PolicyLoadError
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema
 from dorothie_gym.policies.language_model.cassette import Cassette, Reply
 from dorothie_gym.policies.language_model.chat_endpoint import ChatEndpoint, IncompleteError, httpx_module
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
 from dorothie_gym.policies.language_model.faults import ABOUT_THE_ANSWER, WORTH_REPEATING, CallError
+from dorothie_gym.support.copying import shared
 
 _LEAST_TIME: Final = 0.05
 """Time below which no further attempt is made [s]."""

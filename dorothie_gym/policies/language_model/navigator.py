@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.maps.routing import LaneEntry, Place
 from dorothie_gym.maps.town import Town
@@ -27,6 +26,7 @@ from dorothie_gym.policies.route_progress import (
     stopping_distance,
 )
 from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.support.angles import wrap_degrees
 
 TURN_LEAD = 85.0
 """Distance to a junction from which on its turn is due [m]; as the scripted Co-Wizard commands it."""

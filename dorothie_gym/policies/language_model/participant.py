@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.routing import LaneEntry
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
@@ -31,8 +30,9 @@ from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.route_progress import RouteProgress, stopping_distance
 from dorothie_gym.policies.turn_lanes import next_turn
-from dorothie_gym.spaces.actions import ActionDict, ParticipantAction
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
+from dorothie_gym.session.spaces.observations import ObservationMapping
+from dorothie_gym.support import portable_math as pm
 
 ANNOUNCED = 70.0
 """Distance to a junction at which its turn is due to be announced [m]; a car at 40 km/h takes 6 s for it."""

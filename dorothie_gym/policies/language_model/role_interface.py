@@ -25,9 +25,9 @@ from dorothie_gym.policies.observation_parser import (
     street_of,
 )
 from dorothie_gym.policies.policy import DecisionClock, replace
-from dorothie_gym.spaces.actions import ActionDict, Speech
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.actions import ActionDict, Speech
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 KEEP: Final = "keep"
 """Label of leaving a goal, a status or a plan as it is."""

@@ -8,13 +8,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from dorothie_gym.compilation import compiled
-from dorothie_gym.compilation.records import RecordArray
-from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.routing import Place, router
 from dorothie_gym.maps.routing_graph import RoutingLane, routing_graph
 from dorothie_gym.maps.town import Town
+from dorothie_gym.support.compilation import compiled
+from dorothie_gym.support.compilation.records import RecordArray
+from dorothie_gym.support.copying import shared
 
 REACHED_BEHIND = 2.0
 """Largest distance behind the car at which a goal counts as reached instead of passed [m]."""

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.angles import wrap_degrees
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
 from dorothie_gym.policies.co_wizard.driving import distance_ahead
@@ -25,9 +24,10 @@ from dorothie_gym.policies.navigation.navigation_policy import (
 )
 from dorothie_gym.policies.navigation.observation_vector import MAX_SECONDS, Vector
 from dorothie_gym.policies.route_progress import lanes_beside
+from dorothie_gym.session.spaces.actions import CoWizardAction, Physical
+from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import CoWizardAction, Physical
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.support.angles import wrap_degrees
 
 STOP_FOR_GOAL = 30.0
 """Distance to the destination within which a stop is attributed to it [m]."""

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.polyline import closest_on_segment
 from dorothie_gym.maps.route_arrays import RouteSearch
 from dorothie_gym.maps.route_search import find_route
@@ -33,6 +31,8 @@ from dorothie_gym.sim.ego.feasibility import u_turn_braking
 from dorothie_gym.sim.ego.limits import EGO_STANDING, U_TURN_SPEED
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import STATIC
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

@@ -35,10 +35,10 @@ from dorothie_gym.policies.navigation.observation_vector import (
 )
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import stopping_distance
+from dorothie_gym.session.spaces.actions import ActionDict, Physical
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces.actions import ActionDict, Physical
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping
 
 ARRIVED_WITHIN = 3.0
 """Distance to its destination within which a standing car is taken to have arrived [m]; wider than the instructor's

@@ -11,9 +11,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import RecordArray, plain
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.routing_graph import RoutingLane
@@ -38,14 +35,17 @@ from dorothie_gym.policies.navigation.driver_view import (
 from dorothie_gym.policies.navigation.instructor import NavigationInstruction
 from dorothie_gym.policies.navigation.junction_exits import SECTORS, ExitArrays, JunctionExits
 from dorothie_gym.policies.policy import replace
+from dorothie_gym.session.spaces.fields import share, signal, sizes
+from dorothie_gym.session.spaces.observations import ObservationMapping
 from dorothie_gym.sim.ego.limits import MAX_CRUISE
 from dorothie_gym.sim.ego.manoeuvres import find_oncoming
 from dorothie_gym.sim.network.centre_lines import position_on, project_on
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Motion
 from dorothie_gym.sim.state.town_arrays import town_arrays
-from dorothie_gym.spaces.fields import share, signal, sizes
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
+from dorothie_gym.support.compilation.records import RecordArray, plain
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -22,9 +22,9 @@ from dorothie_gym.policies.persona import Persona, Trait
 from dorothie_gym.policies.policy import Policy, replace
 from dorothie_gym.policies.route_progress import light_ahead
 from dorothie_gym.policies.speech import SpeechState
-from dorothie_gym.spaces.actions import ActionDict, ParticipantAction
-from dorothie_gym.spaces.limits import SpaceLimits
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.actions import ActionDict, ParticipantAction
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.session.spaces.observations import ObservationMapping
 
 LONG_RED = 10.0
 """Standstill at a red light that is felt as long [s]."""

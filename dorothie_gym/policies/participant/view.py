@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps.routing import Place
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import LandmarkName
@@ -18,7 +17,8 @@ from dorothie_gym.policies.observation_parser import (
     read_subgoals,
     scalar,
 )
-from dorothie_gym.spaces.observations import ObservationMapping
+from dorothie_gym.session.spaces.observations import ObservationMapping
+from dorothie_gym.support import portable_math as pm
 
 ACROSS_LANE = 0.8
 """Cosine of the angle between car and lane below which the car is in the middle of a U-turn."""

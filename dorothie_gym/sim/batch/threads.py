@@ -12,7 +12,7 @@ from numba import types
 from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import WITHOUT_COUNTS, concurrent
+from dorothie_gym.support.compilation import WITHOUT_COUNTS, concurrent
 
 if TYPE_CHECKING:
     from llvmlite.ir import IRBuilder, Value

@@ -9,16 +9,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import concurrent, direct
-from dorothie_gym.compilation.by_reference import gives_row
-from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Array
-from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.threads import ThreadPool, take, turns_of
 from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_room_of
 from dorothie_gym.sim.step import step
+from dorothie_gym.support.compilation import concurrent, direct
+from dorothie_gym.support.compilation.by_reference import gives_row
+from dorothie_gym.support.copying import CachedViews
+from dorothie_gym.support.processors import available_processors
 
 
 def stacked(world: WorldArrays, count: int) -> WorldArrays:

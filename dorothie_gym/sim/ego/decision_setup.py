@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.compilation import compiled
 from dorothie_gym.sim.ego.limits import KMH
 from dorothie_gym.sim.ego.manoeuvres import extend
 from dorothie_gym.sim.ego.path import find_sweeps
@@ -18,6 +17,7 @@ from dorothie_gym.sim.network.centre_lines import position_on, project_on
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import STATIC, Refusal
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CAR_WIDTH
+from dorothie_gym.support.compilation import compiled
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

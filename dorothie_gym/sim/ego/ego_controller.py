@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dorothie_gym.compilation.records import filled_records, plain
-from dorothie_gym.copying import shared
 from dorothie_gym.ontology.actions import SPEED_STEP, PhysicalAction
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE
@@ -14,6 +12,8 @@ from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car
 from dorothie_gym.sim.state.ego_records import GoalRecord
 from dorothie_gym.sim.state.record_views import ArrayHolder
+from dorothie_gym.support.compilation.records import filled_records, plain
+from dorothie_gym.support.copying import shared
 
 CRUISE_REFUSAL = f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
 """Reason of the refusal of a cruise speed."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.ontology.slots import ObjectClass
 from dorothie_gym.sim.ego.limits import (
@@ -25,6 +23,8 @@ from dorothie_gym.sim.state.town_records import PassageRecord
 from dorothie_gym.sim.traffic.idm_traffic import STEP_AHEAD, STEP_PAST
 from dorothie_gym.sim.traffic.junctions import announce, close, request
 from dorothie_gym.sim.traffic.parameters import CRITICAL_GAP, HARDEST_BRAKING
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

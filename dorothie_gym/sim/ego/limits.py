@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dorothie_gym import portable_math as pm
+from dorothie_gym.support import portable_math as pm
 
 # --- Pedals and steering ----------------------------------------------------------------------------------------------
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.lane_neighbours import opposite_gap
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.maps.polyline import HEADING, HEIGHT, WIDTH, X, Y
@@ -47,6 +46,7 @@ from dorothie_gym.sim.state.codes import (
     Feasible,
     Refusal,
 )
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.ego.ego_hazards import look
 from dorothie_gym.sim.ego.limits import (
     APPROACH_DISTANCE,
@@ -46,6 +44,8 @@ from dorothie_gym.sim.weather import (
     PERIODS,
     SIDE_FORCE,
 )
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

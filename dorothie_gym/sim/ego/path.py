@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import RecordArray
-from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.path_builder import SEARCH_RANGE
 from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.ego_records import CoursePointRecord, SweepRecord
 from dorothie_gym.sim.traffic.parameters import PLANNED
 from dorothie_gym.sim.traffic.route import locate
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
+from dorothie_gym.support.compilation.records import RecordArray
+from dorothie_gym.support.copying import shared
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -8,9 +8,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.maps.polyline import HEADING, HEIGHT, STATION, X, Y
 from dorothie_gym.sim.ego.limits import LATERAL_ACCELERATION, PROFILE_BRAKING, U_TURN_SPEED
 from dorothie_gym.sim.ego.path_search import foot_on_segment
@@ -18,6 +15,9 @@ from dorothie_gym.sim.network.centre_lines import interpolated, position_on, pro
 from dorothie_gym.sim.network.lane_lookup import wrap_radians
 from dorothie_gym.sim.state.ego_records import CoursePointRecord
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
+from dorothie_gym.support.compilation.records import RecordArray
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

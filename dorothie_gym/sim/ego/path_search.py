@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.sim.state.ego_records import CoursePointRecord
+from dorothie_gym.support.compilation import compiled, inlined
+from dorothie_gym.support.compilation.records import RecordArray
 
 SEARCH = 6.0
 """Half width of the search for a place on the path [m], to which twice the error of the pose estimate is added."""

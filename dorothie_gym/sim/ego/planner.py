@@ -12,9 +12,6 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from dorothie_gym.compilation import direct
-from dorothie_gym.compilation.records import plain
-from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import PhysicalAction
@@ -25,6 +22,9 @@ from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE, Feasible, Refusa
 from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
+from dorothie_gym.support.compilation import direct
+from dorothie_gym.support.compilation.records import plain
+from dorothie_gym.support.copying import CachedViews
 
 REASONS: Final[Mapping[int, str]] = MappingProxyType(
     {

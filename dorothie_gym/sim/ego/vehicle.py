@@ -9,14 +9,14 @@ import numpy as np
 from highway_env.vehicle.kinematics import Vehicle
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation.records import fields, plain
-from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.ego.limits import VehicleControl
 from dorothie_gym.sim.road import TownRoad
 from dorothie_gym.sim.state.record_views import ArrayHolder
 from dorothie_gym.sim.state.world_arrays import WorldArrays
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation.records import fields, plain
+from dorothie_gym.support.copying import CachedViews
 
 
 class Car(CachedViews, Vehicle):

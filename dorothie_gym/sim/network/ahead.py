@@ -11,10 +11,10 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from dorothie_gym.compilation import allocating
 from dorothie_gym.maps.model import LEVEL_HEIGHT, Array
 from dorothie_gym.maps.polyline import WIDTH, IntArray, LaneTable, local_coordinates, value_at
 from dorothie_gym.sim.network.network import LaneIndex, TownNetwork
+from dorothie_gym.support.compilation import allocating
 
 HORIZON = 80.0
 """Range ahead and behind, beyond the own lane, in which neighbours are searched [m]."""

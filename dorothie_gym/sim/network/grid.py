@@ -7,7 +7,6 @@ from typing import TypeAlias
 
 import numpy as np
 
-from dorothie_gym.compilation import allocating
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.polyline import (
     IntArray,
@@ -16,6 +15,7 @@ from dorothie_gym.maps.polyline import (
     distance,
     value_at,
 )
+from dorothie_gym.support.compilation import allocating
 
 GRID_CELL = 8.0
 """Side of a cell [m]."""

@@ -11,10 +11,10 @@ from highway_env.road.lane import AbstractLane, LineType
 from highway_env.utils import get_class_path
 from numpy.typing import NDArray
 
-from dorothie_gym.copying import shared
 from dorothie_gym.maps import polyline
 from dorothie_gym.maps.model import Array, Lane
 from dorothie_gym.maps.polyline import LaneTable
+from dorothie_gym.support.copying import shared
 
 
 class TownLaneConfig(TypedDict):

@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.angles import wrap_degrees
-from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.maps.lane_neighbours import oncoming_lanes
 from dorothie_gym.maps.model import Exit, LinkType
 from dorothie_gym.maps.town import Town
 from dorothie_gym.sim.state.codes import NOBODY
 from dorothie_gym.sim.state.town_records import ExitRecord, LaneExitsRecord, LaneRecord
+from dorothie_gym.support.angles import wrap_degrees
+from dorothie_gym.support.compilation.records import RecordArray, empty_records
 
 ANOTHER_WAY = 15.0
 """Difference of angle from which on exits are different turns [degrees]."""

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import allocating, compiled, inlined
-from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.polyline import closest_on_segment
 from dorothie_gym.sim.network.grid import CELL_REACH, SAME_LEVEL, SLACK
 from dorothie_gym.sim.state.codes import NOBODY
 from dorothie_gym.sim.state.town_records import CellEntryRecord, LaneRecord
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import allocating, compiled, inlined
+from dorothie_gym.support.compilation.records import RecordArray, empty_records
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

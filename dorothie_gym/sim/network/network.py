@@ -12,13 +12,13 @@ import numpy as np
 from highway_env.road.lane import LineType
 from highway_env.road.road import RoadNetwork
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane, LinkType
 from dorothie_gym.maps.polyline import HEIGHT, LaneTable
 from dorothie_gym.maps.town import Town, check_extent
 from dorothie_gym.sim.network.grid import GridIndex
 from dorothie_gym.sim.network.lane import PolylineLane
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.copying import shared
 
 LEVEL_ENDS = 3.0
 """Lanes side by side end together when their ends are no farther apart than this along the road [m]."""

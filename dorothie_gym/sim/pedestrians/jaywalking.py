@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.pedestrians.footways import closest_walk
@@ -22,6 +21,7 @@ from dorothie_gym.sim.state.body_records import PedestrianRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import Footway, Kind, Walk
 from dorothie_gym.sim.traffic.parameters import ASKING, CRITICAL_GAP
 from dorothie_gym.sim.traffic.vehicle_models import brake_to
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.state.body_records import PedestrianRecord, SizedBody
 from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

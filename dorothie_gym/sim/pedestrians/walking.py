@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.pedestrians.footways import KEEP_RIGHT, enter_next, find_segment, locate, place_beside, side_kept
 from dorothie_gym.sim.pedestrians.jaywalking import steps_out, stray
@@ -21,6 +19,8 @@ from dorothie_gym.sim.state.codes import NOBODY, Colour, Footway, Kind, Walk
 from dorothie_gym.sim.state.town_records import CrossingRecord, WalkwayRecord
 from dorothie_gym.sim.traffic.junctions import light
 from dorothie_gym.sim.traffic.parameters import TRAFFIC_STANDING
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -11,10 +11,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import RecordArray
-from dorothie_gym.copying import CachedViews
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.pedestrians.pacing import WALKER_SIZE
@@ -30,6 +26,10 @@ from dorothie_gym.sim.sensing.visibility import (
 from dorothie_gym.sim.state.body_records import PedestrianRecord, PlacedBody, PropRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import PEDESTRIAN_CLASS, STATIC, VEHICLES, Group, Kind, Walk
 from dorothie_gym.sim.state.sensing_records import EyeRecord, SeenRecord
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
+from dorothie_gym.support.compilation.records import RecordArray
+from dorothie_gym.support.copying import CachedViews
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.world_arrays import WorldArrays

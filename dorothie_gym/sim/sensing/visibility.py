@@ -22,9 +22,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled
-from dorothie_gym.copying import shared
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled
+from dorothie_gym.support.copying import shared
 
 CLEAR_SIGHT = 80.0
 """Range of perception on a clear day [m]."""

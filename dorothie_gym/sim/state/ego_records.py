@@ -7,8 +7,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation.records import Flag, Float, Int32, Int64
 from dorothie_gym.sim.traffic.parameters import CLOSED, GOALS, PLANNED
+from dorothie_gym.support.compilation.records import Flag, Float, Int32, Int64
 
 
 class SweepRecord:

@@ -10,10 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.compilation.records import RecordArray, empty_records, filled_records
-from dorothie_gym.copying import shared
 from dorothie_gym.maps.model import Array, Lane, LinkType, SignalKind
 from dorothie_gym.maps.polyline import WIDTH, LaneTable
 from dorothie_gym.maps.right_of_way import RightOfWay, right_of_way
@@ -38,6 +34,10 @@ from dorothie_gym.sim.state.town_records import (
     WalkwayRecord,
 )
 from dorothie_gym.sim.traffic.parameters import CAR_LENGTH, CURVE_ACCELERATION, CYCLIST_ROADS
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import RecordArray, empty_records, filled_records
+from dorothie_gym.support.copying import shared
 
 PASSING_WIDTH = 2.5
 """Two vehicles whose middles are this far apart across their lanes pass one another [m]: they are 2 m wide."""

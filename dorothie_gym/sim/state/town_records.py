@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation.records import Flag, Float, Int32
+from dorothie_gym.support.compilation.records import Flag, Float, Int32
 
 
 class LaneRecord:

@@ -9,9 +9,6 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.by_reference import by_reference
-from dorothie_gym.compilation.records import Record, RecordArray, empty_records, plain, record_dtype
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.state.body_records import (
     ClockRecord,
@@ -44,6 +41,9 @@ from dorothie_gym.sim.state.sensing_records import (
 from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import COURSE, EVENTS, GOALS, MAX_SUBSTEPS, POINTS, STEPS
+from dorothie_gym.support.compilation import compiled, inlined
+from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.records import Record, RecordArray, empty_records, plain, record_dtype
 
 PROPS = 16
 """Most props in a world."""

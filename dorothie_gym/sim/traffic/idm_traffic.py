@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import LEVEL_HEIGHT
 from dorothie_gym.sim.ego.limits import U_TURN_SAMPLES
 from dorothie_gym.sim.network.ahead import HORIZON
@@ -36,6 +35,7 @@ from dorothie_gym.sim.traffic.vehicle_models import (
     free_acceleration,
     slip_towards_lane,
 )
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

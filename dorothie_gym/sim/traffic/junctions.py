@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.traffic_light_programs import YELLOW_BRAKING
 from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import NOBODY, Colour, Kind, Relation, TrafficControl, Wait
@@ -34,6 +33,7 @@ from dorothie_gym.sim.traffic.parameters import (
     TRAFFIC_STANDING,
     UNUSED,
 )
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import compiled, inlined
-from dorothie_gym.compilation.records import RecordArray
 from dorothie_gym.sim.network.ahead import HORIZON, LANE_MARGIN
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.state.body_records import NodeRecord, VehicleRecord
 from dorothie_gym.sim.state.codes import NOBODY, Kind
 from dorothie_gym.sim.traffic.parameters import CAR_WIDTH
+from dorothie_gym.support.compilation import compiled, inlined
+from dorothie_gym.support.compilation.records import RecordArray
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

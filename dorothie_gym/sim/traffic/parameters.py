@@ -7,7 +7,7 @@ import math
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from dorothie_gym import portable_math as pm
+from dorothie_gym.support import portable_math as pm
 
 # --- highway-env's Intelligent Driver Model, lane changes and controllers -------------------------------------------
 

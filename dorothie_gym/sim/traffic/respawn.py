@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.ego.limits import EGO_STANDING
 from dorothie_gym.sim.network.lane_lookup import value_near
 from dorothie_gym.sim.pedestrians.footways import place_beside
@@ -30,6 +28,8 @@ from dorothie_gym.sim.traffic.parameters import (
     TRAFFIC_STANDING,
 )
 from dorothie_gym.sim.traffic.route import keep_side, take
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.sim.network.ahead import HORIZON
 from dorothie_gym.sim.network.lane_lookup import project
 from dorothie_gym.sim.randomness import choose
@@ -12,6 +11,7 @@ from dorothie_gym.sim.state.body_records import VehicleRecord
 from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.town_records import LaneRecord
 from dorothie_gym.sim.traffic.parameters import AFTER_END, CYCLIST_FROM_EDGE, PLANNED
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

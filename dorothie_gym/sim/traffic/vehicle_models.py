@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from dorothie_gym import portable_math as pm
-from dorothie_gym.compilation import compiled, inlined
 from dorothie_gym.maps.model import Array
 from dorothie_gym.sim.network.lane_lookup import project, value_near, wrap_radians
 from dorothie_gym.sim.state.body_records import VehicleRecord
@@ -40,6 +38,8 @@ from dorothie_gym.sim.traffic.parameters import (
     TIME_WANTED,
 )
 from dorothie_gym.sim.traffic.route import take
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation import compiled, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays

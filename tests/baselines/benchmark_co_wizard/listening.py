@@ -8,16 +8,16 @@ from typing import Any, NamedTuple
 
 from dorothie_gym.baselines.benchmark_co_wizard.history import History, HistoryTracker
 from dorothie_gym.baselines.benchmark_co_wizard.policy import spans_of
-from dorothie_gym.benchmark.features import HistorySizes
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
+from dorothie_gym.evaluation.rollout import play_session
+from dorothie_gym.evaluation.teacher_forced.features import HistorySizes
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import Policy, make_policy
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.recording import Session
-from dorothie_gym.rollout import play_session
-from dorothie_gym.spaces import ActionDict, CoWizardAction, heard_acts
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording import Session
+from dorothie_gym.session.spaces import ActionDict, CoWizardAction, heard_acts
 from tests.baselines.benchmark_co_wizard.whole_history import WholeHistory
 
 EVERYTHING = HistorySizes(moves=1 << 20, utterances=1 << 20, actions=1 << 20, window=1 << 20)

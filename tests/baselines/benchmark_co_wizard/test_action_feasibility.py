@@ -12,8 +12,8 @@ from dorothie_gym.maps import load_town
 from dorothie_gym.maps.model import LinkType
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, PhysicalAction
 from dorothie_gym.policies.route_progress import Choice
+from dorothie_gym.session.spaces import Physical
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces import Physical
 from tests.baselines.benchmark_co_wizard.observed import town, view
 
 TURN, SWITCH, ROUND = PhysicalAction.J_TURN, PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from dorothie_gym.baselines.benchmark_co_wizard.history import History, HistoryTracker, carried_out
-from dorothie_gym.benchmark.features import HistorySizes
 from dorothie_gym.dialogue import Span
+from dorothie_gym.evaluation.teacher_forced.features import HistorySizes
 from dorothie_gym.ontology import DialogueAct, DialogueMove, PhysicalAction, Role
+from dorothie_gym.session.spaces import Physical, Speech
 from dorothie_gym.sim.state.codes import Motion
-from dorothie_gym.spaces import Physical, Speech
 from tests.baselines.benchmark_co_wizard.observed import town, view
 
 OKAY = DialogueAct.of(DialogueMove.ACKNOWLEDGE)

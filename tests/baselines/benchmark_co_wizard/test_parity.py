@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.benchmark.features import Columns, HistorySizes, columns_of, gather, points
-from dorothie_gym.benchmark.features.incremental import trajectory_at_tenths
-from dorothie_gym.benchmark.features.session_columns import town_graph
+from dorothie_gym.archive import OBJECT_VALUES, Task
 from dorothie_gym.dialogue import Span
+from dorothie_gym.evaluation.teacher_forced.features import Columns, HistorySizes, columns_of, gather, points
+from dorothie_gym.evaluation.teacher_forced.features.incremental import trajectory_at_tenths
+from dorothie_gym.evaluation.teacher_forced.features.session_columns import town_graph
 from dorothie_gym.ontology import DialogueAct, DialogueMove, PhysicalAction, Role
-from dorothie_gym.recording import OBJECT_VALUES, Task
-from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
-from dorothie_gym.spaces import Physical
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
+from dorothie_gym.session.spaces import Physical
 from tests.baselines.benchmark_co_wizard.listening import Played, play
-from tests.benchmark.features.played import seen
+from tests.evaluation.teacher_forced.features.played import seen
 
 ESTIMATED = {
     "window_pose", "window_speed", "window_lane", "window_kind", "window_values", "window_objects_mask",

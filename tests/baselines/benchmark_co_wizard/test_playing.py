@@ -13,13 +13,13 @@ import pytest
 from dorothie_gym.baselines.benchmark_co_wizard.inference import BenchmarkModel
 from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.experiment import Experiment, run_experiment
-from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.evaluation.closed_loop import RolloutSettings, roll_out
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, find_player
-from dorothie_gym.recording import Session
-from dorothie_gym.rollout.closed_loop import RolloutSettings, roll_out
-from dorothie_gym.spaces import SpaceLimits
-from tests.benchmark.corpora import corpus
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording import Session
+from dorothie_gym.session.spaces import SpaceLimits
+from tests.evaluation.teacher_forced.corpora import corpus
 
 MODELS = ("toto", "reader", "toto-trained-text")
 

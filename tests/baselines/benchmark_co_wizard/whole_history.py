@@ -10,15 +10,15 @@ from typing import Any, Self
 import numpy as np
 
 from dorothie_gym.baselines.benchmark_co_wizard.observation_frames import header_of, observed_frame
-from dorothie_gym.benchmark.features import Columns
-from dorothie_gym.benchmark.features.corpus_columns import join
-from dorothie_gym.benchmark.features.incremental import ObservedFrame
-from dorothie_gym.benchmark.features.session_columns import extract, town_graph
 from dorothie_gym.dialogue import Span
+from dorothie_gym.evaluation.teacher_forced.features import Columns
+from dorothie_gym.evaluation.teacher_forced.features.corpus_columns import join
+from dorothie_gym.evaluation.teacher_forced.features.incremental import ObservedFrame
+from dorothie_gym.evaluation.teacher_forced.features.session_columns import extract, town_graph
 from dorothie_gym.maps import Town
 from dorothie_gym.ontology import NAVIGATION_ACTIONS, ArgumentKind, Role
 from dorothie_gym.policies.co_wizard.view import CoWizardView
-from dorothie_gym.recording import (
+from dorothie_gym.session.recording import (
     ACTOR_DTYPE,
     TRAJECTORY_DTYPE,
     WEATHER_DTYPE,
@@ -30,10 +30,10 @@ from dorothie_gym.recording import (
     Surroundings,
     Trajectory,
 )
-from dorothie_gym.recording.surroundings import LIGHT_DTYPE
-from dorothie_gym.recording.trajectory import FRAMES_PER_TENTH
+from dorothie_gym.session.recording.surroundings import LIGHT_DTYPE
+from dorothie_gym.session.recording.trajectory import FRAMES_PER_TENTH
+from dorothie_gym.session.spaces import Physical
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.spaces import Physical
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

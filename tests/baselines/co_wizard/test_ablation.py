@@ -10,10 +10,10 @@ from benchmarks.co_wizard_ablation import make
 from dorothie_gym.baselines.co_wizard.demonstrations import observed
 from dorothie_gym.baselines.co_wizard.memory import Memory
 from dorothie_gym.baselines.co_wizard.policy import Turn
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy, pretrained_folder
 from dorothie_gym.policies.policy import AnyPolicy, policy_inputs, policy_seed
+from dorothie_gym.session.session_engine import SessionEngine
 
 DECISIONS = 140
 """Decisions of a test: a goal is named, approached and asked about."""

@@ -6,7 +6,6 @@ from dorothie_gym.baselines.co_wizard.memory import VARIABLES, Memory, Update
 from dorothie_gym.baselines.co_wizard.remarks import filled, form_of, sources
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Predicate, Proposition, Wording, understand
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import ActionValue, DialogueAct, DialogueMove, LandmarkName, ObjectClass, Role, StreetName
 from dorothie_gym.policies import act_builders
 from dorothie_gym.policies.co_wizard.answers import RECENT_STOP
@@ -15,6 +14,7 @@ from dorothie_gym.policies.co_wizard.view import CoWizardView
 from dorothie_gym.policies.observation_parser import HeardUtterance, street_of
 from dorothie_gym.policies.policy import replace
 from dorothie_gym.policies.speech import intend
+from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.sim.state.codes import Motion
 
 STANDS = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)

@@ -7,9 +7,9 @@ from dorothie_gym.baselines.co_wizard.demonstrations import observed
 from dorothie_gym.baselines.co_wizard.examples import correcting_example
 from dorothie_gym.baselines.co_wizard.memory import GoalEvent, Update
 from dorothie_gym.baselines.co_wizard.teacher import Lesson
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import LandmarkName
-from dorothie_gym.spaces import CoWizardAction
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces import CoWizardAction
 from tests.baselines.co_wizard.test_hearing import heard
 
 

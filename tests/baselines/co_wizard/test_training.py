@@ -10,14 +10,14 @@ from dorothie_gym.baselines.co_wizard.files import load_network
 from dorothie_gym.baselines.co_wizard.hearing import KEPT, UTTERANCE_SIZE
 from dorothie_gym.baselines.co_wizard.training import CoWizardTraining, train_co_wizard
 from dorothie_gym.baselines.imitation.rounds import LESSONS
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import ModelFileError, SessionError
+from dorothie_gym.evaluation.rollout import generate_corpus
+from dorothie_gym.evaluation.rollout.play import play_session
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedParticipant, find_player
-from dorothie_gym.rollout import generate_corpus
-from dorothie_gym.rollout.play import play_session
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces import SpaceLimits
 
 pytestmark = pytest.mark.timeout(600)
 

@@ -8,7 +8,7 @@ from dorothie_gym.baselines.junction_reader import JunctionReader, exit_table, m
 from dorothie_gym.baselines.junction_reader.features import label_words
 from dorothie_gym.baselines.model_io import NFD
 from dorothie_gym.baselines.toto import FrozenTexts, Towns
-from dorothie_gym.benchmark.features import build
+from dorothie_gym.evaluation.teacher_forced.features import build
 from dorothie_gym.maps.lane_graph import EDGE_TYPES, FEATURES, EdgeType
 from dorothie_gym.ontology import LABELS, LandmarkName, ObjectClass, PhysicalAction, StreetName
 from dorothie_gym.ontology.dialogue_acts import LABEL_INDEX
@@ -140,9 +140,9 @@ def test_spans_with_known_acts_are_marked():
 
 @pytest.mark.slow
 def test_exits_of_a_played_corpus_hold_nearly_all_turns(tmp_path):
-    from dorothie_gym.benchmark.features import points
-    from dorothie_gym.recording import Task
-    from dorothie_gym.rollout import generate_corpus
+    from dorothie_gym.archive import Task
+    from dorothie_gym.evaluation.rollout import generate_corpus
+    from dorothie_gym.evaluation.teacher_forced.features import points
 
     generate_corpus(tmp_path, sessions=6, seed=1, workers=1)
     columns = build(tmp_path)

@@ -6,12 +6,12 @@ import pytest
 
 from dorothie_gym.baselines.participant.observed_truth import is_denied
 from dorothie_gym.dialogue import CommunicativeFunction, Predicate, Proposition
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import ObjectClass, Role, WeatherParameter
 from dorothie_gym.policies.notable_conditions import CROWDS, crowd_remark, weather_change_remark
 from dorothie_gym.policies.observation_parser import PARAMETERS
 from dorothie_gym.policies.participant.view import ParticipantView
 from dorothie_gym.policies.speech import intend
+from dorothie_gym.session.session_engine import SessionEngine
 
 FOG = WeatherParameter.FOG_DENSITY
 

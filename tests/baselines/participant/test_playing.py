@@ -15,15 +15,15 @@ from dorothie_gym.baselines.participant.remarks import STOP_FORM, form_of
 from dorothie_gym.baselines.participant.teacher import Teacher
 from dorothie_gym.dialogue import CommunicativeFunction as Function
 from dorothie_gym.dialogue import Direction, Wording, guess_spans, load_lexicon, understand
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import ActionValue, DialogueMove, LandmarkName, MentalAction, Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, act_builders
 from dorothie_gym.policies.observation_parser import HeardUtterance
 from dorothie_gym.policies.participant.orders import order
 from dorothie_gym.policies.policy import policy_inputs, policy_seed
 from dorothie_gym.policies.speech import intend
-from dorothie_gym.spaces import CoWizardAction, SpaceLimits, observation_space
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces import CoWizardAction, SpaceLimits, observation_space
 
 GUIDE, DRIVER, ADVERSARY = Role.PARTICIPANT, Role.CO_WIZARD, Role.AD_WIZARD
 SEED = 21

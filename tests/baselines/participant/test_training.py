@@ -7,14 +7,14 @@ from safetensors.torch import load_file
 from dorothie_gym.baselines.imitation.rounds import LESSONS, RoundSettings
 from dorothie_gym.baselines.participant.files import load_network
 from dorothie_gym.baselines.participant.training import train_participant
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.errors import ModelFileError, SessionError
+from dorothie_gym.evaluation.rollout import generate_corpus
+from dorothie_gym.evaluation.rollout.play import play_session
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ScriptedAdWizard, ScriptedCoWizard, find_player
-from dorothie_gym.rollout import generate_corpus
-from dorothie_gym.rollout.play import play_session
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces import SpaceLimits
 
 pytestmark = pytest.mark.timeout(600)
 

@@ -14,12 +14,12 @@ from dorothie_gym.baselines.rl import Training, TrainingSettings, tuned_settings
 from dorothie_gym.baselines.rl.behaviour_cloning import clone, read_demonstrations
 from dorothie_gym.baselines.rl.checkpoint import make_model
 from dorothie_gym.baselines.rl.environments import make_env
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.errors import SessionError, SettingsError
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES
 from dorothie_gym.policies import make_policy
-from dorothie_gym.rollout import play_session
+from dorothie_gym.session.config import EnvConfig
 
 NAVIGATION = "dorothie_gym/Navigation-v0"
 SMALL = {"n_steps": 16, "batch_size": 32, "n_epochs": 1}

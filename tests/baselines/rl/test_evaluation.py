@@ -6,12 +6,12 @@ import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the extra 'baselines'")
 
-from dorothie_gym.analysis.intervals import wilson_interval
 from dorothie_gym.baselines.rl import evaluate_policy
 from dorothie_gym.baselines.rl.evaluation import evaluate_settings, play_batch
 from dorothie_gym.baselines.rl.settings import NAVIGATION, TrainingSettings
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.envs.navigation_vector_env import NavigationVectorEnv
+from dorothie_gym.evaluation.analysis.intervals import wilson_interval
 from tests.envs.navigation_drivers import follow_lane, obey
 
 

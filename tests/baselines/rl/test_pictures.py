@@ -24,7 +24,7 @@ from dorothie_gym.cli.app import app
 from dorothie_gym.errors import PolicyLoadError, SettingsError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.policy_loader import find_player
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.session.spaces import SpaceLimits
 
 NAVIGATION, CONTINUOUS = "dorothie_gym/Navigation-v0", "dorothie_gym/Navigation-continuous-v0"
 

@@ -17,17 +17,17 @@ from dorothie_gym.baselines.rl.environments import make_env
 from dorothie_gym.baselines.rl.evaluation import greedy_policy
 from dorothie_gym.baselines.rl.run import TrainingEvaluation
 from dorothie_gym.baselines.rl.training import best_of
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.errors import ModelFileError, SettingsError
+from dorothie_gym.evaluation.closed_loop import RolloutSettings, parse_towns, roll_out
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.maps import load_town
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, find_player
-from dorothie_gym.recording import Session
-from dorothie_gym.rollout import play_session
-from dorothie_gym.rollout.closed_loop import RolloutSettings, parse_towns, roll_out
-from dorothie_gym.spaces import SpaceLimits
-from dorothie_gym.spaces.flat import FlatActions
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording import Session
+from dorothie_gym.session.spaces import SpaceLimits
+from dorothie_gym.session.spaces.flat import FlatActions
 
 
 def train(folder: Path, algorithm: str = "ppo", **changes: Any) -> None:

@@ -112,7 +112,7 @@ def test_failure_while_a_checkpoint_is_written_leaves_the_one_before(
     settings = settings_for("ppo", **POLE)
     Training(settings, tmp_path / "whole").run()
     with monkeypatch.context() as patched:
-        patched.setattr("dorothie_gym.files.os.replace", _failing_from(9))
+        patched.setattr("dorothie_gym.support.files.os.replace", _failing_from(9))
         with pytest.raises(OSError, match="No space left"):
             Training(settings, tmp_path / "cut").run()
     Training(settings, tmp_path / "cut").run()

@@ -22,7 +22,7 @@ from dorothie_gym.baselines.rl.environments import make_training_env
 from dorothie_gym.errors import ModelFileError, PolicyLoadError, SettingsError
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.policy_loader import find_player
-from dorothie_gym.spaces import SpaceLimits
+from dorothie_gym.session.spaces import SpaceLimits
 
 DISCRETE = "dorothie_gym/Navigation-v0"
 CONTINUOUS = "dorothie_gym/Navigation-continuous-v0"

@@ -12,6 +12,8 @@ import torch
 
 pytest.importorskip("transformers")
 
+from dorothie_gym.archive import Task
+from dorothie_gym.archive.recorded_perception import ObjectKind
 from dorothie_gym.baselines import checkpoints
 from dorothie_gym.baselines.dataset import Dataset
 from dorothie_gym.baselines.model_zoo import find_row, make_model
@@ -21,15 +23,14 @@ from dorothie_gym.baselines.vision.detected_boxes import DetectedBoxes, actors_a
 from dorothie_gym.baselines.vision.detector import Detector
 from dorothie_gym.baselines.vision.frames import SPACE_COLUMNS
 from dorothie_gym.baselines.vision.segformer import SegFormer
-from dorothie_gym.benchmark.features import columns_of, points
-from dorothie_gym.camera.pose import CameraPose, view_from
 from dorothie_gym.errors import CheckpointError
+from dorothie_gym.evaluation.teacher_forced.features import columns_of, points
 from dorothie_gym.maps.catalogue import find_town
-from dorothie_gym.recording import ActorKind, Session, Task
-from dorothie_gym.recording.recorded_perception import ObjectKind
+from dorothie_gym.pictures.camera.pose import CameraPose, view_from
+from dorothie_gym.session.recording import ActorKind, Session
 from tests.baselines.vision.test_detector import TINY
 from tests.baselines.vision.test_segformer import TINY as TINY_READER
-from tests.benchmark.features.played import play
+from tests.evaluation.teacher_forced.features.played import play
 
 ANY = 0.0
 """Threshold by which every query is an object."""

@@ -12,17 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dorothie_gym.archive import Corpus
 from dorothie_gym.baselines.vision import frames
 from dorothie_gym.baselines.vision.frames import FrameSampling, load_frames
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.errors import SessionError
+from dorothie_gym.evaluation.rollout import generate_corpus
 from dorothie_gym.ontology import ObjectClass, Role
-from dorothie_gym.recording import Corpus, EventType, Session
-from dorothie_gym.recording.events import Event
-from dorothie_gym.rollout import generate_corpus
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording import EventType, Session
+from dorothie_gym.session.recording.events import Event
 from dorothie_gym.sim.config import WorldConfig
-from dorothie_gym.user_cache import SEAL_FILE
-from tests.cache_damage import DAMAGES
+from dorothie_gym.support.user_cache import SEAL_FILE
+from tests.support.cache_damage import DAMAGES
 
 SMALL = FrameSampling(width=96, height=64, spacing=6.0, wait=3.0, most=5)
 

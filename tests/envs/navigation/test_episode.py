@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.compilation.records import plain
 from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights
 from dorothie_gym.envs.navigation.episode import LEFT_ROAD_DISTANCE, TERMS, Ending, EpisodeArrays, episode_arrays, judge
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.state.codes import Breach
 from dorothie_gym.sim.state.town_arrays import empty_town
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
+from dorothie_gym.support.compilation.records import plain
 
 WEIGHTS = NavigationWeights(
     progress=1.0, subgoal=10.0, success=100.0, collision=-3.0, infraction=-5.0, gave_up=-7.0, time=-2.0, action=-0.5,

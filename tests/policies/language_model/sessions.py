@@ -6,15 +6,15 @@ import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
-from dorothie_gym.engine.session_log import SessionSummary
+from dorothie_gym.evaluation.rollout.play import play_session
 from dorothie_gym.ontology import AGENT_ROLES, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.language_model import LanguageModelConfig, LanguageModelPolicy
 from dorothie_gym.policies.language_model.cassette import Reply
 from dorothie_gym.policies.language_model.language_model import LanguageModel, Prompt
-from dorothie_gym.rollout.play import play_session
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.session_log import SessionSummary
 
 NOWHERE = LanguageModelConfig(model="reader", url="http://127.0.0.1:9/v1")
 

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
+from dorothie_gym.archive import compare_folders
 from dorothie_gym.errors import PolicyLoadError
+from dorothie_gym.evaluation.closed_loop import RolloutSettings, roll_out
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies import ALL_SCRIPTED, find_player
 from dorothie_gym.policies.language_model import LanguageModelConfig, SimulatedTime
 from dorothie_gym.policies.language_model.cassette import Cassette, Reply
-from dorothie_gym.recording import compare_folders
-from dorothie_gym.rollout.closed_loop import RolloutSettings, roll_out
+from dorothie_gym.session.config import EnvConfig
 from tests.policies.language_model.fake_server import serving
 from tests.policies.language_model.sessions import play
 

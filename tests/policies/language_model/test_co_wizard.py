@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
+from dorothie_gym.evaluation.rollout import resimulate
 from dorothie_gym.maps import SEEN_TOWNS, UNSEEN_TOWNS
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model import LanguageModelPolicy
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.recording import Session
-from dorothie_gym.rollout import resimulate
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording import Session
+from dorothie_gym.session.session_engine import SessionEngine
 from tests.policies.language_model.prompt_reader import CoWizardReader
 from tests.policies.language_model.sessions import NOWHERE, PromptModel, play
 

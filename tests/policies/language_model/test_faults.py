@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model import Fault, LanguageModelConfig
 from dorothie_gym.policies.language_model.answer_schema import AnswerSchema, ChoiceField
 from dorothie_gym.policies.language_model.language_model import LanguageModel, Prompt
+from dorothie_gym.session.config import EnvConfig
 from tests.policies.language_model.fake_server import FakeServer, serving
 from tests.policies.language_model.sessions import play
 

@@ -10,8 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.language_model import LanguageModelPolicy
@@ -20,7 +18,9 @@ from dorothie_gym.policies.language_model.cassette import Reply
 from dorothie_gym.policies.language_model.faults import CallError
 from dorothie_gym.policies.language_model.language_model import LanguageModel, Prompt
 from dorothie_gym.policies.policy import policy_inputs, policy_seed
-from dorothie_gym.spaces import action_space, plain_text
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces import action_space, plain_text
 from tests.policies.language_model.sessions import NOWHERE
 from tests.policies.language_model.simple_readers import Dice
 

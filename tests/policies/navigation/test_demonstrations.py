@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import AGENT_ROLES, PhysicalAction, Role
@@ -16,7 +15,8 @@ from dorothie_gym.policies.navigation.demonstrations import DemonstrationRecorde
 from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.policy import policy_seed
-from dorothie_gym.spaces import CoWizardAction, Physical, noop
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.spaces import CoWizardAction, Physical, noop
 from tests.envs.navigation_drivers import obey
 
 

@@ -25,7 +25,7 @@ from dorothie_gym.policies.navigation.instructor_arrays import InstructorArrays,
 from dorothie_gym.policies.navigation.junction_exits import SECTORS
 from dorothie_gym.policies.observation_parser import SeenLandmark, read_landmarks, read_subgoals
 from dorothie_gym.policies.route_tables import route_tables
-from dorothie_gym.spaces import ObjectColumn, SubgoalColumn
+from dorothie_gym.session.spaces import ObjectColumn, SubgoalColumn
 
 
 class Talk:

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dorothie_gym.engine.config import EnvConfig
 from dorothie_gym.envs.duo_wizard_v0 import DuoWizardEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
+from dorothie_gym.evaluation.rollout import play_session
 from dorothie_gym.ontology import AGENT_ROLES, ActionValue, DialogueAct, DialogueMove, Role
 from dorothie_gym.policies import make_policy
 from dorothie_gym.policies.navigation import NavigationAction, NavigationPolicy, layout
@@ -16,8 +16,8 @@ from dorothie_gym.policies.navigation.driver_view import driver_of
 from dorothie_gym.policies.navigation.junction_exits import JunctionExits
 from dorothie_gym.policies.navigation.observation_vector import NavigationEncoder
 from dorothie_gym.policies.observation_parser import read_landmarks
-from dorothie_gym.rollout import play_session
-from dorothie_gym.spaces import AdWizardAction, CoWizardAction, ParticipantAction, Speech, noop
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.spaces import AdWizardAction, CoWizardAction, ParticipantAction, Speech, noop
 from tests.envs.navigation_drivers import obey
 
 FIELD = layout()

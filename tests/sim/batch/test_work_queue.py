@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dorothie_gym.compilation import concurrent
 from dorothie_gym.sim.batch.threads import take, turns_of
+from dorothie_gym.support.compilation import concurrent
 
 NUMBERS = 20_000
 

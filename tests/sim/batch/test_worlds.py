@@ -7,13 +7,13 @@ import functools
 import numpy as np
 import pytest
 
-from dorothie_gym.processors import available_processors
 from dorothie_gym.sim.batch.worlds import VectorWorld, step_alone
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_vehicle, populate
 from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.town_arrays import TownArrays, town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
+from dorothie_gym.support.processors import available_processors
 from tests.sim.network.towns import find_town
 
 DT = 1.0 / 30.0

@@ -7,8 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from dorothie_gym import portable_arrays as pn
-from dorothie_gym import portable_math as pm
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import PhysicalAction
@@ -17,6 +15,8 @@ from dorothie_gym.sim.ego.path import Path
 from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.world import World
+from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support import portable_math as pm
 from tests.sim.driving import network, on_lane
 
 TOWNS = ["brookside", "Town01"]

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from dorothie_gym.compilation.records import empty_records
 from dorothie_gym.ontology import ObjectClass, PropKind, Sensor, WeatherParameter
 from dorothie_gym.sim.ego.obstacles import PerceivedBody
 from dorothie_gym.sim.sensing.perception import Perception, detection_probability, position_error, see
@@ -18,6 +17,7 @@ from dorothie_gym.sim.state.codes import Kind
 from dorothie_gym.sim.state.sensing_records import EyeRecord, SeenRecord
 from dorothie_gym.sim.weather import Weather
 from dorothie_gym.sim.world import World
+from dorothie_gym.support.compilation.records import empty_records
 from tests.sim.driving import ALONE, long_lane, network, run, world_at
 
 FOG = Visibility(fog=0.05)

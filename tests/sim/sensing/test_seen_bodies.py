@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dorothie_gym.compilation.records import RecordArray, empty_records
 from dorothie_gym.ontology import ObjectClass, PropKind, WeatherParameter
 from dorothie_gym.sim.ego.obstacles import PerceivedBody
 from dorothie_gym.sim.sensing.perception import (
@@ -26,6 +25,7 @@ from dorothie_gym.sim.state.body_records import PedestrianRecord, PropRecord, Ve
 from dorothie_gym.sim.state.codes import Group, Kind, Walk
 from dorothie_gym.sim.state.sensing_records import EyeRecord, SeenRecord
 from dorothie_gym.sim.weather import Weather
+from dorothie_gym.support.compilation.records import RecordArray, empty_records
 
 P = WeatherParameter
 SKIES: dict[str, dict[WeatherParameter, float]] = {

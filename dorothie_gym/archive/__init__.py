@@ -1,0 +1,5 @@
+"""Recorded sessions: corpora, the SDN format, prediction points and comparison."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

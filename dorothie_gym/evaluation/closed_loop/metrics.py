@@ -1,0 +1,386 @@
+"""Closed-loop metrics (spec: metrics) and their figures over sessions, with confidence intervals.
+
+Over several sessions a metric is the ratio of the sums of its two parts. For metrics that a session has once (success,
+driving score) the ratio is the mean over sessions; for metrics per subgoal, exchange or exception it is the mean over
+all subgoals, exchanges or exceptions, so that a session with few exchanges has a small weight.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import ClassVar, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.evaluation.analysis.intervals import bootstrap_weights, percentile_interval, wilson_interval
+from dorothie_gym.evaluation.closed_loop.session_record import TIMEOUT, SessionRecord
+from dorothie_gym.support import portable_arrays as pn
+
+PENALTIES: Final[Mapping[str, float]] = MappingProxyType(
+    {"pedestrian": 0.50, "vehicle": 0.60, "static": 0.65, "red_light": 0.70, "stop_sign": 0.80, TIMEOUT: 0.70}
+)
+"""Factor of the driving score for each infraction, as in the CARLA leaderboard (leaderboard.carla.org, version 2)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoopMetric(ABC):
+    """Metric over one or more sessions.
+
+    Attributes:
+        key: name of the metric in JSON.
+        title: name of the metric in tables.
+        worst: value of a session that ended in an error; None leaves such sessions out.
+        is_share: whether tables show the metric in per cent.
+        counts_sessions: whether the metric is 0 or 1 for a session.
+    """
+
+    key: ClassVar[str]
+    title: ClassVar[str]
+    worst: ClassVar[float | None] = None
+    is_share: ClassVar[bool] = True
+    counts_sessions: ClassVar[bool] = False
+
+    @abstractmethod
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the contributions of a session to numerator and denominator; (0, 0) leaves the session out."""
+
+    def of(self, records: Iterable[SessionRecord]) -> float | None:
+        """Returns the metric over some sessions; None if all are left out."""
+        sums = [self.parts(record) for record in records]
+        lower = sum(part for _, part in sums)
+        return sum(part for part, _ in sums) / lower if lower else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Success(ClosedLoopMetric):
+    """Whether all live subgoals were reached in an allowed order, the destination last, without own collisions."""
+
+    key: ClassVar[str] = "success"
+    title: ClassVar[str] = "success"
+    worst: ClassVar[float | None] = 0.0
+    counts_sessions: ClassVar[bool] = True
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns 1 for a success, else 0; and 1."""
+        return float(record.success), 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalConditionSuccess(ClosedLoopMetric):
+    """Share of the live subgoals that were reached (ALFRED; Shridhar et al., 2020)."""
+
+    key: ClassVar[str] = "goal_condition_success"
+    title: ClassVar[str] = "goals"
+    worst: ClassVar[float | None] = 0.0
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the share, and 1."""
+        return (record.reached / record.live, 1.0) if record.live else (0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SPL(ClosedLoopMetric):
+    """Success weighted by path length: success x shortest / max(shortest, driven) (Anderson et al., 2018)."""
+
+    key: ClassVar[str] = "spl"
+    title: ClassVar[str] = "SPL"
+    worst: ClassVar[float | None] = 0.0
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the product, and 1."""
+        if not record.success:
+            return 0.0, 1.0
+        if record.shortest is None:
+            return 0.0, 0.0
+        longest = max(record.shortest, record.driven)
+        return (record.shortest / longest if longest else 1.0), 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteCompletion(ClosedLoopMetric):
+    """Share of the route through the live subgoals that was driven (`session_record.route_completion`)."""
+
+    key: ClassVar[str] = "route_completion"
+    title: ClassVar[str] = "completion"
+    worst: ClassVar[float | None] = 0.0
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the share, and 1."""
+        return (0.0, 0.0) if record.completion is None else (record.completion, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class InfractionScore(ClosedLoopMetric):
+    """Product of the penalties of all infractions; 1 without infractions.
+
+    Attributes:
+        penalties: factor of each kind of infraction; other kinds have the factor 1.
+    """
+
+    key: ClassVar[str] = "infraction_score"
+    title: ClassVar[str] = "infraction score"
+    is_share: ClassVar[bool] = False
+    penalties: Mapping[str, float] = field(default_factory=lambda: PENALTIES)
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the product, and 1."""
+        product = 1.0
+        for name, count in record.infractions.items():
+            product *= math.prod([self.penalties.get(name, 1.0)] * count)
+        return product, 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Infractions(ClosedLoopMetric):
+    """Number of infractions of a session that have a penalty."""
+
+    key: ClassVar[str] = "infractions"
+    title: ClassVar[str] = "infractions"
+    is_share: ClassVar[bool] = False
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns their number, and 1."""
+        return float(sum(count for name, count in record.infractions.items() if name in PENALTIES)), 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrivingScore(ClosedLoopMetric):
+    """Route completion x infraction score."""
+
+    key: ClassVar[str] = "driving_score"
+    title: ClassVar[str] = "driving score"
+    worst: ClassVar[float | None] = 0.0
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the product, and 1."""
+        share, counts = RouteCompletion().parts(record)
+        return share * InfractionScore().parts(record)[0], counts
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seconds(ClosedLoopMetric):
+    """Simulated time of a session [s]."""
+
+    key: ClassVar[str] = "seconds"
+    title: ClassVar[str] = "seconds"
+    is_share: ClassVar[bool] = False
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns the time, and 1."""
+        return record.seconds, 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExchangesPerSubgoal(ClosedLoopMetric):
+    """Exchanges per live subgoal, reached or not."""
+
+    key: ClassVar[str] = "exchanges_per_subgoal"
+    title: ClassVar[str] = "exchanges / subgoal"
+    is_share: ClassVar[bool] = False
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns exchanges, and live subgoals."""
+        return record.talk.exchanges, record.live
+
+
+@dataclass(frozen=True, kw_only=True)
+class UtterancesPerSubgoal(ClosedLoopMetric):
+    """Utterances of participant and Co-Wizard per live subgoal, reached or not."""
+
+    key: ClassVar[str] = "utterances_per_subgoal"
+    title: ClassVar[str] = "utterances / subgoal"
+    is_share: ClassVar[bool] = False
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns utterances, and live subgoals."""
+        return record.talk.utterances, record.live
+
+
+@dataclass(frozen=True, kw_only=True)
+class AbandonedExchanges(ClosedLoopMetric):
+    """Share of the exchanges that were abandoned without an answer."""
+
+    key: ClassVar[str] = "abandoned_exchanges"
+    title: ClassVar[str] = "exchanges abandoned"
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns abandoned exchanges, and all exchanges."""
+        return record.talk.abandoned, record.talk.exchanges
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClarificationRate(ClosedLoopMetric):
+    """Clarifying moves (Confuse, Clarify, Check) per exchange."""
+
+    key: ClassVar[str] = "clarification_rate"
+    title: ClassVar[str] = "clarifications / exchange"
+    is_share: ClassVar[bool] = False
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns such moves, and exchanges."""
+        return record.talk.clarifications, record.talk.exchanges
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExceptionsMet(ClosedLoopMetric):
+    """Number of exceptions that the car met (`met_exceptions`)."""
+
+    key: ClassVar[str] = "exceptions_met"
+    title: ClassVar[str] = "exceptions met"
+    is_share: ClassVar[bool] = False
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns their number, and 1."""
+        return float(sum(each.met is not None for each in record.exceptions)), 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExceptionsRecovered(ClosedLoopMetric):
+    """Share of the met exceptions from which the car recovered (`met_exceptions`)."""
+
+    key: ClassVar[str] = "exceptions_recovered"
+    title: ClassVar[str] = "recovered"
+
+    def parts(self, record: SessionRecord) -> tuple[float, float]:
+        """Returns exceptions recovered from, and exceptions met."""
+        met = [each for each in record.exceptions if each.met is not None]
+        return float(sum(each.seconds is not None for each in met)), float(len(met))
+
+
+METRICS: Final[tuple[ClosedLoopMetric, ...]] = (
+    Success(),
+    GoalConditionSuccess(),
+    SPL(),
+    RouteCompletion(),
+    Infractions(),
+    InfractionScore(),
+    DrivingScore(),
+    Seconds(),
+    ExchangesPerSubgoal(),
+    UtterancesPerSubgoal(),
+    AbandonedExchanges(),
+    ClarificationRate(),
+    ExceptionsMet(),
+    ExceptionsRecovered(),
+)
+"""All metrics that are ratios of sums, in the order of tables; `RecoverySeconds` is a median."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecoverySeconds:
+    """Median time from meeting an exception to recovery, over the exceptions recovered from [s]."""
+
+    key: ClassVar[str] = "recovery_seconds"
+    title: ClassVar[str] = "seconds to recovery"
+    is_share: ClassVar[bool] = False
+
+    def values(self, record: SessionRecord) -> tuple[float, ...]:
+        """Returns the times of one session."""
+        return tuple(each.seconds for each in record.exceptions if each.seconds is not None)
+
+    def of(self, records: Iterable[SessionRecord]) -> float | None:
+        """Returns the median over the exceptions of some sessions; None without a recovery."""
+        found = [seconds for record in records for seconds in self.values(record)]
+        return statistics.median(found) if found else None
+
+
+# --- figures over sessions --------------------------------------------------------------------------------------------
+
+BOOTSTRAP_SEED: Final = 0
+"""Seed of the bootstrap samples: equal sessions give equal intervals."""
+
+
+FigurePage: TypeAlias = dict[str, float | None]
+"""Metric over sessions in JSON types: `mean`, `low` and `high`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MetricInterval:
+    """Metric over sessions with its 95 % interval.
+
+    The interval is Wilson's for a share of sessions (success), and for shares that are 0, or 1, in all sessions, where
+    the sessions count as trials. It is the percentile bootstrap over sessions for everything else.
+
+    Attributes:
+        mean: value over all sessions; None if undefined.
+        low: lower end of the interval; None if undefined or for a single session.
+        high: upper end of the interval.
+    """
+
+    mean: float | None
+    low: float | None = None
+    high: float | None = None
+
+    def to_json(self) -> FigurePage:
+        """Returns `mean`, `low` and `high`, rounded to 6 decimals, which do not depend on the machine."""
+        return {name: None if value is None else round(value, 6) for name, value in vars(self).items()}
+
+
+def figures_of(records: Sequence[SessionRecord], errored: int = 0) -> dict[str, MetricInterval]:
+    """Returns every metric over sessions, by key.
+
+    Args:
+        records: records of the finished sessions.
+        errored: number of sessions that ended in an error; they count with the `worst` value of a metric.
+    """
+    found = {metric.key: interval_of(metric, records, errored) for metric in METRICS}
+    found[RecoverySeconds.key] = _median(records)
+    return found
+
+
+def interval_of(metric: ClosedLoopMetric, records: Sequence[SessionRecord], errored: int = 0) -> MetricInterval:
+    """Returns a metric over sessions with its interval; see `figures_of`."""
+    parts = [metric.parts(record) for record in records]
+    if metric.worst is not None:
+        parts += [(metric.worst, 1.0)] * errored
+    if not any(lower for _, lower in parts):
+        return MetricInterval(mean=None)
+    sums = np.array(parts, dtype=np.float64)  # (n, 2)
+    upper, lower = sums.sum(axis=0).tolist()
+    if metric.is_share and len(parts) > 1 and (metric.counts_sessions or upper in (0.0, lower)):
+        sessions = sum(part > 0.0 for _, part in parts)
+        low, high = wilson_interval(sessions * upper / lower, sessions)
+        return MetricInterval(mean=upper / lower, low=low, high=high)
+    drawn = pn.matmul(bootstrap_weights(len(parts), seed=BOOTSTRAP_SEED), sums)  # (RESAMPLES, 2)
+    drawn = drawn[drawn[:, 1] > 0.0]
+    return _between(float(upper / lower), drawn[:, 0] / drawn[:, 1], len(parts))
+
+
+def _median(records: Sequence[SessionRecord]) -> MetricInterval:
+    """Returns the median time to recovery; sessions are resampled with all their exceptions."""
+    metric = RecoverySeconds()
+    mean = metric.of(records)
+    if mean is None:
+        return MetricInterval(mean=None)
+    owners = [k for k, record in enumerate(records) for _ in metric.values(record)]
+    values = np.array([seconds for record in records for seconds in metric.values(record)])
+    order = np.argsort(values, kind="stable")
+    counts = bootstrap_weights(len(records), seed=BOOTSTRAP_SEED)[
+        :, np.array(owners)[order]
+    ]  # occurrences of each value in each sample
+    counts = counts[counts.sum(axis=1) > 0.0]
+    medians = _weighted_medians(values[order], counts)
+    return _between(mean, medians, len(records))
+
+
+def _weighted_medians(values: NDArray[np.float64], counts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the medians (m,) of ascending values (n,) that occur as often as counts (m, n) state."""
+    reached = np.cumsum(counts, axis=1)
+    total = reached[:, -1]
+    low = (reached >= np.floor((total + 1.0) / 2.0)[:, None]).argmax(axis=1)
+    high = (reached >= np.floor(total / 2.0 + 1.0)[:, None]).argmax(axis=1)
+    medians: NDArray[np.float64] = (values[low] + values[high]) / 2.0
+    return medians
+
+
+def _between(mean: float, drawn: NDArray[np.float64], sessions: int) -> MetricInterval:
+    if sessions < 2 or not len(drawn):
+        return MetricInterval(mean=mean)
+    low, high = percentile_interval(drawn)
+    return MetricInterval(mean=mean, low=low, high=high)

@@ -1,0 +1,245 @@
+"""Rollouts: sessions of given players in given towns, played and measured."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from dorothie_gym.evaluation.closed_loop.results import RESULT_FILE, RolloutResult, RolloutRow
+from dorothie_gym.evaluation.closed_loop.session_record import SessionRecord, measure
+from dorothie_gym.evaluation.closed_loop.usage import SessionUsage, read_usage
+from dorothie_gym.evaluation.rollout.runner import PlayedSession, SessionJob, run_sessions
+from dorothie_gym.maps.catalogue import SEEN_TOWNS, UNSEEN_TOWNS, load_town
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.language_model.config import LanguageModelConfig
+from dorothie_gym.policies.policy_loader import ALL_SCRIPTED, Player
+from dorothie_gym.session.channel_kind import ChannelKind
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording.file_names import safe_name
+from dorothie_gym.session.recording.json_io import to_page
+from dorothie_gym.support.files import write_atomically
+
+SESSIONS_FOLDER: Final = "sessions"
+"""Folder of the sessions within the folder of a rollout, for replay."""
+
+_ROLLOUTS: Final = 7
+"""Branch of the seed; corpora draw from another, so that no policy is tested on a session that it was trained on."""
+
+_GROUPS: Final[Mapping[str, tuple[str, ...]]] = {
+    "seen": SEEN_TOWNS, "unseen": UNSEEN_TOWNS, "all": (*SEEN_TOWNS, *UNSEEN_TOWNS),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class RolloutPlan:
+    """A session of a rollout.
+
+    Attributes:
+        number: number of the session in the rollout, from 0.
+        town: name or file of the town.
+        seed: seed of the session, which determines it together with the players.
+    """
+
+    number: int
+    town: str
+    seed: int
+
+    @property
+    def path(self) -> str:
+        """Folder of the session within the folder of the rollout."""
+        return f"{SESSIONS_FOLDER}/{self.number:04d}-{safe_name(Path(self.town).stem)}"
+
+    def __str__(self) -> str:
+        return f"session {self.number} ({self.town}, seed {self.seed})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RolloutSettings:
+    """Settings of a rollout, which determine its result.
+
+    Attributes:
+        cast: player of each of the three roles.
+        towns: names or files of towns, which take turns.
+        sessions: number of sessions in all towns.
+        seed: seed of the rollout; with the number of a session it gives the seed of the session, for any players.
+        config: settings of the engine.
+    """
+
+    cast: Mapping[Role, Player] = field(default_factory=lambda: ALL_SCRIPTED)
+    towns: tuple[str, ...] = UNSEEN_TOWNS
+    sessions: int = 20
+    seed: int = 0
+    config: EnvConfig = field(default_factory=EnvConfig)
+
+    def __post_init__(self) -> None:
+        """Checks the fields."""
+        if self.sessions < 1:
+            raise ValueError(f"sessions is {self.sessions}; it must be at least 1")
+        if self.seed < 0:
+            raise ValueError(f"seed is {self.seed}; it must be at least 0")
+        if not self.towns:
+            raise ValueError("towns is empty; give at least one")
+        missing = [str(role) for role in AGENT_ROLES if role not in self.cast]
+        if missing:
+            raise ValueError(f"cast has no player for {', '.join(missing)}; each of the three roles needs a player")
+
+    def plans(self) -> tuple[RolloutPlan, ...]:
+        """Returns the plans of the sessions, in order."""
+        return tuple(
+            RolloutPlan(number=number, town=self.towns[number % len(self.towns)], seed=_seed(self.seed, number))
+            for number in range(self.sessions)
+        )
+
+    def to_json(self) -> dict[str, object]:
+        """Returns the settings in JSON types, with SHA-256 and training cost of learned players."""
+        models = {
+            str(role): player.language_model.record()
+            for role, player in self.cast.items()
+            if player.language_model is not None
+        }
+        return {
+            **{str(role): self.cast[role].name for role in AGENT_ROLES},
+            "sha256": {str(role): self.cast[role].sha256 for role in AGENT_ROLES if self.cast[role].sha256},
+            "training": {str(role): dict(self.cast[role].training) for role in AGENT_ROLES if self.cast[role].training},
+            **({"language_models": models} if models else {}),
+            "towns": list(self.towns),
+            "sessions_planned": self.sessions,
+            "seed": self.seed,
+            "config": self.config.record(),
+        }
+
+
+def command_of(settings: Mapping[str, Any]) -> str:
+    """Returns the command that reproduces a rollout, from the output of `RolloutSettings.to_json`.
+
+    Settings of the engine without a command-line option are left out.
+    """
+    usual, config = EnvConfig(), settings["config"]
+    words = ["dorothie-gym", "rollout"]
+    for role in (Role.CO_WIZARD, Role.PARTICIPANT, Role.AD_WIZARD):
+        words += [f"--{str(role).replace('_', '-')}", str(settings[str(role)])]
+    words += ["--towns", ",".join(settings["towns"])]
+    words += ["--sessions", str(settings["sessions_planned"]), "--seed", str(settings["seed"])]
+    for option, name in (("--max-seconds", "max_seconds"), ("--word-errors", "word_error_rate")):
+        if config[name] != getattr(usual, name):
+            words += [option, f"{config[name]:g}"]
+    if perception := config.get("perception"):
+        words += ["--perception", perception]
+    if config.get("channel") == ChannelKind.SPEECH:
+        words += ["--speech"]
+    words += _language_model_options(settings.get("language_models", {}))
+    return shlex.join(words)
+
+
+def _language_model_options(models: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Returns the options of the language models of a rollout, whose settings are the same for all roles."""
+    if not models:
+        return []
+    usual, found = LanguageModelConfig(model="usual", url="http://localhost/v1").record(), next(iter(models.values()))
+    words = ["--llm-url", "URL"]
+    for option, name in (("--llm-time", "time"), ("--llm-timeout", "timeout"), ("--llm-tokens", "max_tokens")):
+        if found[name] != usual[name]:
+            words += [option, f"{found[name]}"]
+    if found["pictures"]:
+        words += ["--llm-pictures"]
+    return words
+
+
+def parse_towns(text: str) -> tuple[str, ...]:
+    """Parses a list of towns: "seen", "unseen", "all", names or files, separated by commas.
+
+    Raises:
+        TownError: there is no such town.
+        ValueError: the list is empty.
+    """
+    found: list[str] = []
+    for name in filter(None, (part.strip() for part in text.split(","))):
+        if name not in _GROUPS:
+            load_town(name)
+        found += [town for town in _GROUPS.get(name, (name,)) if town not in found]
+    if not found:
+        raise ValueError(f"towns is {text!r}; give seen, unseen, all, or names separated by commas")
+    return tuple(found)
+
+
+def fold_of_towns(towns: Sequence[str]) -> str | None:
+    """Returns "seen" or "unseen" if all towns belong to that fold; otherwise None."""
+    return next((fold for fold in ("seen", "unseen") if towns and set(towns) <= set(_GROUPS[fold])), None)
+
+
+def _seed(seed: int, number: int) -> int:
+    return int(np.random.SeedSequence([seed, number, _ROLLOUTS]).generate_state(1)[0] >> 1)
+
+
+# --- playing --------------------------------------------------------------------------------------------------------
+
+SETTINGS_FILE: Final = "settings.json"
+"""Settings of a rollout; a folder with other settings is refused."""
+
+
+def roll_out(
+    settings: RolloutSettings,
+    folder: Path | str,
+    *,
+    workers: int = 1,
+    ray: str | None = None,
+    on_session: Callable[[int, int], None] | None = None,
+) -> RolloutResult:
+    """Plays the sessions of a rollout, measures them, and writes the result into the folder.
+
+    The result depends neither on the number of workers nor on interruptions: a finished session is measured but not
+    played again. An interrupted run writes the result of the sessions finished so far. A session whose policy fails
+    becomes a row with an error; the next run plays it again.
+
+    Args:
+        settings: settings of the rollout.
+        folder: folder of sessions and result, created if missing.
+        workers: number of processes; more than one needs an importable main module of the caller.
+        ray: address of a Ray cluster that replaces the workers; see `dorothie_gym.evaluation.rollout.on_ray`.
+        on_session: called with the numbers of finished and of planned sessions, first with 0 and after each session.
+
+    Raises:
+        ValueError: there are no workers.
+        SessionError: the folder holds something else, or another process holds its lock.
+        ProcessError: a process died, or there is no such cluster.
+        OutputFolderError: the folder was deleted or replaced meanwhile.
+        OSError: the folder cannot be written.
+    """
+    root, rows = Path(folder), list[RolloutRow]()
+    job = SessionJob(
+        settings_file=SETTINGS_FILE,
+        settings=settings.to_json(),
+        config=settings.config,
+        cast=settings.cast,
+        evaluate=_measure,
+        keep_errors=True,
+        writes_cost=True,
+    )
+    with run_sessions(job, settings.plans(), root, workers=workers, ray=ray, on_session=on_session) as outcomes:
+        try:
+            for outcome in outcomes:
+                plan = outcome.plan
+                record, usage = outcome.result or (None, {})
+                rows.append(
+                    RolloutRow(
+                        number=plan.number,
+                        town=plan.town,
+                        seed=plan.seed,
+                        record=record,
+                        error=outcome.error,
+                        usage=usage,
+                    )
+                )
+        finally:
+            result = RolloutResult(settings=settings.to_json(), rows=tuple(sorted(rows, key=lambda row: row.number)))
+            write_atomically(root / RESULT_FILE, to_page(result.to_json()))
+    return result
+
+
+def _measure(played: PlayedSession) -> tuple[SessionRecord, SessionUsage]:
+    return measure(played.session, played.town), read_usage(played.folder)

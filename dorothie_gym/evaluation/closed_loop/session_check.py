@@ -1,0 +1,271 @@
+"""Check of one session of a rollout: its files, header, end and measures, and the session played again from its seed.
+
+A session follows from town, seed, settings and players. Town, seed and settings are those of the protocol, not those
+that the session states, and the players of the protocol choose their actions again. What is recorded must be equal.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from dorothie_gym.archive.comparison import first_difference
+from dorothie_gym.errors import DorothieGymError, SessionError, one_line, short_repr
+from dorothie_gym.evaluation.closed_loop.results import RolloutRow
+from dorothie_gym.evaluation.closed_loop.running import RolloutPlan
+from dorothie_gym.evaluation.closed_loop.session_record import measure
+from dorothie_gym.evaluation.closed_loop.task_progress import task_at_end
+from dorothie_gym.evaluation.closed_loop.usage import read_usage
+from dorothie_gym.evaluation.rollout.play import USAGE_FILE, play_session, with_personas
+from dorothie_gym.evaluation.rollout.recorded_policy import RecordedPolicy, recorded_persona
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.policies.policy import AnyPolicy, policy_seed
+from dorothie_gym.policies.policy_loader import Player
+from dorothie_gym.session.channel_kind import ChannelKind
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording.events import EndReason, EventType
+from dorothie_gym.session.recording.file_names import (
+    ACTIONS_FILE,
+    AUDIO_FOLDER,
+    EVENTS_FILE,
+    FRAMES_FILE,
+    HEADER_FILE,
+    SessionState,
+)
+from dorothie_gym.session.recording.header import SessionHeader
+from dorothie_gym.session.recording.json_io import same_json
+from dorothie_gym.session.recording.session import Session, session_state
+from dorothie_gym.session.session_engine import SessionEngine
+
+_FILES: Final = frozenset({HEADER_FILE, EVENTS_FILE, ACTIONS_FILE, FRAMES_FILE})
+"""Files of every session of a rollout."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionTask:
+    """Session to be checked.
+
+    Attributes:
+        plan: session that the protocol plans.
+        row: its row in the result; None without one.
+        simulated: whether it is played again.
+    """
+
+    plan: RolloutPlan
+    row: RolloutRow | None
+    simulated: bool
+
+    def __str__(self) -> str:
+        return str(self.plan)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionFindings:
+    """Findings about a session.
+
+    Attributes:
+        number: number of the session in the rollout.
+        faults: what is wrong, one line each.
+        digest: SHA-256 of its content; None if it could not be read.
+        simulated: whether it was played again and found equal.
+        has_persona: whether its header has a persona of a role whose policy cannot be played again.
+    """
+
+    number: int
+    faults: tuple[str, ...]
+    digest: str | None = None
+    simulated: bool = False
+    has_persona: bool = False
+
+
+class SessionChecker:
+    """Checks the sessions of a rollout, one after the other.
+
+    Args:
+        root: folder of the rollout.
+        config: settings of the protocol.
+        cast: players that are played again. The other roles take their recorded actions.
+    """
+
+    def __init__(self, root: Path, config: EnvConfig, cast: Mapping[Role, Player]) -> None:
+        self._root, self._config, self._cast = root, config, dict(cast)
+        self._engines: dict[str, SessionEngine] = {}
+        self._policies: dict[tuple[str, Role], AnyPolicy] = {}
+
+    def __call__(self, task: SessionTask) -> SessionFindings:
+        """Returns what is found about a session; the first kind of fault ends its check."""
+        plan = task.plan
+        found = SessionFindings(number=plan.number, faults=())
+        try:
+            row = self._row(task)
+            session = self._load(plan, row)
+            found = replace(
+                found,
+                digest=session.digest,
+                has_persona=any(recorded_persona(session, role) for role in AGENT_ROLES if role not in self._cast),
+            )
+            self._check_header(plan, session)
+            _check_end(session, self._config)
+            if task.simulated:
+                self._play_again(plan, session)
+                found = replace(found, simulated=True)
+            faults = tuple(f"{plan}: {fault}" for fault in self._differences(plan, session, row))
+        except DorothieGymError as error:
+            faults = (f"{plan}: {error}",)
+        return replace(found, faults=faults)
+
+    # --- Row and files ------------------------------------------------------------------------------------------------
+
+    def _row(self, task: SessionTask) -> RolloutRow:
+        plan, row = task.plan, task.row
+        if row is None:
+            raise SessionError("has no row")
+        if (row.town, row.seed) != (plan.town, plan.seed):
+            raise SessionError(f"its row is of {one_line(row.town)}, seed {row.seed}")
+        if row.record is None:
+            if session_state(self._root / plan.path) is SessionState.FINISHED:
+                raise SessionError("its row has an error, but the session is finished")
+            raise SessionError(
+                f"ended in an error ({one_line(row.error, 120)}); a submission has complete sessions only: mend the "
+                "policy and run the rollout again, which plays this session again"
+            )
+        if surplus := sorted(row.usage.keys() - {str(Role.CO_WIZARD)}):
+            raise SessionError(f"its row has a usage of {surplus[0]}, whose policy has none")
+        return row
+
+    def _load(self, plan: RolloutPlan, row: RolloutRow) -> Session:
+        folder = self._root / plan.path
+        if session_state(folder) is not SessionState.FINISHED:
+            raise SessionError(f"{folder}: holds no finished session")
+        session = Session.load(folder)
+        if not session.complete:
+            raise SessionError("is not complete: its header counts other events or frames than there are")
+        if session.decisions is None:
+            raise SessionError(f"has no {ACTIONS_FILE}; it cannot be played again")
+        self._check_files(folder, session, row)
+        return session
+
+    def _check_files(self, folder: Path, session: Session, row: RolloutRow) -> None:
+        known = set(_FILES)
+        if row.usage and Role.CO_WIZARD not in self._cast:
+            known.add(USAGE_FILE)
+        if self._config.channel is ChannelKind.SPEECH:
+            named = {str(event.data["audio"]) for event in session.events if "audio" in event.data}
+            _check_names(folder / AUDIO_FOLDER, named)
+            known |= {AUDIO_FOLDER} if named else set()
+        _check_names(folder, known)
+
+    # --- What follows from town, seed and settings --------------------------------------------------------------------
+
+    def _engine(self, town: str) -> SessionEngine:
+        if town not in self._engines:
+            self._engines[town] = SessionEngine(town, config=self._config)
+        return self._engines[town]
+
+    def _policies_of(self, plan: RolloutPlan, session: Session) -> dict[Role, AnyPolicy]:
+        engine, policies = self._engine(plan.town), dict[Role, AnyPolicy]()
+        for role in AGENT_ROLES:
+            if role not in self._cast:
+                policies[role] = RecordedPolicy(session, role, frames=self._config.frames, limits=engine.limits)
+                continue
+            key = (plan.town, role)
+            if key not in self._policies:
+                self._policies[key] = self._cast[role].make(role, engine.limits)
+            policies[role] = self._policies[key]
+        return policies
+
+    def _check_header(self, plan: RolloutPlan, session: Session) -> None:
+        engine, header = self._engine(plan.town), session.header
+        if (header.town, header.seed) != (engine.town.name, plan.seed):
+            raise SessionError(f"the session is of {header.town}, seed {header.seed}")
+        if not same_json(header.config, self._config.record()):
+            raise SessionError("the session has other settings than the rollout")
+        policies = self._policies_of(plan, session)
+        engine.reset(seed=plan.seed)
+        states = {role: policies[role].initial_state(policy_seed(plan.seed, role), engine.town) for role in AGENT_ROLES}
+        drawn = with_personas(engine.session_header(), policies, states)
+        difference = first_difference(_only_header(session, header), _only_header(session, drawn))
+        if difference is not None:
+            raise SessionError(f"its header is not what its seed gives: {difference}")
+        if not same_json(header.to_json(), drawn.to_json()):
+            raise SessionError(f"was recorded by version {header.package_version}, format {header.format_version}")
+
+    def _play_again(self, plan: RolloutPlan, session: Session) -> None:
+        """Raises `SessionError` if the session, played again, is not the recorded one."""
+        with tempfile.TemporaryDirectory(prefix="dorothie_gym-") as folder:
+            try:
+                play_session(
+                    self._engine(plan.town), self._policies_of(plan, session), seed=plan.seed, folder=Path(folder) / "s"
+                )
+            except OSError:
+                raise  # of the temporary folder
+            except Exception as error:  # recorded actions are the submitter's: whatever they break is their fault
+                raise SessionError(f"cannot be played again: {type(error).__name__}: {one_line(error)}") from error
+            again = Session.load(Path(folder) / "s")
+            difference = first_difference(session, again, strict=True)
+            if difference is not None:
+                raise SessionError(f"simulated again, it differs at {difference}")
+            if session.digest != again.digest:
+                raise SessionError("simulated again, its content has another hash")
+            if session.report.to_json() != again.report.to_json():
+                raise SessionError("its files have parts that no session has; `dorothie-gym show` names them")
+            for name, audio in again.audio.items():
+                if session.audio[name].read_bytes() != audio.read_bytes():
+                    raise SessionError(f"simulated again, {AUDIO_FOLDER}/{name} differs")
+
+    # --- Measures -----------------------------------------------------------------------------------------------------
+
+    def _differences(self, plan: RolloutPlan, session: Session, row: RolloutRow) -> Iterator[str]:
+        """Yields where the row is not what the session measures."""
+        assert row.record is not None
+        try:
+            wanted = measure(session, self._engine(plan.town).town).to_json()
+        except Exception as error:  # a session that was not played again may hold anything
+            raise SessionError(f"cannot be measured: {type(error).__name__}: {one_line(error)}") from error
+        given: Mapping[str, object] = row.record.to_json()
+        for name, value in wanted.items():
+            if not same_json(value, given.get(name)):
+                yield f"{name} is {given.get(name)!r}; the session has {value!r}"
+        if read_usage(self._root / plan.path) != dict(row.usage):
+            yield "the usage of language models is not that recorded beside the session"
+
+
+def _check_names(folder: Path, known: set[str]) -> None:
+    """Raises `SessionError` if a folder has other files than the known ones."""
+    found = {path.name for path in folder.iterdir()} if folder.is_dir() else set[str]()
+    if surplus := sorted(found - known):
+        raise SessionError(f"{folder / surplus[0]}: is no part of a session, and nothing checks it; remove it")
+    if missing := sorted(known - found):
+        raise SessionError(f"{folder / missing[0]}: is missing")
+
+
+def _check_end(session: Session, config: EnvConfig) -> None:
+    """Raises `SessionError` unless a session arrived or ran out of time."""
+    ends = session.of_type(EventType.END)
+    if len(ends) != 1 or session.events[-1] is not ends[0]:
+        raise SessionError(f"has {len(ends)} events of type {EventType.END}; a session has one, which is its last")
+    reason, last = ends[0].data.get("reason"), session.duration
+    frames = session.trajectory["frame"]
+    if not len(frames) or frames[-1] != ends[0].frame or frames[-1] - frames[0] + 1 != len(frames):
+        raise SessionError(f"its {len(frames)} frames do not run to its end at {last:g} s")
+    if (session.summary or {}).get("reason") != reason:
+        raise SessionError(f"its last event has the reason {short_repr(reason)}, its outcome another one")
+    if reason == EndReason.OUT_OF_TIME:
+        if last < config.max_seconds - 1e-9:
+            raise SessionError(
+                f"ran out of time after {last:g} s; the time of the protocol is {config.max_seconds:g} s"
+            )
+    elif reason != EndReason.ARRIVED:
+        raise SessionError(
+            f"ended for the reason {short_repr(reason)}; a session of a submission ends when the car has arrived, or "
+            f"after {config.max_seconds:g} s"
+        )
+    elif not task_at_end(session).done:
+        raise SessionError("ended by arrival, but not all subgoals were reached")
+
+
+def _only_header(session: Session, header: SessionHeader) -> Session:
+    return Session(header=header, events=(), trajectory=session.trajectory[:0], name=session.name)

@@ -1,0 +1,159 @@
+"""Pool of worker processes that end with the process that started them.
+
+`concurrent.futures.ProcessPoolExecutor` was tried: when a worker dies, it reports neither the task nor the exit code,
+and before Python 3.14 it cannot end a running task without private attributes, so that Ctrl-C would wait for a session.
+`joblib.Parallel` (loky) was tried as well: it is as fast and ends at Ctrl-C, but it does not name the task of a dead
+worker, and its workers outlive a caller that is killed.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from multiprocessing import get_context, parent_process, resource_tracker
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Generic, TypeVar
+
+from dorothie_gym.errors import ProcessError
+from dorothie_gym.support.interruption import starting_process
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+def run_tasks(
+    prepare: Callable[[], Callable[[Task], Result]], tasks: Iterable[Task], *, workers: int
+) -> Iterator[Result]:
+    """Runs tasks in worker processes, and yields each result when its task is done, in any order.
+
+    Tasks and results travel through pipes. When the iterator is closed before the end, the processes are killed.
+
+    Args:
+        prepare: called once in each process; returns the function that runs a task. It must be picklable.
+        tasks: tasks to run.
+        workers: number of processes; 1 runs the tasks in the calling process.
+
+    Raises:
+        ProcessError: a task failed in another process, or its process died.
+        OSError: a file cannot be read or written.
+    """
+    waiting = list(reversed(list(tasks)))
+    if workers == 1:
+        work = prepare()
+        while waiting:
+            yield work(waiting.pop())
+        return
+    pool: list[_Worker[Task, Result]] = []
+    try:
+        for _ in range(min(workers, len(waiting))):
+            pool.append(_Worker(prepare))
+        for worker in pool:
+            worker.submit(waiting.pop())
+        busy = {worker.connection: worker for worker in pool}
+        while busy:
+            for connection in [found for found in wait(list(busy)) if isinstance(found, Connection)]:
+                worker = busy[connection]
+                result = worker.result()
+                if waiting:
+                    worker.submit(waiting.pop())
+                else:
+                    del busy[connection]
+                yield result
+    finally:
+        for worker in pool:
+            worker.kill()
+
+
+class _Worker(Generic[Task, Result]):
+    """Process that runs one task after another.
+
+    Attributes:
+        connection: readable when the task is done or the process is dead.
+    """
+
+    def __init__(self, prepare: Callable[[], Callable[[Task], Result]]) -> None:
+        context = get_context("spawn")  # a fork would copy the threads and locks of the caller
+        self.connection, theirs = context.Pipe()
+        self._process: BaseProcess = context.Process(target=_serve, args=(theirs, prepare), daemon=True)
+        start_process(self._process)
+        theirs.close()
+        self._task: Task | None = None
+
+    def submit(self, task: Task) -> None:
+        self._task = task
+        try:
+            self.connection.send(task)
+        except BrokenPipeError:
+            self._raise_death()
+
+    def result(self) -> Result:
+        try:
+            done, result = self.connection.recv()
+        except (EOFError, ConnectionResetError):
+            self._raise_death()
+        if not done:
+            if isinstance(result, OSError):
+                raise result
+            raise ProcessError(f"{self._task}: {result}")
+        found: Result = result
+        return found
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.join()
+        self.connection.close()
+
+    def _raise_death(self) -> None:
+        self._process.join()
+        raise ProcessError(f"{self._task}: the worker process died with code {self._process.exitcode}")
+
+
+def _serve(connection: Connection, prepare: Callable[[], Callable[[Task], Result]]) -> None:
+    """Runs the tasks of a connection until it is closed; the main function of a worker process."""
+    exit_with_parent()
+    work: Callable[[Task], Result] | None = None
+    while True:
+        try:
+            task = connection.recv()
+        except (EOFError, ConnectionResetError):
+            return
+        answer: tuple[bool, Result | str | OSError]
+        try:
+            work = work or prepare()
+            answer = True, work(task)
+        except Exception as error:  # any error is reported to the caller
+            if isinstance(error, OSError) and error.filename is not None:
+                answer = False, OSError(error.errno, error.strerror, str(error.filename))
+            else:
+                where = traceback.extract_tb(error.__traceback__)[-1]
+                place = f"{os.path.basename(where.filename)}, line {where.lineno}"
+                answer = False, f"{type(error).__name__}: {error} ({place})"
+        connection.send(answer)
+
+
+# --- One process ------------------------------------------------------------------------------------------------------
+
+
+def start_process(process: BaseProcess) -> None:
+    """Starts a worker process, which Ctrl-C does not reach; its function must begin with `exit_with_parent`."""
+    if os.name == "posix":
+        resource_tracker.ensure_running()  # its start would unblock the signals
+    with starting_process():
+        process.start()
+
+
+def exit_with_parent() -> None:
+    """Ends this worker process when its parent ends, and ignores Ctrl-C, which the parent handles."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_wait_for_parent, daemon=True).start()
+
+
+def _wait_for_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

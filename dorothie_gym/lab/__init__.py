@@ -1,0 +1,1 @@
+"""People in the browser: the console, studies and annotation."""

@@ -1,0 +1,57 @@
+"""Recordings of spoken turns as the audio of dialogue moves: the field `audio` of the events of a session."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.session.recording.events import Event, EventType
+
+
+class SpanRecordings:
+    """Names of the recordings of the spans that people have said and that are not over yet.
+
+    The engine knows nothing of recordings. A span is found again by its speaker and words when its utterance is over;
+    spans of the same words are over in the order in which they were said.
+    """
+
+    def __init__(self) -> None:
+        self._said: dict[Role, deque[tuple[str, str | None]]] = {}
+
+    def say(self, role: Role, text: str, audio: str | None) -> None:
+        """Notes a span.
+
+        Args:
+            role: speaker.
+            text: words.
+            audio: name of the recording of its turn; None for a typed one.
+        """
+        self._said.setdefault(role, deque()).append((text, audio))
+
+    def named(self, events: Sequence[Event]) -> tuple[Event, ...]:
+        """Returns events in which the dialogue moves that were spoken into a microphone name their recordings."""
+        return tuple(self._named(events))
+
+    def _named(self, events: Sequence[Event]) -> Iterator[Event]:
+        for event in events:
+            audio = self._take(event.source, str(event.data["span"])) if _is_said(event) else None
+            yield event if audio is None else replace(event, data={**event.data, "audio": audio})
+
+    def _take(self, role: Role, text: str) -> str | None:
+        """Returns the recording of the first span with these words; forgets it, and those before, which were refused.
+
+        A span that nobody said here, as a policy said it, has none.
+        """
+        said = self._said.get(role, deque())
+        if all(words != text for words, _ in said):
+            return None
+        while True:
+            words, audio = said.popleft()
+            if words == text:
+                return audio
+
+
+def _is_said(event: Event) -> bool:
+    return event.type is EventType.DIALOGUE_MOVE

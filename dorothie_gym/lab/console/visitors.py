@@ -1,0 +1,179 @@
+"""Connections of a web server: how many there are, and which of them give way when there are too many.
+
+Whoever holds a seat or another valid secret is known and keeps its connection. All others are strangers: they share
+a limited number of places, and have a limited time. When the places are taken, a new connection is still let in. Those
+that give way are of the address that has most strangers: first those that ask too often, then the oldest. So a browser
+that asks at once is served, also if the flood comes from its address.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import chain, islice
+from typing import Final
+
+from dorothie_gym.lab.console.rate_limit import TokenBucket
+
+MOST_STRANGERS: Final = 2000
+"""Most connections without a valid secret: 300 browsers that load the page at once."""
+
+MOST_KNOWN: Final = 1500
+"""Most connections with a valid secret; further ones count as strangers."""
+
+GIVING_WAY: Final = 16
+"""Connections that give way at once: they are chosen less often, which costs less."""
+
+PATIENCE: Final = 1.0
+"""Time by which a connection that has sent its request may be older than others before it gives way [s]."""
+
+STRANGER_SECONDS: Final = 20.0
+"""Time of a stranger to send a request, or to join with a websocket [s]; the slowest page has 100 kB."""
+
+KNOWN_SECONDS: Final = 120.0
+"""Time of a known person to send a request [s]: a recording of 1 MB over a line of 64 kbit/s."""
+
+ANSWER_SECONDS: Final = 60.0
+"""Time of a stranger to receive an answer [s]."""
+
+REQUESTS: Final = (60.0, 10.0)
+"""Requests of a connection that are served in turn at once, and per second: a page has 20 files."""
+
+ENDED_AT_ONCE: Final = 50
+"""Connections whose time is over that are ended in one pass: those of a flood are late together, and all of them would
+keep the seats waiting for 0.2 s."""
+
+
+def network_of(host: str | None) -> str:
+    """Returns the address by which visitors are counted: one of IPv4, or the /64 network of one of IPv6.
+
+    Args:
+        host: address of a connection, or what a proxy says about it.
+
+    Returns:
+        A short text; an empty one for what is no address.
+    """
+    try:
+        address = ipaddress.ip_address((host or "").partition("%")[0])
+    except ValueError:
+        return ""
+    if isinstance(address, ipaddress.IPv6Address):
+        if address.ipv4_mapped is not None:
+            return str(address.ipv4_mapped)
+        return str(ipaddress.ip_network((address, 64), strict=False))
+    return str(address)
+
+
+@dataclass(eq=False, kw_only=True)
+class Visitor:
+    """One connection.
+
+    Attributes:
+        address: address by which it is counted.
+        transport: the connection itself.
+        since: clock at which the server began to wait for its request [s].
+        known: whether it has shown a valid secret.
+        served: whether the server has something to do for it; otherwise it waits for the client.
+        socket: whether it is a websocket.
+        heavy: whether it asks too often.
+    """
+
+    address: str
+    transport: asyncio.Transport
+    since: float
+    known: bool = False
+    served: bool = False
+    socket: bool = False
+    heavy: bool = False
+    requests: TokenBucket = field(default_factory=lambda: TokenBucket(*REQUESTS))
+
+    def is_late(self, now: float) -> bool:
+        """Returns whether its time is over; `now` is the clock [s]."""
+        if self.known and (self.socket or self.served):
+            return False
+        return now - self.since > (
+            KNOWN_SECONDS if self.known else ANSWER_SECONDS if self.served else STRANGER_SECONDS
+        )  # fmt: skip
+
+    def rank(self) -> tuple[bool, float]:
+        """Returns a key by which connections give way, smallest first."""
+        return not self.heavy, self.since + (PATIENCE if self.served else 0.0)
+
+
+class Visitors:
+    """Connections of a server.
+
+    Args:
+        clock: clock of the server [s].
+        strangers: most connections without a valid secret.
+        known: most connections with one.
+    """
+
+    def __init__(
+        self, clock: Callable[[], float], *, strangers: int = MOST_STRANGERS, known: int = MOST_KNOWN
+    ) -> None:  # fmt: skip
+        self._clock = clock
+        self._most_strangers, self._most_known = strangers, known
+        self._strangers: dict[Visitor, None] = {}
+        self._known: set[Visitor] = set()
+        self._addresses: Counter[str] = Counter()
+        self._closed = False
+
+    def enter(self, transport: asyncio.Transport) -> Visitor:
+        """Admits a connection; others give way if there are too many."""
+        peer = transport.get_extra_info("peername")
+        now = self._clock()
+        visitor = Visitor(
+            address=network_of(peer[0] if isinstance(peer, tuple) else None), transport=transport, since=now
+        )  # fmt: skip
+        if self._closed:
+            transport.abort()
+            return visitor
+        if len(self._strangers) >= self._most_strangers:
+            self._make_room()
+        self._strangers[visitor] = None
+        self._addresses[visitor.address] += 1
+        return visitor
+
+    def leave(self, visitor: Visitor) -> None:
+        """Forgets a connection that has ended."""
+        self._known.discard(visitor)
+        if visitor in self._strangers:
+            del self._strangers[visitor]
+            self._addresses[visitor.address] -= 1
+            if not self._addresses[visitor.address]:
+                del self._addresses[visitor.address]
+
+    def recognise(self, visitor: Visitor) -> None:
+        """Notes that a connection has shown a valid secret."""
+        if visitor in self._strangers and len(self._known) < self._most_known:
+            self.leave(visitor)
+            self._known.add(visitor)
+            visitor.known = True
+
+    def sweep(self) -> None:
+        """Ends connections whose time is over, `ENDED_AT_ONCE` at most."""
+        now = self._clock()
+        late = (each for each in chain(self._strangers, self._known) if each.is_late(now))
+        for visitor in list(islice(late, ENDED_AT_ONCE)):
+            self._end(visitor)
+
+    def close(self) -> None:
+        """Ends all strangers, and admits nobody from now on: the server stops."""
+        self._closed = True
+        for visitor in list(self._strangers):
+            self._end(visitor)
+
+    def _make_room(self) -> None:
+        crowded, _ = self._addresses.most_common(1)[0]
+        candidates = [each for each in self._strangers if each.address == crowded]
+        candidates.sort(key=lambda each: each.rank())
+        for visitor in candidates[: min(GIVING_WAY, max(1, len(candidates) // 4))]:
+            self._end(visitor)
+
+    def _end(self, visitor: Visitor) -> None:
+        self.leave(visitor)
+        visitor.transport.abort()

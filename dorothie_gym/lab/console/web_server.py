@@ -1,0 +1,200 @@
+"""Web server of the commands with people in browsers: uvicorn with limits that hold under floods."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+import os
+import socket
+import time
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Final
+
+from starlette.applications import Starlette
+from starlette.requests import ClientDisconnect
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn import Config, Server
+
+from dorothie_gym.lab.console.messages import MAX_BYTES
+from dorothie_gym.lab.console.protocols import Guard, GuardedHttp, GuardedSocket
+from dorothie_gym.lab.console.turns import Turns
+from dorothie_gym.lab.console.visitors import MOST_KNOWN, MOST_STRANGERS, Visitors
+
+logger = logging.getLogger(__name__)
+
+ACCEPTED_AT_ONCE: Final = 32
+"""Connections that are accepted in one pass of the event loop; with more, it would be late for the seats."""
+
+BACKLOG: Final = 2048
+"""Connections that the system keeps until they are accepted: a flood must not fill it, as browsers then wait 1 s."""
+
+DESCRIPTORS: Final = 8192
+"""Open files that the process asks the system for: connections, records and pictures."""
+
+QUIET_SECONDS: Final = 60.0
+"""Time in which the same kind of message is not logged again [s]."""
+
+FREEZES: Final = 0, 50, 100, 300, 600
+"""Ticks of 0.1 s after which the objects that exist are no longer searched for garbage. A flood makes Python search,
+and the objects of libraries, of which a session loads some when it begins, would stop all threads for 0.3 s."""
+
+LOGGERS: Final = "uvicorn.error", "asyncio", __name__
+"""Loggers whose messages others can cause by what they send."""
+
+FORWARDED: Final = "FORWARDED_ALLOW_IPS"
+"""Variable of uvicorn with the addresses of proxies whose `X-Forwarded-For` is believed; by default of none."""
+
+
+class WebServer(Server):
+    """Server with limits for its connections.
+
+    Args:
+        config: settings of uvicorn; its protocols are of `visitors`.
+        visitors: connections.
+    """
+
+    def __init__(self, config: Config, visitors: Visitors) -> None:
+        super().__init__(config)
+        self._visitors = visitors
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Starts to listen."""
+        await super().startup(sockets)
+        for listener in sockets or ():
+            listener.listen(BACKLOG)  # asyncio has set it to the number of connections that it accepts at once
+
+    async def on_tick(self, counter: int) -> bool:
+        """Ends connections whose time is over; returns whether the server is to stop."""
+        if counter in FREEZES:
+            gc.freeze()
+        self._visitors.sweep()
+        return await super().on_tick(counter)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stops, without waiting for strangers."""
+        self._visitors.close()
+        await super().shutdown(sockets)
+
+
+def web_server(app: Starlette, *, host_names: Collection[str] = (), **options: Any) -> WebServer:
+    """Returns a server for an application.
+
+    Args:
+        app: the application.
+        host_names: further names of this machine; see `hosts.ForeignHosts`.
+        options: settings of uvicorn that differ from the usual ones.
+    """
+    app.state.host_names = frozenset(map(str.lower, host_names))
+    visitors = Visitors(time.monotonic, strangers=_allowed(MOST_STRANGERS), known=_allowed(MOST_KNOWN))
+    guard, proxies = Guard(visitors, Turns()), os.environ.get(FORWARDED, "")
+    usual: dict[str, Any] = {
+        "loop": "asyncio",
+        "http": partial(GuardedHttp, guard),
+        "ws": GuardedSocket,
+        "ws_max_size": 2 * MAX_BYTES,
+        "ws_per_message_deflate": False,
+        "proxy_headers": bool(proxies),
+        "forwarded_allow_ips": proxies,
+        "backlog": ACCEPTED_AT_ONCE,
+        "log_level": "warning",
+        "access_log": False,
+        "server_header": False,
+        "timeout_graceful_shutdown": 2,
+    }
+    config = Config(Outermost(app), **(usual | options))
+    for name in LOGGERS:  # after the configuration has set up logging
+        found = logging.getLogger(name)
+        if not any(isinstance(each, RepeatedMessages) for each in found.filters):
+            found.addFilter(RepeatedMessages())
+    return WebServer(config, visitors)
+
+
+def _allowed(most: int) -> int:
+    """Returns a number of connections that the limit of open files allows, after raising that limit."""
+    try:
+        import resource
+    except ImportError:  # Windows, which has no such limit
+        return most
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != resource.RLIM_INFINITY and soft < DESCRIPTORS:
+        wanted = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(DESCRIPTORS, hard)
+        try:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+            soft = wanted
+        except (OSError, ValueError):
+            logger.debug("the limit of open files stays at %d", soft)
+    share = most / (MOST_STRANGERS + MOST_KNOWN)
+    return most if soft == resource.RLIM_INFINITY else min(most, int(share * soft * 0.75))  # the rest is for files
+
+
+class Outermost:
+    """Ends requests whose client has gone, or that the stop of the server interrupts, without a traceback.
+
+    Args:
+        app: the application.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handles a request."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        started = False
+
+        async def note_start(message: Message) -> None:
+            nonlocal started
+            started = True
+            await send(message)
+
+        try:
+            await self._app(scope, receive, note_start)
+        except ClientDisconnect:
+            logger.debug("a client has gone before its request was complete")
+            status = 400
+        except asyncio.CancelledError:  # uvicorn cancels what is not over when it stops
+            logger.debug("the server stops before an answer is complete")
+            status = 503
+        except Exception:
+            logger.exception("a request has failed")
+            status = 500
+        else:
+            return
+        if scope["type"] == "http" and not started:
+            await send({"type": "http.response.start", "status": status, "headers": [(b"content-length", b"0")]})
+            await send({"type": "http.response.body", "body": b""})
+
+
+@dataclass
+class _Kind:
+    """Messages of one kind: when one was logged, and how many were not."""
+
+    logged: float
+    left_out: int = 0
+
+
+@dataclass
+class RepeatedMessages(logging.Filter):
+    """Logs the first message of a kind, and then one in `QUIET_SECONDS` with the number of those that were left out."""
+
+    kinds: dict[object, _Kind] = field(default_factory=dict)
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Returns whether a message is logged."""
+        kind = (record.exc_info[0] if record.exc_info else None, str(record.msg)[:30])
+        now = time.monotonic()
+        found = self.kinds.get(kind)
+        if found is not None and now - found.logged < QUIET_SECONDS:
+            found.left_out += 1
+            return False
+        if found is not None and found.left_out:
+            record.msg = f"{record.msg} ({found.left_out} more like this since the last one)"
+        if len(self.kinds) >= 100:
+            self.kinds.clear()
+        self.kinds[kind] = _Kind(now)
+        return True

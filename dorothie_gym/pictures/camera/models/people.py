@@ -1,0 +1,157 @@
+"""People who walk or stand, in several clothings, and a coarse version of each for the distance."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array
+from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.pictures.camera.mesh import Mesh
+from dorothie_gym.pictures.camera.models.solids import ModelBuilder, Palette, Rgb, Slot, dressed
+from dorothie_gym.support import portable_math as pm
+
+PHASES = 8
+"""Phases of a walking cycle of two steps."""
+
+STANDING = PHASES
+"""Pose of somebody who stands, after the phases."""
+
+POSES = PHASES + 1
+
+CYCLE = 1.4
+"""Way that a person walks in one cycle [m] (two steps of 0.7 m, Knoblauch et al. 1996)."""
+
+_THIGH, _SHANK, _SOLE = 0.43, 0.42, 0.07  # [m]
+_SWING, _ARM_SWING = 0.42, 0.42  # [rad] largest angles of thighs and arms
+_KNEE = 0.8  # [rad] largest bend of the knee of the leg that swings forward
+
+
+class Outfit(enum.IntEnum):
+    """Cut of the clothes."""
+
+    TROUSERS = 0
+    SKIRT = 1
+    COAT = 2
+    BACKPACK = 3
+
+
+@dataclass(frozen=True)
+class Look:
+    """Clothing and colours of a person."""
+
+    outfit: Outfit
+    top: Rgb
+    trousers: Rgb
+    skin: Rgb
+    hair: Rgb
+    extra: Rgb
+
+    @property
+    def palette(self) -> Palette:
+        """Colours of the parts."""
+        return {
+            Slot.TOP: self.top, Slot.TROUSERS: self.trousers, Slot.SKIN: self.skin, Slot.HAIR: self.hair,
+            Slot.EXTRA: self.extra, Slot.SHOES: (42, 38, 36),
+        }  # fmt: skip
+
+
+_SKINS: tuple[Rgb, ...] = ((226, 184, 154), (198, 148, 114), (142, 98, 72), (98, 68, 50))
+_HAIRS: tuple[Rgb, ...] = ((52, 40, 32), (26, 22, 20), (152, 112, 62), (128, 124, 120))
+_TOPS: tuple[Rgb, ...] = (
+    (184, 62, 62), (62, 98, 162), (226, 220, 208), (72, 122, 86), (232, 178, 62), (98, 74, 122), (54, 58, 64),
+    (210, 122, 150), (66, 142, 150), (150, 106, 72), (236, 236, 236), (120, 36, 52),
+)  # fmt: skip
+_TROUSERS: tuple[Rgb, ...] = ((46, 52, 74), (74, 68, 60), (34, 36, 40), (110, 104, 92), (58, 76, 104))
+_EXTRAS: tuple[Rgb, ...] = ((160, 60, 40), (40, 70, 100), (60, 80, 50))
+
+LOOKS = tuple(
+    Look(
+        Outfit(k % len(Outfit)),
+        top,
+        _TROUSERS[k % 5],
+        _SKINS[(k * 3 + k // 4) % 4],
+        _HAIRS[(k + k // 3) % 4],
+        _EXTRAS[k % 3],
+    )
+    for k, top in enumerate(_TOPS)
+)
+"""Persons to choose from."""
+
+
+def person_form(outfit: Outfit, pose: int, *, coarse: bool = False) -> Mesh:
+    """Returns a person without colours, in a phase of walking or standing."""
+    model = ModelBuilder(ObjectClass.PEDESTRIAN)
+    swing = 0.0 if pose == STANDING else pm.sin(2.0 * math.pi * pose / PHASES)
+    forward = 0.0 if pose == STANDING else pm.cos(2.0 * math.pi * pose / PHASES)
+    legs = [_leg(swing, forward), _leg(-swing, -forward)]
+    hip = _SOLE - min(float(leg[2, 2]) for leg in legs)  # the lower foot is on the ground
+    sides = 3 if coarse else 4
+    bare = outfit is Outfit.SKIRT
+    for leg, side, front in zip(legs, (1.0, -1.0), (swing, -swing), strict=True):
+        top, knee, foot = leg + (0.0, side * 0.09, hip)
+        slot = Slot.SKIN if bare else Slot.TROUSERS
+        if coarse:
+            model.limb(top, foot - (0.0, 0.0, _SOLE), (0.09, 0.06), slot, sides=3)
+        else:
+            model.limb(top, knee, (0.095, 0.07), slot, sides=sides)
+            model.limb(knee, foot, (0.07, 0.05), slot, sides=sides, shade=0.94)
+            x, y, z = foot.tolist()
+            model.box((x - 0.08, y - 0.045, z - _SOLE), (x + 0.17, y + 0.045, z + 0.02), Slot.SHOES)
+        _arm(model, side, -front, hip, sleeves=outfit is not Outfit.TROUSERS, coarse=coarse, standing=pose == STANDING)
+    _torso(model, outfit, hip, coarse=coarse)
+    return model.build()
+
+
+def dressed_person(form: Mesh, look: Look) -> Mesh:
+    """Returns a person with the colours of a look."""
+    return dressed(form, look.palette)
+
+
+def _leg(swing: float, forward: float) -> Array:
+    """Returns hip, knee and ankle (3, 3) below the middle of the hip, from the angle and the motion of the thigh."""
+    thigh = _SWING * swing + 0.14 * max(0.0, forward)
+    knee = _KNEE * max(0.0, forward) + 0.06 * abs(swing)
+    joint = np.array([_THIGH * pm.sin(thigh), 0.0, -_THIGH * pm.cos(thigh)])
+    shank = thigh - knee
+    return np.stack((np.zeros(3), joint, joint + (_SHANK * pm.sin(shank), 0.0, -_SHANK * pm.cos(shank))))
+
+
+def _arm(
+    model: ModelBuilder, side: float, swing: float, hip: float, *, sleeves: bool, coarse: bool, standing: bool
+) -> None:
+    angle = _ARM_SWING * swing
+    bend = 0.12 if standing else 0.4
+    shoulder = np.array([0.0, side * 0.215, hip + 0.52])
+    elbow = shoulder + (0.27 * pm.sin(angle), side * 0.02, -0.27 * pm.cos(angle))
+    hand = elbow + (0.25 * pm.sin(angle + bend), -side * 0.01, -0.25 * pm.cos(angle + bend))
+    if coarse:
+        model.limb(shoulder, hand, (0.05, 0.035), Slot.TOP, sides=3)
+        return
+    model.limb(shoulder, elbow, (0.055, 0.048), Slot.TOP)
+    model.limb(elbow, hand, (0.045, 0.036), Slot.TOP if sleeves else Slot.SKIN, shade=0.95)
+
+
+def _torso(model: ModelBuilder, outfit: Outfit, hip: float, *, coarse: bool) -> None:
+    sides = 4 if coarse else 6
+    waist, shoulders, neck = hip + 0.18, hip + 0.56, hip + 0.66
+    lower = {Outfit.SKIRT: (hip - 0.34, 0.22), Outfit.COAT: (hip - 0.30, 0.20)}.get(outfit, (hip - 0.05, 0.165))
+    slot = Slot.TROUSERS if outfit in (Outfit.SKIRT, Outfit.TROUSERS) else Slot.TOP
+    middle = (0.0, 0.0, waist)
+    model.limb((0.0, 0.0, lower[0]), middle, (lower[1], 0.15), slot, sides=sides, flat=0.72, shade=0.93)
+    model.limb(middle, (0.0, 0.0, shoulders), (0.15, 0.215), Slot.TOP, sides=sides, flat=0.6)
+    if coarse:
+        model.ball((0.01, 0.0, hip + 0.76), (0.10, 0.095, 0.14), Slot.SKIN, sides=4, rings=1)
+        model.ball((-0.02, 0.0, hip + 0.81), (0.10, 0.10, 0.11), Slot.HAIR, sides=4, rings=0, part=(0.0, 0.5))
+        return
+    model.limb((0.0, 0.0, shoulders), (0.0, 0.0, neck - 0.04), (0.21, 0.07), Slot.TOP, sides=sides, flat=0.6)
+    model.limb((0.0, 0.0, neck - 0.06), (0.0, 0.0, neck + 0.03), (0.055, 0.055), Slot.SKIN)
+    model.ball((0.012, 0.0, hip + 0.76), (0.105, 0.09, 0.125), Slot.SKIN)
+    model.ball((-0.018, 0.0, hip + 0.795), (0.108, 0.102, 0.115), Slot.HAIR, rings=1, part=(0.0, 0.62))
+    if outfit is Outfit.BACKPACK:
+        model.box((-0.30, -0.14, hip + 0.14), (-0.11, 0.14, hip + 0.54), Slot.EXTRA, bottom=True)
+    elif outfit is Outfit.SKIRT:
+        model.box((-0.09, 0.23, hip - 0.06), (0.13, 0.31, hip + 0.14), Slot.EXTRA, bottom=True)

@@ -1,0 +1,122 @@
+"""Pose of a camera and its pinhole projection.
+
+The world's x axis points east, its y axis south, z up; headings turn clockwise as seen from above. Picture coordinates
+run to the right and down, in pixels; the centre of the first pixel is at (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from dorothie_gym.maps.model import Array
+from dorothie_gym.session.camera_config import CameraMount
+from dorothie_gym.support import portable_arrays as pn
+from dorothie_gym.support import portable_math as pm
+from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.copying import shared
+
+
+@shared
+@dataclass(frozen=True)
+class CameraPose:
+    """Place and direction of a camera, which does not roll.
+
+    Attributes:
+        x: [m].
+        y: [m].
+        z: [m].
+        heading: [rad].
+        pitch: upwards [rad].
+        tilt: of the car that carries it, upwards [rad]: that of the road.
+    """
+
+    x: float
+    y: float
+    z: float
+    heading: float
+    pitch: float = 0.0
+    tilt: float = 0.0
+
+    def mounted(self, forward: float, up: float, pitch: float) -> Self:
+        """Returns the pose of a mount on a car with this pose.
+
+        Args:
+            forward: of the middle of the car [m].
+            up: above the road, at a right angle to it [m].
+            pitch: relative to the car [rad].
+        """
+        c, s = pm.cos(self.pitch), pm.sin(self.pitch)
+        ahead, rise = forward * c - up * s, forward * s + up * c
+        x, y = self.x + ahead * pm.cos(self.heading), self.y + ahead * pm.sin(self.heading)
+        return type(self)(x, y, self.z + rise, self.heading, self.pitch + pitch, self.pitch)
+
+
+@by_reference
+class View(NamedTuple):
+    """Pinhole projection from a pose: square pixels, the principal point in the middle.
+
+    Attributes:
+        origin: (3,) position [m].
+        axes: (3, 3) unit vectors to the right, up and forward.
+        focal: focal length [pixels].
+        width: of the picture [pixels].
+        height: of the picture [pixels].
+    """
+
+    origin: Array
+    axes: Array
+    focal: float
+    width: int
+    height: int
+
+    def scaled(self, factor: int) -> View:
+        """Returns the projection of the same picture with more pixels."""
+        return self._replace(focal=self.focal * factor, width=self.width * factor, height=self.height * factor)
+
+    def rays(self) -> Array:
+        """Returns the directions (h, w, 3) through the centres of the pixels, of length 1 along the axis."""
+        right = (np.arange(self.width) + 0.5 - 0.5 * self.width) / self.focal
+        down = (np.arange(self.height) + 0.5 - 0.5 * self.height) / self.focal
+        return np.asarray(self.axes[2] + right[None, :, None] * self.axes[0] - down[:, None, None] * self.axes[1])
+
+    def project(self, points: Array) -> tuple[Array, Array]:
+        """Returns the picture coordinates (n, 2) [pixels] of points (n, 3) [m], and their depths (n,) [m]."""
+        right, up, depth = pn.matmul(points - self.origin, self.axes.T).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = 0.5 * self.width + self.focal * right / depth
+            y = 0.5 * self.height - self.focal * up / depth
+        return np.column_stack((x, y)), depth
+
+
+def pose_on_car(mount: CameraMount, x: float, y: float, z: float, heading: float, rise: float = 0.0) -> CameraPose:
+    """Returns the pose of a camera on a car.
+
+    Args:
+        mount: place of the camera on the car.
+        x: of the car [m].
+        y: of the car [m].
+        z: of the road below it [m].
+        heading: of the car [rad].
+        rise: of the road per metre ahead.
+    """
+    return CameraPose(x, y, z, heading, pm.atan(rise)).mounted(mount.forward, mount.up, math.radians(mount.pitch))
+
+
+def view_from(pose: CameraPose, width: int, height: int, field_of_view: float) -> View:
+    """Returns the projection of a picture.
+
+    Args:
+        pose: of the camera.
+        width: [pixels].
+        height: [pixels].
+        field_of_view: horizontal [degrees].
+    """
+    c, s = pm.cos(pose.heading), pm.sin(pose.heading)
+    cp, sp = pm.cos(pose.pitch), pm.sin(pose.pitch)
+    axes = np.array([[-s, c, 0.0], [-sp * c, -sp * s, cp], [cp * c, cp * s, sp]])
+    focal = 0.5 * width / pm.tan(0.5 * math.radians(field_of_view))
+    return View(np.array([pose.x, pose.y, pose.z]), axes, focal, width, height)

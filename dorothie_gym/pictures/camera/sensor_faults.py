@@ -1,0 +1,52 @@
+"""Faults of the camera: a blurred picture, and none at all."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.ontology.world_exceptions import Sensor
+from dorothie_gym.support.compilation import concurrent
+
+_SHARE = 0.012  # radius of the blur as a share of the picture's width
+_ROUNDS = 2  # of means; two make the weights fall off linearly
+
+
+def apply_faults(picture: NDArray[np.uint8], faults: Collection[Sensor], scratch: NDArray[np.uint8]) -> None:
+    """Changes a picture (h, w, 3) as faults do: `Sensor.VIEW` leaves nothing, `Sensor.BLUR` no details.
+
+    Args:
+        picture: to be changed.
+        faults: of any sensors.
+        scratch: (max(h, w),) or longer.
+    """
+    if Sensor.VIEW in faults:
+        picture[:] = 0
+    elif Sensor.BLUR in faults:
+        radius = max(1, round(_SHARE * picture.shape[1]))
+        for _ in range(_ROUNDS):
+            for channel in range(3):
+                blur(picture, channel, radius, scratch)
+
+
+@concurrent
+def blur(picture: NDArray[np.uint8], channel: int, radius: int, scratch: NDArray[np.uint8]) -> None:
+    """Replaces a channel by its means over squares; rows and columns go on as they end."""
+    height, width, _ = picture.shape
+    for axis in range(2):
+        lines, length = (height, width) if axis == 0 else (width, height)
+        for line in range(lines):
+            for k in range(length):
+                scratch[k] = picture[line, k, channel] if axis == 0 else picture[k, line, channel]
+            total = 0
+            for k in range(-radius, radius + 1):
+                total += int(scratch[min(max(k, 0), length - 1)])
+            for k in range(length):
+                mean = (total + radius) // (2 * radius + 1)
+                if axis == 0:
+                    picture[line, k, channel] = mean
+                else:
+                    picture[k, line, channel] = mean
+                total += int(scratch[min(k + radius + 1, length - 1)]) - int(scratch[max(k - radius, 0)])

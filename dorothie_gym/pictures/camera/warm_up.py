@@ -1,0 +1,38 @@
+"""Compilation of the camera ahead of its use, see `engine.warm_up`."""
+
+from __future__ import annotations
+
+from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
+from dorothie_gym.pictures.camera.labels import write_labels
+from dorothie_gym.pictures.camera.scene_cache import town_scene
+from dorothie_gym.pictures.camera.session_camera import SessionCamera
+from dorothie_gym.pictures.camera.shading import shade
+from dorothie_gym.pictures.camera.town_scene import SessionScene
+from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.warm_up import TOWN, Progress, reporting
+from dorothie_gym.sim.config import WorldConfig
+from dorothie_gym.sim.weather import Weather
+from dorothie_gym.support.compilation.dispatcher import CompiledFunction
+
+
+def is_warm() -> bool:
+    """Returns whether pictures need no compilation."""
+    stages = shade, write_labels
+    return all(not isinstance(stage, CompiledFunction) or stage.is_cached() for stage in stages)
+
+
+def warm_up(progress: Progress | None = None) -> None:
+    """Compiles what pictures need, and keeps the scene of one town; `progress` as in `engine.warm_up.warm_up`."""
+    with reporting(progress):
+        engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
+        engine.reset(seed=0)
+        world, rain = engine.session.world, Weather()
+        rain.set(WeatherParameter.PRECIPITATION, 80.0)
+        scene = SessionScene(town_scene(world.town), landmarks=engine.session.task.storyboard.landmarks)
+        camera = SessionCamera(scene, CameraConfig(width=16, height=16, outputs=tuple(CameraOutput)))
+        camera.render(world)
+        x, y = world.car.position.tolist()
+        pose = camera.pose_on(x, y, float(world.car.height), 0.0)
+        camera.render_from(pose, world.actors.arrays, rain, time=0.0, head_lights=True, faults=(Sensor.BLUR,))

@@ -1,5 +1,0 @@
-"""Recorded sessions: format, writer, readers, prediction points, corpora and comparison."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,289 @@
+"""Observations of the roles. A value that a role must not know is never written into its observation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dorothie_gym.dialogue.conversation import Utterance
+from dorothie_gym.ontology.dialogue_acts import encode_slots
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.ontology.slots import GoalStatus
+from dorothie_gym.ontology.world_exceptions import PropKind, Sensor
+from dorothie_gym.session.beliefs import BeliefTracker
+from dorothie_gym.session.scenario import Scenario
+from dorothie_gym.session.session_views import SessionViews
+from dorothie_gym.session.spaces.actions import NO_MOVE
+from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, plain_text
+from dorothie_gym.session.spaces.observations import (
+    MAX_UTTERANCE,
+    MESSAGE_KINDS,
+    LandmarkColumn,
+    Observation,
+    SubgoalColumn,
+)
+from dorothie_gym.sim.ego.motion_control import motion_of
+from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.support.compilation import direct
+from dorothie_gym.support.copying import CachedViews
+from dorothie_gym.tasks.state import TaskState
+from dorothie_gym.tasks.storyboard import Landmark
+
+Table = NDArray[np.float64]
+
+_SENSORS = tuple(Sensor)
+_motion_of = direct(motion_of)
+_PROP_NUMBERS = {kind: 1.0 + k for k, kind in enumerate(PropKind)}
+
+
+@dataclass(kw_only=True)
+class DeliveredMessages:
+    """Speech and messages that reach the roles at a decision.
+
+    Attributes:
+        said: utterances that ended since the last decision, by speaker.
+        heard: the same utterances as the listener recognises them.
+        message: message of the Ad-Wizard to the participant.
+        speaking: remaining speaking time of each role [s].
+    """
+
+    said: Mapping[Role, Utterance]
+    heard: Mapping[Role, Utterance]
+    message: str
+    speaking: Mapping[Role, float]
+
+
+class ObservationBuilder(CachedViews):
+    """Builds the observations of a session, for the roles that are asked for.
+
+    Compiled code writes what changes at every decision (`view_steps`). Constant values are written once, and rarely
+    changing ones when they change.
+    """
+
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_tables",)
+
+    def __init__(self, views: SessionViews, scenario: Scenario, task: TaskState, beliefs: BeliefTracker) -> None:
+        """Writes what stays the same in the session.
+
+        Args:
+            views: the row of the session.
+            scenario: storyboard, street names and departure.
+            task: progress in the storyboard.
+            beliefs: places of hidden landmarks as the Co-Wizard has stated them.
+        """
+        self._views, self._world, self._task, self._beliefs = views, views.world, task, beliefs
+        self._weather: tuple[float, ...] = ()
+        self._faults: tuple[Sensor, ...] = ()
+        self._versions = (-1, -1)
+        self._props = 0
+        self._heard = self._spoke = True  # whether utterances, or remaining speaking times, may be in the row
+        views.arrays.clear(views.row)
+        self._write_constants(scenario)
+
+    @cached_property
+    def _tables(self) -> dict[Role, Observation]:
+        """Arrays of the row, by role and field."""
+        return self._views.tables()
+
+    def build(self, delivered: DeliveredMessages, roles: Sequence[Role]) -> dict[str, Observation]:
+        """Builds the observations of some roles, by agent, each in its observation space.
+
+        Args:
+            delivered: speech and messages of the last decision.
+            roles: the roles that observe.
+        """
+        self._views.observe(roles)
+        self.write(delivered)
+        arrays, row = self._views.arrays, self._views.row
+        return {_NAMES[role]: arrays.observation(role, row) for role in roles}
+
+    def write(self, delivered: DeliveredMessages) -> None:
+        """Writes all that the compiled code does not: what is said, and what has changed of the rest."""
+        self._write_talk(delivered)
+        self._write_props()
+        weather = tuple(self._world.weather.values.values())
+        if weather != self._weather:
+            self._weather = weather
+            for table in self._tables.values():
+                table["weather"][:] = weather
+        faults = tuple(self._world.faults)
+        if faults != self._faults:
+            self._faults = faults
+            self._tables[Role.AD_WIZARD]["sensors"][:] = [sensor in faults for sensor in _SENSORS]
+        versions = self._task.version, self._beliefs.version
+        if versions != self._versions:
+            self._versions = versions
+            self._write_tasks()
+            self._write_guesses(self._tables[Role.CO_WIZARD]["guesses"])
+
+    def motion(self) -> Motion:
+        """Returns the state of motion of the ego."""
+        return Motion(_motion_of(self._world.actors.arrays))
+
+    # --- rarely changing values -------------------------------------------------------------------------------------
+
+    def _write_constants(self, scenario: Scenario) -> None:
+        participant, co_wizard, ad_wizard = (self._tables[role] for role in AGENT_ROLES)
+        landmarks = scenario.storyboard.landmarks[: len(ad_wizard["hidden"])]
+        known = [landmark for landmark in landmarks if not landmark.hidden]
+        write_landmarks(participant["landmarks"], landmarks)
+        write_landmarks(ad_wizard["landmarks"], landmarks)
+        write_landmarks(co_wizard["landmarks"], known)
+        ad_wizard["hidden"][: len(landmarks)] = [landmark.hidden for landmark in landmarks]
+        for table in self._tables.values():
+            table["street_names"][: len(scenario.street_names)] = [name.value for name in scenario.street_names]
+        story = plain_text(scenario.storyboard.story, STORY_LENGTH)
+        self._views.set_text(Role.PARTICIPANT, "story", story)
+        self._views.set_text(Role.AD_WIZARD, "story", story)
+        subgoals = scenario.storyboard.subgoals[: len(ad_wizard["subgoals"])]
+        self._write_lines(Role.AD_WIZARD, "changes", (subgoal.change for subgoal in subgoals))
+        for kind in MESSAGE_KINDS:
+            messages = (getattr(subgoal.messages, kind) for subgoal in subgoals)
+            self._write_lines(Role.AD_WIZARD, f"{kind}_messages", (message and str(message) for message in messages))
+
+    def _write_lines(self, role: Role, field: str, lines: Iterable[str | None]) -> None:
+        """Writes a text with a line for each subgoal, empty for None."""
+        self._views.set_text(role, field, plain_text("\n".join(line or "" for line in lines), STORY_LENGTH))
+
+    def _write_tasks(self) -> None:
+        rows = range(min(len(self._task.storyboard.subgoals), len(self._tables[Role.AD_WIZARD]["subgoals"])))
+        for role, numbers in ((Role.PARTICIPANT, self._task.live), (Role.AD_WIZARD, rows)):
+            self._write_lines(role, "tasks", map(self._task.description, numbers))
+        for role, permissions in ((Role.PARTICIPANT, False), (Role.AD_WIZARD, True)):
+            write_subgoals(self._tables[role]["subgoals"], self._task, permissions=permissions)
+
+    def _write_guesses(self, table: Table) -> None:
+        table[:] = 0.0
+        for name, guess in self._beliefs.places.items():
+            (xx, xy), (_, yy) = guess.covariance
+            table[name.value] = (1.0, *guess.mean, xx, yy, xy)
+
+    def _write_props(self) -> None:
+        """Writes the props, if there are or were any."""
+        if not (self._props or self._world.actors.has_props):
+            return
+        props, table = self._world.actors.props, self._tables[Role.AD_WIZARD]["props"]
+        for row, prop in zip(table, props, strict=False):
+            row[:] = _PROP_NUMBERS[prop.kind], prop.position[0], prop.position[1], prop.heading
+        self._props = min(len(props), len(table))
+        table[self._props :] = 0.0
+
+    # --- talk -------------------------------------------------------------------------------------------------------
+
+    def _write_talk(self, delivered: DeliveredMessages) -> None:
+        participant, co_wizard, _ = (self._tables[role] for role in AGENT_ROLES)
+        spoke = any(delivered.speaking.values())
+        if spoke or self._spoke:
+            participant["speaking"][0] = delivered.speaking[Role.PARTICIPANT]
+            co_wizard["speaking"][0] = delivered.speaking[Role.CO_WIZARD]
+            participant["other_speaking"][0] = delivered.speaking[Role.CO_WIZARD] > 0.0
+            co_wizard["other_speaking"][0] = delivered.speaking[Role.PARTICIPANT] > 0.0
+        heard = bool(delivered.said or delivered.message)
+        if heard or self._heard:
+            message = plain_text(delivered.message, MESSAGE_LENGTH) if delivered.message else ""
+            self._views.set_text(Role.PARTICIPANT, "message", message)
+            for listener, speaker in ((Role.PARTICIPANT, Role.CO_WIZARD), (Role.CO_WIZARD, Role.PARTICIPANT)):
+                self._write_utterance(listener, speaker, delivered.heard.get(speaker))
+                self._write_utterance(Role.AD_WIZARD, speaker, delivered.said.get(speaker))
+        self._spoke, self._heard = spoke, heard
+
+    def _write_utterance(self, listener: Role, speaker: Role, utterance: Utterance | None) -> None:
+        text = "" if utterance is None else plain_text(utterance.text, MAX_UTTERANCE)
+        self._views.set_text(listener, f"{speaker}_text", text)
+        table = self._tables[listener]
+        if (moves := table.get(f"{speaker}_moves")) is None:
+            return  # acts are not observed
+        slots = table[f"{speaker}_slots"]
+        moves[:], slots[:] = NO_MOVE, 0
+        for k, act in enumerate(() if utterance is None else utterance.acts[: len(moves)]):
+            moves[k], slots[k] = int(act.move), encode_slots(act.slots)
+
+
+_NAMES = {role: str(role) for role in AGENT_ROLES}
+
+
+def write_landmarks(table: Table, landmarks: Sequence[Landmark]) -> None:
+    """Writes landmarks as rows of `LandmarkColumn`."""
+    for row, landmark in zip(table, landmarks, strict=False):
+        row[LandmarkColumn.NAME] = landmark.name.value
+        row[LandmarkColumn.X], row[LandmarkColumn.Y] = landmark.position
+        row[LandmarkColumn.LANE], row[LandmarkColumn.STATION] = landmark.lane, landmark.station
+        row[LandmarkColumn.STREET] = landmark.street
+
+
+def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
+    """Writes the subgoals as rows of `SubgoalColumn`.
+
+    Args:
+        table: table of which all rows are written.
+        task: present state of the task.
+        permissions: whether untriggered subgoals and the permitted changes of each subgoal are written.
+    """
+    table[:] = 0.0
+    triggers, deletions, changes = task.possible_triggers(), task.possible_deletions(), task.possible_changes()
+    for i, (row, subgoal) in enumerate(zip(table, task.storyboard.subgoals, strict=False)):
+        live = i in task.live
+        if not (live or permissions or task.status(i) is GoalStatus.ABANDONED):
+            continue  # not yet triggered: unknown to the participant
+        row[SubgoalColumn.LIVE] = live
+        row[SubgoalColumn.LANDMARK] = task.landmark_of(i)
+        row[SubgoalColumn.STATUS] = task.status(i).value
+        row[SubgoalColumn.REACHED] = task.reached(i)
+        row[SubgoalColumn.ALLOWED] = task.allowed(i)
+        row[SubgoalColumn.AFTER] = sum(1 << k for k in subgoal.after)
+        if permissions:
+            row[SubgoalColumn.CAN_TRIGGER] = i in triggers
+            row[SubgoalColumn.CAN_DELETE] = i in deletions
+            row[SubgoalColumn.CAN_CHANGE] = i in changes
+
+
+# --- observations on demand -------------------------------------------------------------------------------------------
+
+_AGENTS = {str(role): role for role in AGENT_ROLES}
+
+
+class Observable(Protocol):
+    """Session whose roles can be observed; `decisions` is the number of decisions played so far."""
+
+    decisions: int
+
+    def observations(self, roles: Sequence[Role]) -> dict[str, Observation]:
+        """Builds the observations of some roles at the present decision, by agent."""
+        ...
+
+
+class LazyObservations(Mapping[str, Observation]):
+    """Observations of the roles at one decision, each built when it is first read.
+
+    A mapping is valid until the session takes its next step: it raises `RuntimeError` when an observation that was not
+    read in time is asked for afterwards.
+    """
+
+    def __init__(self, session: Observable) -> None:
+        self._session, self._decision = session, session.decisions
+        self._built: dict[str, Observation] = {}
+
+    def __getitem__(self, agent: str) -> Observation:
+        return self.of((_AGENTS[agent],))[agent]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_AGENTS)
+
+    def __len__(self) -> int:
+        return len(_AGENTS)
+
+    def of(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
+        """Returns the observations of some roles by agent; those that are missing are built together."""
+        missing = [role for role in roles if role not in self._built] if self._built else roles
+        if not missing:
+            return {_NAMES[role]: self._built[role] for role in roles}
+        if self._session.decisions != self._decision:
+            raise RuntimeError(f"the session has taken a step since; the observation of {missing[0]} was not read")
+        found = self._session.observations(missing)
+        self._built.update(found)
+        return found if missing is roles else {_NAMES[role]: self._built[role] for role in roles}

@@ -1,0 +1,124 @@
+"""Parts of a session that other packages provide: pictures, perception by pictures, and spoken words.
+
+A session knows what these parts do, not how: it imports neither the camera nor speech. Where a configuration asks for a
+part, its class is found by name, as Gymnasium finds environments by the entry points of their registration.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+import numpy as np
+
+from dorothie_gym.dialogue.conversation import Utterance
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.session.cabin import CabinState
+from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.spaces.observations import Observation
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
+    from dorothie_gym.session.scenario import Scenario
+    from dorothie_gym.sim.world import World
+    from dorothie_gym.support.audio import Samples
+
+PICTURES: Final = "dorothie_gym.pictures.camera.session_pictures:SessionPictures"
+"""Entry point of what draws `Pictures`."""
+
+PERCEPTION: Final = "dorothie_gym.pictures.camera.camera_perception:CameraPerception"
+"""Entry point of the `VisiblePerception`."""
+
+SPEECH: Final = "dorothie_gym.speech.spoken_dialogue:SpokenDialogue"
+"""Entry point of the `SpokenChannel`."""
+
+
+class Pictures(Protocol):
+    """Pictures of the camera on the car of a session (`camera.session_pictures`)."""
+
+    def frame(self, decision: int) -> CameraFrame:
+        """Returns the picture at the present decision, of this number."""
+
+    def add_to(self, observations: Mapping[str, Observation], decision: int) -> None:
+        """Adds the pictures of the present decision to the observations of the roles that see them."""
+
+
+class VisiblePerception(Protocol):
+    """What the pictures of a session let the roles perceive (`camera.camera_perception`)."""
+
+    @property
+    def in_view(self) -> tuple[int, ...]:
+        """Indices of the landmarks that are recognised at the present decision, ascending."""
+
+    @property
+    def recognised(self) -> tuple[int, ...]:
+        """Indices of the landmarks that have been recognised so far, in the order of the first time."""
+
+    def look(self) -> None:
+        """Looks at the present decision."""
+
+    def pixels(self, key: int) -> int:
+        """Returns the number of visible pixels of a body, by its key."""
+
+    def add_to(self, observations: Mapping[str, Observation]) -> None:
+        """Writes what is seen into the observations of the roles that see it, which own their arrays."""
+
+
+class SpokenChannel(Protocol):
+    """Voices of a session and what is recognised of them (`speech.spoken_dialogue`).
+
+    Attributes:
+        recordings: audio of the spans that were delivered last, with noise, at 16 kHz, by file name.
+    """
+
+    recordings: dict[str, Samples]
+
+    def give_voices(self, pitches: Mapping[Role, float]) -> None:
+        """Gives speakers a pitch of their own, relative to that of the synthesiser, by role."""
+
+    def speak(self, role: Role, text: str, pace: float) -> Samples:
+        """Returns a text as a role says it, at 16 kHz (n,), at a rate relative to that of the session."""
+
+    def begin(self, role: Role, samples: Samples, end: float) -> None:
+        """Notes a span that a role has begun and that ends at a time [s]."""
+
+    def seconds(self, samples: Samples) -> float:
+        """Returns the duration of audio [s]."""
+
+    def audio_name(self, utterance: int, span: int) -> str:
+        """Returns the name of the file with the audio of a span; spans are counted from 0."""
+
+    def hear(self, utterance: Utterance, number: int, cabin: CabinState) -> Utterance:
+        """Returns what is recognised of an utterance that is over, the number-th of the session, in a car's noise."""
+
+
+def draw_pictures(world: World, scenario: Scenario, config: CameraConfig) -> Pictures:
+    """Returns the pictures of the camera on the car of a session."""
+    pictures: Pictures = _make(PICTURES, world, scenario, config)
+    return pictures
+
+
+def see_by_camera(world: World, scenario: Scenario) -> VisiblePerception:
+    """Returns the perception by the pictures of a session, after the first look."""
+    perception: VisiblePerception = _make(PERCEPTION, world, scenario)
+    return perception
+
+
+def speak_aloud(seed: np.random.SeedSequence, *, words_per_second: float, classify: bool) -> SpokenChannel:
+    """Returns the voices and the recogniser of a session.
+
+    Args:
+        seed: seed of voices and noise.
+        words_per_second: speaking rate of the session [words/s].
+        classify: as of `dialogue.Recogniser`.
+
+    Raises:
+        SpeechError: the extra `speech` is not installed.
+    """
+    channel: SpokenChannel = _make(SPEECH, seed, words_per_second=words_per_second, classify=classify)
+    return channel
+
+
+def _make(entry_point: str, *arguments: object, **settings: object) -> Any:
+    return pkgutil.resolve_name(entry_point)(*arguments, **settings)

@@ -1,0 +1,235 @@
+"""Recorder of a session in progress: events, frames, actions and surroundings, decision by decision."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from dorothie_gym.errors import SessionError
+from dorothie_gym.maps.town import Town
+from dorothie_gym.maps.traffic_lights import LightColour, LightProgramme
+from dorothie_gym.ontology.roles import AGENT_ROLES, Role
+from dorothie_gym.session.recording.action_log import Decision
+from dorothie_gym.session.recording.events import Event
+from dorothie_gym.session.recording.surroundings import ACTOR_DTYPE, ActorKind
+from dorothie_gym.session.recording.writer import SessionWriter
+from dorothie_gym.session.session_engine import SessionEngine
+from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, action_space, noop
+from dorothie_gym.session.spaces.limits import SpaceLimits
+from dorothie_gym.sim.bodies import Pedestrian
+from dorothie_gym.sim.state.codes import Kind, Walk
+from dorothie_gym.sim.world import World
+from dorothie_gym.support.audio import encode_flac
+from dorothie_gym.support.compilation.records import plain
+
+_ACTOR_KINDS = np.full(max(Kind) + 1, -1, dtype=np.int64)
+_ACTOR_KINDS[Kind.CAR], _ACTOR_KINDS[Kind.CYCLIST] = ActorKind.VEHICLE, ActorKind.CYCLIST
+"""Kind of actor by `Kind` of a vehicle; -1 for empty records and for the ego."""
+
+_PLACE = ("key", "x", "y", "heading")
+
+
+def actors_around(world: World) -> NDArray[np.void]:
+    """Returns vehicles, pedestrians and props without the ego as rows of `ACTOR_DTYPE` (n,)."""
+    state = world.actors.arrays
+    vehicles, pedestrians, props = plain(state.vehicles), plain(state.pedestrians), plain(state.props)
+    kinds = _ACTOR_KINDS[vehicles["kind"]]
+    driving = np.flatnonzero(kinds >= 0)
+    walking = np.flatnonzero(pedestrians["state"] != Walk.EMPTY)
+    standing = np.flatnonzero(props["present"])
+    first, second = len(driving), len(driving) + len(walking)
+    rows = np.empty(second + len(standing), dtype=ACTOR_DTYPE)
+    if first:
+        part = rows[:first]
+        part["kind"] = kinds[driving]
+        for name in (*_PLACE, "speed", "length", "width"):
+            part[name] = vehicles[name][driving]
+    if second > first:
+        part = rows[first:second]
+        part["kind"], part["length"], part["width"] = ActorKind.PEDESTRIAN, Pedestrian.LENGTH, Pedestrian.WIDTH
+        for name in (*_PLACE, "speed"):
+            part[name] = pedestrians[name][walking]
+    if len(standing):
+        part = rows[second:]
+        part["kind"], part["speed"] = ActorKind.PROP, 0.0
+        for name in (*_PLACE, "length", "width"):
+            part[name] = props[name][standing]
+    return rows
+
+
+_CLOSE = 1e-3
+"""Time before a change of phase from which the colours are computed again [s]; sums of durations are not exact."""
+
+
+class LightStates:
+    """Colours of the traffic lights of a town, computed again only after a change.
+
+    Args:
+        town: the town.
+    """
+
+    def __init__(self, town: Town) -> None:
+        self._programmes = town.programmes
+        self._since, self._until = 0.0, -math.inf
+        self._states: dict[int, LightColour] = {}
+
+    def at(self, time: float) -> dict[int, LightColour]:
+        """Returns the colours at a simulated time [s] by id of the signal; the caller must not modify them."""
+        if not self._since <= time < self._until:
+            remaining = (_remaining(programme, time) for programme in self._programmes)
+            self._since, self._until = time, time + min(remaining, default=math.inf) - _CLOSE
+            phases = [(programme.phase_at(time), programme.signals) for programme in self._programmes]
+            self._states = {signal: phase.colour(signal) for phase, signals in phases for signal in signals}
+        return self._states
+
+
+def _remaining(programme: LightProgramme, time: float) -> float:
+    """Returns the remaining time of the present phase [s]."""
+    now = (time - programme.offset) % programme.cycle
+    ends = itertools.accumulate(phase.duration for phase in programme.phases)
+    return next((end - now for end in ends if now < end), 0.0)
+
+
+# --- compact actions --------------------------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=16)
+def _idle(role: Role, limits: SpaceLimits) -> ActionDict:
+    return noop(role, limits)
+
+
+@lru_cache(maxsize=16)
+def _arrays(role: Role, limits: SpaceLimits) -> frozenset[str]:
+    return frozenset(name for name, value in _idle(role, limits).items() if isinstance(value, np.ndarray))
+
+
+def compact(actions: Mapping[str, ActionMapping], limits: SpaceLimits) -> dict[Role, ActionDict]:
+    """Returns actions in the compact form of `Decision`: fields without effect are left out.
+
+    Args:
+        actions: valid actions of the roles, by agent.
+        limits: sizes of the action spaces.
+    """
+    found = {}
+    for role in AGENT_ROLES:
+        idle, arrays = _idle(role, limits), _arrays(role, limits)
+        fields: ActionDict = {}
+        for name, value in actions[str(role)].items():
+            if name in arrays:
+                values = np.asarray(value)
+                if values.any():
+                    fields[name] = _short(values, _is_flags(role, name, limits))
+            elif value != idle[name]:
+                fields[name] = value if isinstance(value, str) else int(value)
+        if fields:
+            found[role] = fields
+    return found
+
+
+def expand(decision: Decision, limits: SpaceLimits) -> dict[str, ActionDict]:
+    """Returns the actions of a recorded decision in the action spaces, by agent.
+
+    Raises:
+        SessionError: a role has no such field, or a value is outside its range.
+    """
+    return {str(role): _expanded(decision, role, limits) for role in AGENT_ROLES}
+
+
+def idle_actions(limits: SpaceLimits) -> dict[str, ActionDict]:
+    """Returns the actions without effect of all roles, by agent."""
+    return {str(role): _idle(role, limits) for role in AGENT_ROLES}
+
+
+def _short(values: NDArray[np.generic], flags: bool) -> list[int]:
+    places = np.flatnonzero(values)
+    short: list[int] = places.tolist() if flags else values[: int(places[-1]) + 1].tolist()
+    return short
+
+
+def _expanded(decision: Decision, role: Role, limits: SpaceLimits) -> ActionDict:
+    idle = _idle(role, limits)
+    fields = decision.actions.get(role)
+    if not fields:
+        return idle
+    action = dict(idle)
+    for name, value in fields.items():
+        where = f"decision at frame {decision.frame}, {role}: field {name!r}"
+        if name not in idle:
+            raise SessionError(f"{where} is none of {', '.join(idle)}")
+        if isinstance(idle[name], np.ndarray):
+            value = _long(value, idle[name], _is_flags(role, name, limits), where)
+        action[name] = value
+    return action
+
+
+def _long(value: object, idle: NDArray[np.generic], flags: bool, where: str) -> NDArray[np.generic]:
+    array = idle.copy()
+    if not isinstance(value, list | tuple) or not all(type(item) is int and 0 <= item < 2**31 for item in value):
+        raise SessionError(f"{where} must be a list of whole numbers")
+    if (max(value, default=0) if flags else len(value) - 1) >= len(array):
+        raise SessionError(f"{where} goes beyond the {len(array)} places that there are")
+    if flags:
+        array[list(value)] = 1
+    else:
+        array[: len(value)] = value
+    return array
+
+
+@lru_cache(maxsize=256)
+def _is_flags(role: Role, name: str, limits: SpaceLimits) -> bool:
+    """Returns whether the field is an array of 0 and 1."""
+    return isinstance(action_space(role, limits)[name], spaces.MultiBinary)
+
+
+# --- recorder ---------------------------------------------------------------------------------------------------------
+
+
+class SessionRecorder:
+    """Records the actions of the roles, the events and frames that follow, and the surroundings at each decision.
+
+    Args:
+        engine: an engine that has just been reset; the events of the reset are recorded at once.
+        writer: writer of the session's folder.
+    """
+
+    def __init__(self, engine: SessionEngine, writer: SessionWriter) -> None:
+        self._engine, self._writer = engine, writer
+        self._lights = LightStates(engine.town)
+        self._frame = engine.session.world.frame
+        self._append()
+
+    def record(self, actions: Mapping[str, ActionMapping], events: Sequence[Event] | None = None) -> None:
+        """Records a decision after the engine has played it.
+
+        Args:
+            actions: actions that were played, by agent.
+            events: events of the decision, with what only the caller knows of them; None: those of the engine.
+
+        Raises:
+            SessionError: a value cannot be written.
+            OSError: the folder cannot be written.
+        """
+        self._writer.add_decision(self._frame, compact(actions, self._engine.limits))
+        self._append(events)
+
+    def record_end(self) -> None:
+        """Records the end of a session that was broken off after the last decision; errors as in `record`."""
+        self._writer.append(self._engine.last_events)
+
+    def _append(self, events: Sequence[Event] | None = None) -> None:
+        frames, world = self._engine.last_frames, self._engine.session.world
+        self._writer.append(self._engine.last_events if events is None else events, frames)
+        if recordings := self._engine.last_recordings:
+            for name, samples in recordings.items():
+                self._writer.add_audio(name, encode_flac(samples))
+        self._frame = world.frame
+        if len(frames) and frames[-1, 0] == world.frame:
+            self._writer.add_actors(world.frame, actors_around(world))
+            self._writer.add_lights(world.frame, self._lights.at(world.time))
+            self._writer.add_weather(world.frame, world.weather.values)

@@ -1,0 +1,172 @@
+"""Scenario of a session, drawn from its seed: storyboard, street names, departure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import gymnasium
+import numpy as np
+
+from dorothie_gym import tasks  # lazy: storyboards are read when a session begins
+from dorothie_gym.errors import did_you_mean, short_repr
+from dorothie_gym.maps.town import Town
+from dorothie_gym.ontology.slots import StreetName
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.recording.header import SessionHeader, SubgoalRow
+from dorothie_gym.support.copying import shared
+from dorothie_gym.tasks.storyboard import Storyboard, StoryboardTemplate, Subgoal
+
+STREET_NAMES = tuple(
+    name for name in StreetName if name not in (StreetName.UNKNOWN, StreetName.QUERIED, StreetName.HIGHWAY)
+)
+"""The fourteen names that are drawn for streets."""
+
+
+@shared
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """Initial conditions of a session.
+
+    Attributes:
+        seed: seed of the scenario, and of the session.
+        storyboard: the task, bound to places of the town.
+        street_names: name of each street of the town.
+        departure: lane of the parked ego and the distance along it [m].
+    """
+
+    seed: int
+    storyboard: Storyboard
+    street_names: tuple[StreetName, ...]
+    departure: tuple[int, float]
+
+
+ResetOptions: TypeAlias = Mapping[str, object]
+"""Options of an environment's `reset`."""
+
+
+def check_options(options: ResetOptions | None, *known: str) -> None:
+    """Warns of the options of a reset that an environment does not know; it ignores them."""
+    for name in options or {}:
+        if name not in known:
+            hint = did_you_mean(str(name), known)
+            gymnasium.logger.warn(
+                f"reset option {short_repr(name)} is unknown and ignored; {hint}known: {', '.join(known)}"
+            )
+
+
+def scenario_option(options: ResetOptions | None) -> Scenario | None:
+    """Returns the option `scenario` of a reset, or None; other options are ignored.
+
+    Raises:
+        ValueError: the option is no `Scenario`.
+    """
+    scenario = (options or {}).get("scenario")
+    if scenario is not None and not isinstance(scenario, Scenario):
+        raise ValueError(f"option 'scenario' is a {type(scenario).__name__}; it must be a Scenario")
+    return scenario
+
+
+def template_option(storyboard: str | Path | StoryboardTemplate | None) -> StoryboardTemplate | None:
+    """Returns the template that an argument `storyboard` names; None draws one of the shipped templates.
+
+    Raises:
+        StoryboardError: the template does not exist or is invalid.
+        ValueError: the argument is of another type.
+    """
+    if storyboard is None or isinstance(storyboard, StoryboardTemplate):
+        return storyboard
+    if not isinstance(storyboard, str | Path):
+        raise ValueError(
+            f"storyboard is a {type(storyboard).__name__}; it must be a name, a path or a StoryboardTemplate"
+        )
+    return tasks.load_template(storyboard)
+
+
+def draw_scenario(town: Town, template: StoryboardTemplate | None, seed: int) -> Scenario:
+    """Draws a scenario; equal arguments give equal scenarios.
+
+    Args:
+        town: the map, with at least one site for each landmark of the storyboard and one for the departure.
+        template: template of the storyboard; None draws one of the shipped templates.
+        seed: any integer >= 0.
+
+    Raises:
+        StoryboardError: the template does not fit the town.
+    """
+    task, streets, departure = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
+    if template is None:
+        names = tasks.template_names()
+        template = tasks.load_template(names[int(task.integers(len(names)))])
+    storyboard = tasks.bind(template, town.sites, task)
+    taken = {landmark.site for landmark in storyboard.landmarks}
+    free = [site for site in town.sites if site.id not in taken] or list(town.sites)
+    start = free[int(departure.integers(len(free)))]
+    return Scenario(
+        seed=seed,
+        storyboard=storyboard,
+        street_names=_name_streets(town, streets),
+        departure=(start.lane, start.station),
+    )
+
+
+def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...]:
+    """Returns shuffled names; a street named Highway keeps its name, streets beyond the fourteenth have no name."""
+    shuffled = [STREET_NAMES[int(i)] for i in rng.permutation(len(STREET_NAMES))]
+    names: list[StreetName] = []
+    for street in town.streets:
+        if street.name == StreetName.HIGHWAY.label:
+            names.append(StreetName.HIGHWAY)
+        else:
+            names.append(shuffled.pop() if shuffled else StreetName.UNKNOWN)
+    return tuple(names)
+
+
+def header_of(scenario: Scenario, town: str, config: EnvConfig) -> SessionHeader:
+    """Returns the header of a session's record.
+
+    Args:
+        scenario: scenario of the session.
+        town: name of the town.
+        config: settings of the session.
+    """
+    storyboard = scenario.storyboard
+    return SessionHeader(
+        town=town,
+        storyboard=storyboard.name,
+        seed=scenario.seed,
+        decision_frequency=config.decision_frequency,
+        street_names=[name.label for name in scenario.street_names],
+        landmarks=[
+            {
+                "name": landmark.name.label,
+                "lane": landmark.lane,
+                "station": landmark.station,
+                "x": landmark.position[0],
+                "y": landmark.position[1],
+                "street": landmark.street,
+                "hidden": landmark.hidden,
+            }
+            for landmark in storyboard.landmarks
+        ],
+        subgoals=[_row_of(subgoal) for subgoal in storyboard.subgoals],
+        story=storyboard.story,
+        departure=scenario.departure,
+        config=config.record(),
+    )
+
+
+def _row_of(subgoal: Subgoal) -> SubgoalRow:
+    row = SubgoalRow(
+        description=subgoal.description,
+        landmark=subgoal.landmark,
+        after=subgoal.after,
+        trigger=subgoal.trigger,
+        delete=subgoal.delete,
+        change=subgoal.change,
+    )
+    if subgoal.reason is not None:
+        row["extra"] = {"reason": subgoal.reason}
+    return row

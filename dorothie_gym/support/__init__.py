@@ -1,0 +1,1 @@
+"""Files, caches, compiled functions and arithmetic that all packages share."""

@@ -1,0 +1,251 @@
+"""Compiled functions: one optimisation for each function that Python calls, not one for each function.
+
+numba makes machine code of every function for every combination of argument types that it meets, each time with all the
+functions that it calls linked in and optimised again, and with wrappers for calls from Python. In a simulation whose
+step calls 250 functions up to nine deep, most of that work is thrown away. Here a function that is called from compiled
+code only becomes unoptimised LLVM code, a part; optimisation and machine code follow once, for the whole that Python
+calls.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from llvmlite import binding
+from numba import typeof, types
+from numba.core import event, typing
+from numba.core.codegen import CodeLibrary, JITCodeLibrary
+from numba.core.compiler import Compiler, Flags
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import _FunctionCompiler  # type: ignore[attr-defined]  # numba has no type information
+from numba.core.registry import CPUDispatcher
+
+from dorothie_gym.support.compilation.cache import ContentCache
+from dorothie_gym.support.compilation.shortcuts import remembering, without_counts
+
+if TYPE_CHECKING:
+    from numba.core.compiler import CompileResult
+    from numba.core.compiler_machinery import PassManager
+
+
+class _Library(JITCodeLibrary):  # type: ignore[misc]  # numba has no type information
+    """Code of a function and of all that it calls, optimised once."""
+
+    _linking_libraries: list[CodeLibrary]
+
+    def _optimize_functions(self, ll_module: binding.ModuleRef) -> None:
+        """Leaves all to the optimisation of the whole."""
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        """Optimises once: numba's first, cheaper run prepares the removal of reference counts."""
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
+    def finalize(self) -> None:
+        """Links all parts, optimises, and makes machine code."""
+        for part in _parts_of(self):
+            self._reload_init.update(part._reload_init)
+            self._final_module.link_in(part.own_module(), preserve=True)
+        self._linking_libraries = _others_of(self)
+        super().finalize()
+
+
+class _Part(_Library):
+    """Code of a function that only compiled functions call: neither linked nor optimised on its own."""
+
+    def finalize(self) -> None:
+        """Leaves linking and optimisation to the whole."""
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Returns 0: there is no machine code."""
+        return 0
+
+    def own_module(self) -> binding.ModuleRef:
+        """Returns the code of this function alone, to be linked."""
+        return super()._get_module_for_linking()
+
+    def _get_module_for_linking(self) -> binding.ModuleRef:
+        """Returns the code with all that it calls, for functions that numba's own decorators compile."""
+        module = self.own_module().clone()
+        for part in _parts_of(self):
+            module.link_in(part.own_module(), preserve=True)
+        for library in _others_of(self):
+            module.link_in(library._get_module_for_linking(), preserve=True)
+        return module
+
+
+def _parts_of(library: _Library) -> list[_Part]:
+    """Returns the parts that a function calls, directly or not."""
+    found: dict[_Part, None] = {}
+    queue: list[_Library] = [library]
+    while queue:
+        for called in queue.pop()._linking_libraries:
+            if isinstance(called, _Part) and called is not library and called not in found:
+                found[called] = None
+                queue.append(called)
+    return list(found)
+
+
+def _others_of(library: _Library) -> list[CodeLibrary]:
+    """Returns the libraries of numba's own that a function or its parts call."""
+    callers = [library, *_parts_of(library)]
+    called = dict.fromkeys(each for caller in callers for each in caller._linking_libraries)
+    return [each for each in called if not isinstance(each, _Part)]
+
+
+class _Compiler(Compiler):  # type: ignore[misc]  # numba has no type information
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *others: Any) -> None:
+        super().__init__(typingctx, targetctx, library, *others)
+        if not self.state.flags.nrt:
+            self.state.typingctx = remembering(typingctx)
+
+    def define_pipelines(self) -> list[PassManager]:
+        return super().define_pipelines() if self.state.flags.nrt else [without_counts(self.state)]
+
+
+class _WholeCompiler(_Compiler):
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *others: Any) -> None:
+        super().__init__(typingctx, targetctx, library, *others)
+        self.state.library = _Library(self.state.targetctx.codegen(), "whole")
+        self.state.library.enable_object_caching()
+
+
+class _PartCompiler(_Compiler):
+    def __init__(self, typingctx: Any, targetctx: Any, library: Any, *others: Any) -> None:
+        super().__init__(typingctx, targetctx, library, *others)
+        self.state.library = _Part(self.state.targetctx.codegen(), "part")
+        self.state.flags.no_compile = True
+
+
+class OwnFlags(Flags):  # type: ignore[misc]  # numba has no type information
+    """Options of a compilation, equal to those of numba, that are compared by the values that were set.
+
+    numba's caches have options in their keys. Comparing the values of all options took a tenth of the compiler's time.
+    """
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return _FLAGS_HASH
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Flags):
+            return NotImplemented
+        if self._values == other._values:
+            return True
+        return all(getattr(self, name) == getattr(other, name) for name in {*self._values, *other._values})
+
+
+_FLAGS_HASH = hash(Flags())
+
+
+class _OwnFunctionCompiler(_FunctionCompiler):  # type: ignore[misc]  # numba has no type information
+    def _customize_flags(self, flags: Flags) -> Flags:
+        return OwnFlags(flags)
+
+
+@contextmanager
+def _collector_paused() -> Iterator[None]:
+    """Turns Python's garbage collector off, if it is on, and on again at the end.
+
+    A compilation makes millions of objects that live until its end: looking through them took a sixth of its time.
+    """
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def _call(entry: Callable[..., object], left_out: tuple[None, ...], *arguments: object) -> object:
+    return entry(*arguments, *left_out)
+
+
+def _widest(kind: types.Type) -> types.Type:
+    """Returns the type of an argument for the call, so that numba compiles a function once for all of them.
+
+    Of a constant only its type counts, and every integer is passed as the widest one: fields of records have 32 bits.
+    """
+    return types.int64 if isinstance(kind, types.Integer) and kind.bitwidth < types.int64.bitwidth else kind
+
+
+class CompiledFunction(CPUDispatcher):  # type: ignore[misc]  # numba has no type information
+    """A function that is compiled when it is called from Python, and a part of those that call it."""
+
+    def __init__(self, py_func: Callable[..., object], locals: Any = None, targetoptions: Any = None) -> None:
+        options = {**(targetoptions or {}), "no_cfunc_wrapper": True}
+        super().__init__(py_func, locals or {}, options, pipeline_class=_WholeCompiler)
+        self._compiler = _OwnFunctionCompiler(py_func, self.targetdescr, options, self.locals, _WholeCompiler)
+        parts = {**options, "no_cpython_wrapper": True}
+        self._part_compiler = _OwnFunctionCompiler(py_func, self.targetdescr, parts, self.locals, _PartCompiler)
+        self._parts: dict[tuple[types.Type, ...], CompileResult] = {}
+
+    def enable_caching(self) -> None:
+        """Keeps machine code on disk."""
+        self._cache = ContentCache(self)
+
+    def compile(self, sig: Any) -> Any:
+        """Returns the machine code for a signature, from memory, the cache or compiled now."""
+        with global_compiler_lock, _collector_paused():
+            return super().compile(sig)
+
+    def compile_for(self, *examples: object) -> None:
+        """Compiles the function for arguments of the types of examples, without a call."""
+        kinds = [typeof(example) for example in examples]
+        self.compile(tuple(self._compiler.fold_argument_types(kinds, {})[1]))
+
+    def entry_for(self, *examples: object) -> Callable[..., object]:
+        """Returns the machine code for arguments of the types of examples, which does not look at types again.
+
+        Machine code takes all arguments, and ignores the values of those that are left out.
+        """
+        kinds = tuple(self._compiler.fold_argument_types([typeof(example) for example in examples], {})[1])
+        entry: Callable[..., object] = self.compile(kinds)
+        return partial(_call, entry, (None,) * (len(kinds) - len(examples))) if len(kinds) > len(examples) else entry
+
+    def is_cached(self) -> bool:
+        """Returns whether there is machine code of this version of the function on disk."""
+        return isinstance(self._cache, ContentCache) and not self._cache.is_empty()
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Returns the signature of the part that compiled code calls with arguments of some types."""
+        pysig, args = self._compiler.fold_argument_types(args, kws)
+        args = tuple(_widest(types.unliteral(kind)) for kind in args)
+        part = self._part(args)
+        name = self.py_func.__name__
+        return (
+            typing.make_concrete_template(f"CallTemplate({name})", key=name, signatures=[part.signature]),
+            pysig,
+            args,
+            {},
+        )
+
+    def get_overload(self, sig: Any) -> Any:
+        """Returns the key under which the part was registered."""
+        return self._part(tuple(sig)).fndesc
+
+    def _part(self, args: tuple[types.Type, ...]) -> CompileResult:
+        found = self._parts.get(args)
+        if found is None:
+            with global_compiler_lock:
+                with event.trigger_event("numba:compile", data={"dispatcher": self, "args": args, "return_type": None}):
+                    found = self._parts[args] = self._part_compiler.compile(args, None)
+                self.targetctx.insert_user_function(found.fndesc, found.fndesc, [found.library])
+        return found
+
+
+class InlinedFunction(CompiledFunction):
+    """A function of numbers that is a part of compiled functions, and Python when it is called from Python."""
+
+    def __call__(self, *numbers: float) -> object:
+        """Runs the function in Python, with numbers of Python's own type, whose arithmetic is the fastest."""
+        return self.py_func(*[float(number) for number in numbers])
