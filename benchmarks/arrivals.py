@@ -33,9 +33,11 @@ from dorothie_gym.lab.studies.waiting_room import CERTAINTY, GONE_SECONDS, MOVAB
 from dorothie_gym.ontology import Role
 
 PAGES: Final = {
-    Stage.CONSENT: (30.0, 120.0), Stage.BEFORE: (40.0, 150.0), Stage.INSTRUCTIONS: (40.0, 120.0),
+    Stage.CONSENT: (30.0, 120.0),
+    Stage.BEFORE: (40.0, 150.0),
+    Stage.INSTRUCTIONS: (40.0, 120.0),
     Stage.TUTORIAL: (40.0, 130.0),
-}  # fmt: skip
+}
 """Shortest and longest time that people spend at the stages before the waiting room [s]; an assumption."""
 
 FORMERLY_FREE: Final = 1800.0
@@ -48,11 +50,14 @@ def two_roles(seed: int) -> Assigner:
     """Returns the slots of a study with two conditions for two people."""
     instructions = {"participant": "Tell the car where to go.", "co_wizard": "Drive the car."}
     content = {
-        "title": "Arrivals", "contact": "-", "scenarios": [{"town": "brookside"}],
+        "title": "Arrivals",
+        "contact": "-",
+        "scenarios": [{"town": "brookside"}],
         "conditions": [{"name": name, "co_wizard": "human"} for name in ("one", "two")],
-        "assignment": {"seed": seed}, "consent": {"text": "-", "statements": ["-"]},
+        "assignment": {"seed": seed},
+        "consent": {"text": "-", "statements": ["-"]},
         "texts": {"instructions": instructions, "debriefing": "-"},
-    }  # fmt: skip
+    }
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "study.yaml"
         file.write_text(yaml.safe_dump(content), encoding="utf-8")
@@ -185,11 +190,13 @@ class Arrivals:
         found.sort(key=lambda each: (list(CERTAINTY).index(each.stage), each.since))
         return [
             Candidate(
-                name=str(each.number), role=each.role or Role.PARTICIPANT, certainty=CERTAINTY[each.stage],
+                name=str(each.number),
+                role=each.role or Role.PARTICIPANT,
+                certainty=CERTAINTY[each.stage],
                 movable=each.stage in MOVABLE,
             )
             for each in found
-        ]  # fmt: skip
+        ]
 
     def _mend(self, now: float) -> None:
         change = changed_role(self.assigner, self._there(now), self.taken) if self.way == "package" else None

@@ -116,10 +116,11 @@ def measure(
     engine = SessionEngine(
         load_town(town),
         config=EnvConfig(
-            decision_frequency=DRIVE_FREQUENCY, max_seconds=seconds,
+            decision_frequency=DRIVE_FREQUENCY,
+            max_seconds=seconds,
             world=WorldConfig(vehicles=vehicles, pedestrians=pedestrians),
         ),
-    )  # fmt: skip
+    )
     drive = _drive(engine, seed)
     places = _places(engine.town, drive[-1])
     scenario = engine.session.scenario
@@ -134,10 +135,13 @@ def measure(
         config = CameraConfig(width=size[0], height=size[1], outputs=parts, antialiasing=antialias)
         rows.append(
             {
-                "width": size[0], "height": size[1], "outputs": [str(part) for part in parts], "antialias": antialias,
+                "width": size[0],
+                "height": size[1],
+                "outputs": [str(part) for part in parts],
+                "antialias": antialias,
                 **_times(scene, config, places, drive, repeats),
             }
-        )  # fmt: skip
+        )
     progress("references", 0.8)
     width, height = REFERENCE_SIZE
     camera = SessionCamera(scene, CameraConfig(width=width, height=height, outputs=EVERYTHING))
@@ -199,10 +203,8 @@ def _places(town: Town, crowd: Shot) -> list[Shot]:
 def _draw(camera: SessionCamera, shot: Shot) -> float:
     """Returns the time of a picture [s]."""
     return cpu_seconds(
-        partial(
-            camera.render_from, shot.pose, shot.arrays, shot.weather, time=shot.time, head_lights=shot.lights
-        )
-    )  # fmt: skip
+        partial(camera.render_from, shot.pose, shot.arrays, shot.weather, time=shot.time, head_lights=shot.lights)
+    )
 
 
 def _times(

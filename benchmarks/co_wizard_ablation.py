@@ -51,7 +51,7 @@ class RandomCommands(LearnedCoWizard):
 
     def _act(
         self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
-    ) -> tuple[int, tuple[Remark, ...]]:  # fmt: skip
+    ) -> tuple[int, tuple[Remark, ...]]:
         _, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
         return int(rng.integers(len(inputs.rows))), remarks
 
@@ -61,7 +61,7 @@ class RuledCommands(LearnedCoWizard):
 
     def _act(
         self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
-    ) -> tuple[int, tuple[Remark, ...]]:  # fmt: skip
+    ) -> tuple[int, tuple[Remark, ...]]:
         _, remarks = super()._act(scene, memory, inputs, rng, silent=silent)
         return ruled_command(memory, scene.view), remarks
 
@@ -216,13 +216,19 @@ def main(
         for row in chosen:
             print(f"{row}: {work / row}", file=sys.stderr, flush=True)
             player = Player(
-                name=f"{model} ({row})", path=folder, loader=partial(make, row), sha256=full.sha256,
+                name=f"{model} ({row})",
+                path=folder,
+                loader=partial(make, row),
+                sha256=full.sha256,
                 training=full.training,
-            )  # fmt: skip
+            )
             settings = RolloutSettings(
-                cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, towns=parse_towns(towns), sessions=sessions, seed=seed,
+                cast={**ALL_SCRIPTED, Role.CO_WIZARD: player},
+                towns=parse_towns(towns),
+                sessions=sessions,
+                seed=seed,
                 config=CONFIGS.get(row, EnvConfig()),
-            )  # fmt: skip
+            )
             with session_progress(quiet=False) as on_session:
                 found[row] = roll_out(settings, work / row, workers=workers, on_session=on_session)
             print(f"{row}: {_shown(found[row], 'success')}", file=sys.stderr, flush=True)

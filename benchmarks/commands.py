@@ -113,9 +113,14 @@ def vector(
         from benchmarks.vector import measure
 
         return measure(
-            town, worlds=worlds, vehicles=vehicles, pedestrians=pedestrians, threads=threads, repeats=repeats,
+            town,
+            worlds=worlds,
+            vehicles=vehicles,
+            pedestrians=pedestrians,
+            threads=threads,
+            repeats=repeats,
             progress=progress,
-        )  # fmt: skip
+        )
 
     _run("vector", measured, picture, as_json)
 

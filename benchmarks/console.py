@@ -43,9 +43,7 @@ def serve(sessions: int, pipe: Pipe) -> None:
         ConsoleConfig(max_seconds=3600.0),
         parse_roles("participant=scripted,co_wizard=human,ad_wizard=scripted"),
     )
-    rooms = [
-        Room(SessionEngine(TOWN, config=config.environment()), plans, config, seed=k) for k in range(sessions)
-    ]  # fmt: skip
+    rooms = [Room(SessionEngine(TOWN, config=config.environment()), plans, config, seed=k) for k in range(sessions)]
     server = uvicorn.Server(
         uvicorn.Config(
             Console(rooms).app(), port=0, log_level="warning", ws="websockets-sansio", ws_per_message_deflate=False

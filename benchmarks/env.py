@@ -163,7 +163,7 @@ def _stock_seconds(stock: StockIntersection, steps: int) -> float:
 
 def _two_processes(
     town: str, vehicles: int, pedestrians: int, seed: int, decisions: int, repeats: int, progress: Progress
-) -> float | None:  # fmt: skip
+) -> float | None:
     """Returns the throughput of two processes relative to one; None on a single processor."""
     if available_processors() < 2:
         return None

@@ -47,15 +47,17 @@ def history(columns: Columns, table: PointTable) -> NDArray[np.float64]:
     moves, actions = batch.move_mask, batch.action_mask
     now = batch.time[:, None]
     own = moves & (now - batch.move_time < 0.05)
-    return np.column_stack([
-        _newest_first(2 * batch.move + batch.move_speaker, moves, -1),
-        _newest_first(now - batch.move_time, moves, NEVER),
-        _newest_first(batch.action, actions, -1),
-        _newest_first(batch.action_angle, actions, 0.0),
-        _newest_first(now - batch.action_time, actions, NEVER),
-        batch.time,
-        own.sum(axis=1),
-    ])  # fmt: skip
+    return np.column_stack(
+        [
+            _newest_first(2 * batch.move + batch.move_speaker, moves, -1),
+            _newest_first(now - batch.move_time, moves, NEVER),
+            _newest_first(batch.action, actions, -1),
+            _newest_first(batch.action_angle, actions, 0.0),
+            _newest_first(now - batch.action_time, actions, NEVER),
+            batch.time,
+            own.sum(axis=1),
+        ]
+    )
 
 
 def _newest_first(values: NDArray[Any], mask: NDArray[np.bool_], filler: float) -> NDArray[np.float64]:
@@ -85,12 +87,14 @@ def _states(columns: Columns, tables: Sequence[PointTable]) -> list[Any]:
 def _words(columns: Columns, tables: Sequence[PointTable]) -> list[Any]:
     model = WordRegression()
     return [
-        sparse.hstack([
-            model.features(columns, gather(columns, table, np.arange(len(table)), model.spec)),
-            _last_move(columns, table),
-        ]).tocsr()
+        sparse.hstack(
+            [
+                model.features(columns, gather(columns, table, np.arange(len(table)), model.spec)),
+                _last_move(columns, table),
+            ]
+        ).tocsr()
         for table in tables
-    ]  # fmt: skip
+    ]
 
 
 MODELS: Final[Mapping[str, Callable[[Columns, Sequence[PointTable]], list[Any]]]] = {
@@ -142,9 +146,13 @@ def main(
         for task, shares in tasks.items():
             limit = LIMITS.get((name, Task(task)))
             table.add_row(
-                name, task, f"{100 * shares['accuracy']:.1f} %", "" if limit is None else f"{100 * limit:.0f} %",
-                f"{100 * shares['majority']:.1f} %", f"{shares['points']:,}",
-            )  # fmt: skip
+                name,
+                task,
+                f"{100 * shares['accuracy']:.1f} %",
+                "" if limit is None else f"{100 * limit:.0f} %",
+                f"{100 * shares['majority']:.1f} %",
+                f"{shares['points']:,}",
+            )
     Console().print(table)
 
 

@@ -85,11 +85,12 @@ def _show(rows: dict[str, dict[int, EpisodeStatistics]], *, as_json: bool) -> No
     if as_json:
         pages = {
             _name(town): {
-                "part": _part(town), **estimates[town].to_json(),
+                "part": _part(town),
+                **estimates[town].to_json(),
                 "trainings": {seed: asdict(each) for seed, each in row.items()},
             }
             for town, row in rows.items()
-        }  # fmt: skip
+        }
         print(json.dumps(pages))
         return
     table = Table("town", "", "success", *(f"seed {seed}" for seed in next(iter(rows.values()))))

@@ -47,10 +47,13 @@ def stock_road(network: TownNetwork, world: WorldArrays) -> Road:
         place = np.array([float(vehicle.x), float(vehicle.y)])
         road.vehicles.append(
             IDMVehicle(
-                road, place, heading=float(vehicle.heading), speed=float(vehicle.speed),
+                road,
+                place,
+                heading=float(vehicle.heading),
+                speed=float(vehicle.speed),
                 target_speed=float(vehicle.desired),
             )
-        )  # fmt: skip
+        )
     return road
 
 

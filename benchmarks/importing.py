@@ -14,8 +14,11 @@ TOWN: Final = "brookside"
 """Town of the first environment."""
 
 PACKAGE, FIRST_ENV, FIRST_STEP, HIGHWAY_ENV = (
-    "import dorothie_gym", "first environment", "first step", "import highway_env",
-)  # fmt: skip
+    "import dorothie_gym",
+    "first environment",
+    "first step",
+    "import highway_env",
+)
 """Names of the measured programs."""
 
 _START_CLOCK = "import time; start = time.perf_counter()\n"

@@ -33,9 +33,11 @@ class MetaDriveReference:
         if picture is not None:
             camera: Any = import_module("metadrive.component.sensors.rgb_camera").RGBCamera
             settings |= {
-                "image_observation": True, "stack_size": 1, "sensors": {"rgb_camera": (camera, *picture)},
+                "image_observation": True,
+                "stack_size": 1,
+                "sensors": {"rgb_camera": (camera, *picture)},
                 "vehicle_config": {"image_source": "rgb_camera"},
-            }  # fmt: skip
+            }
         self._env = environment(settings)
         self._over = True
 

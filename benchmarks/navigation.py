@@ -74,9 +74,14 @@ def measure(
     progress("environments", 0.0)
     rng = np.random.default_rng(seed)
     envs = NavigationVectorEnv(
-        environments, town, traffic=traffic, exceptions=exceptions, observation=observation, threads=threads,
+        environments,
+        town,
+        traffic=traffic,
+        exceptions=exceptions,
+        observation=observation,
+        threads=threads,
         autoreset_mode=AutoresetMode.SAME_STEP,
-    )  # fmt: skip
+    )
     single = NavigationEnv(town, traffic=traffic, exceptions=exceptions, observation=observation)
     envs.reset(seed=seed)
     single.reset(seed=seed)
@@ -138,7 +143,7 @@ class _Kernel:
         first = row_of(self._batch.worlds, 0)
         self._worlds = VectorWorld(
             town_arrays(network_of(self._batch.town)), first, envs.num_envs, threads=envs.threads
-        )  # fmt: skip
+        )
 
     def step(self) -> tuple[float, int]:
         """Returns the time of some decisions of physics, and the number of environment steps."""

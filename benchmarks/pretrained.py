@@ -239,9 +239,7 @@ def _validate(player: Player, role: Role, folder: Path) -> RolloutResult:
     return roll_out(_rollout_settings(player, role, VALIDATION_SESSIONS), folder / player.sha256[:12])
 
 
-def _rollout_settings(
-    player: Player, role: Role, sessions: int, config: EnvConfig | None = None
-) -> RolloutSettings:  # fmt: skip
+def _rollout_settings(player: Player, role: Role, sessions: int, config: EnvConfig | None = None) -> RolloutSettings:
     return RolloutSettings(
         cast={**ALL_SCRIPTED, role: player},
         towns=parse_towns("seen"),

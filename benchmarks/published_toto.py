@@ -113,17 +113,26 @@ def rebuild(session: Session, view: PointView, graph: TownGraph, senses: Senses)
     window = [[float(row["x"]), float(row["y"]), float(row["heading"]), 0.0] for row in past]
     said = [move.frame for move in moves]
     frames = [
-        *[0] * (1 + len(landmarks) + len(streets)), *(action.frame for action in actions), *said, *said,
-        *past["frame"].tolist(), view.frame, view.frame,
-    ]  # fmt: skip
+        *[0] * (1 + len(landmarks) + len(streets)),
+        *(action.frame for action in actions),
+        *said,
+        *said,
+        *past["frame"].tolist(),
+        view.frame,
+        view.frame,
+    ]
     return Features(
         lanes=torch.tensor(graph.lanes[:LANES].tolist()),
         road=torch.tensor(graph.road[:LANES].tolist()) % ROADS,
         junction=torch.tensor(graph.junction[:LANES].tolist()) % JUNCTIONS,
         edges=torch.tensor([pair for pair in graph.edges.T.tolist() if max(pair) < LANES]).view(-1, 2).T,
         edge_types=torch.tensor(
-            [kind for pair, kind in zip(graph.edges.T.tolist(), graph.edge_types.tolist(), strict=True)
-             if max(pair) < LANES], dtype=torch.int64,
+            [
+                kind
+                for pair, kind in zip(graph.edges.T.tolist(), graph.edge_types.tolist(), strict=True)
+                if max(pair) < LANES
+            ],
+            dtype=torch.int64,
         ),
         landmarks=torch.cat((torch.tensor(landmarks).view(-1, 7), _stacked(names)), dim=1),
         landmark_lanes=torch.tensor([max(0, min(mark["lane"], LANES - 1)) for mark in view.landmarks]).long(),
@@ -140,7 +149,7 @@ def rebuild(session: Session, view: PointView, graph: TownGraph, senses: Senses)
         sound=senses.sounds[view.frame % senses.rows],
         detector=senses.queries[view.frame % len(senses.queries)],
         frames=torch.tensor(frames),
-    )  # fmt: skip
+    )
 
 
 class PublishedTOTO(nn.Module):

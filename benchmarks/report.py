@@ -85,17 +85,22 @@ def world_report(figures: Figures) -> Report:
         rows=(
             Measurement(
                 label=f"highway-env's road\n{_count(figures['vehicles'], 'IDM vehicle')}, no other actors",
-                value=stock, spread=figures["stock_spread"], best=figures["stock_best"], reference=True,
+                value=stock,
+                spread=figures["stock_spread"],
+                best=figures["stock_best"],
+                reference=True,
             ),
             Measurement(
                 label="dorothie_gym's world\ntraffic, people, lights, yielding, props",
-                value=figures["substeps_per_second"], spread=figures["spread"], best=figures["best"],
+                value=figures["substeps_per_second"],
+                spread=figures["spread"],
+                best=figures["best"],
             ),
         ),
         mark=Mark(label="real time", value=FRAME_RATE),
         notes=(f"memory of one more world in the same town: {figures['bytes_per_world'] / 1024:.0f} KiB",),
         machine=machine_line(figures["machine"]),
-    )  # fmt: skip
+    )
 
 
 def env_report(figures: Figures) -> Report:
@@ -103,10 +108,12 @@ def env_report(figures: Figures) -> Report:
     simulated = figures["simulated_seconds_per_second"]
     rows = [
         Measurement(
-            label="highway-env\nintersection-v0", value=figures["stock_simulated_seconds_per_second"],
-            spread=figures["stock_spread"], reference=True,
+            label="highway-env\nintersection-v0",
+            value=figures["stock_simulated_seconds_per_second"],
+            spread=figures["stock_spread"],
+            reference=True,
         )
-    ]  # fmt: skip
+    ]
     sumo = figures["sumo_substeps_per_second"]
     if sumo is not None:
         label = "SUMO\nvehicles on a grid as large"
@@ -114,10 +121,12 @@ def env_report(figures: Figures) -> Report:
     step_share = simulated / figures["steps_per_second"]
     rows.append(
         Measurement(
-            label="DuoWizardEnv\nthree agents, full observations", value=simulated, spread=figures["spread"],
+            label="DuoWizardEnv\nthree agents, full observations",
+            value=simulated,
+            spread=figures["spread"],
             best=figures["best"] * step_share,
         )
-    )  # fmt: skip
+    )
     scaling = figures["two_processes_scaling"]
     notes = [
         f"{number(figures['steps_per_second'])} steps per second of {figures['substeps_per_step']} substeps; "
@@ -178,13 +187,16 @@ def import_report(figures: Figures) -> Report:
         rows=(
             Measurement(label="import highway_env", value=stock, spread=figures["highway_env_spread"], reference=True),
             Measurement(label="import dorothie_gym", value=seconds["package"], spread=figures["package_spread"]),
-            Measurement(label="... and first environment,\nmade and reset", value=seconds["first_environment"],
-                spread=figures["spread"]),
+            Measurement(
+                label="... and first environment,\nmade and reset",
+                value=seconds["first_environment"],
+                spread=figures["spread"],
+            ),
             Measurement(label="... and its first step", value=seconds["first_step"]),
         ),
         machine=machine_line(figures["machine"]),
         logarithmic=False,
-    )  # fmt: skip
+    )
 
 
 def rl_report(figures: Figures) -> Report:
@@ -212,7 +224,7 @@ def rl_report(figures: Figures) -> Report:
             Measurement(
                 label="intersection-v0\nof highway-env", value=figures["stock_steps_per_second"], reference=True
             ),
-        ]  # fmt: skip
+        ]
         if figures["metadrive_steps_per_second"] is not None:
             rows.append(Measurement(label="MetaDrive", value=figures["metadrive_steps_per_second"], reference=True))
         parts = ", ".join(f"{name} {100 * share:.0f} %" for name, share in figures["step_shares"].items())
@@ -430,9 +442,14 @@ def _draw_rows(axes: Axes, report: Report) -> None:
     if report.mark is not None:
         axes.axvline(report.mark.value, color=hexadecimal(LIGHT_RED), linewidth=1.4, linestyle=(0, (4, 3)), zorder=3)
         axes.annotate(
-            report.mark.label, (report.mark.value, 1.0), xycoords=("data", "axes fraction"), xytext=(4, 3),
-            textcoords="offset points", fontsize=8.5, color=hexadecimal(LIGHT_RED),
-        )  # fmt: skip
+            report.mark.label,
+            (report.mark.value, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(4, 3),
+            textcoords="offset points",
+            fontsize=8.5,
+            color=hexadecimal(LIGHT_RED),
+        )
     axes.set_yticks(list(places), [row.label for row in report.rows], fontsize=9, color=INK)
     axes.set_ylim(len(values) - 0.5, -0.5)
     axes.set_xlabel(report.unit + (" (logarithmic)" if report.logarithmic else ""), fontsize=8.5, color=SOFT)

@@ -18,9 +18,12 @@ from dorothie_gym.errors import SettingsError
 from dorothie_gym.support.processors import available_processors
 
 ALONE = (
-    "batch_steps_per_second", "kernel_steps_per_second", "single_steps_per_second", "stock_steps_per_second",
+    "batch_steps_per_second",
+    "kernel_steps_per_second",
+    "single_steps_per_second",
+    "stock_steps_per_second",
     "metadrive_steps_per_second",
-)  # fmt: skip
+)
 """Figures without a learner; None for other environments than `Navigation-v0`."""
 
 SHARES = ("environment", "policy", "learner")
@@ -70,15 +73,18 @@ def measure(
     steps = steps or (4096 if observation == CAMERA else 65_536)
     if workers is None:
         workers = 0 if has_batch(env) else min(available_processors(), environments)
-    settings = tuned_settings(
-        algorithm, env, environments=environments, seed=seed, workers=workers, env_settings=world
-    )  # fmt: skip
+    settings = tuned_settings(algorithm, env, environments=environments, seed=seed, workers=workers, env_settings=world)
     alone: Figures = dict.fromkeys(ALONE)
     if env == NAVIGATION:
         alone = navigation.measure(
-            town, traffic=traffic, exceptions=exceptions, observation=observation, environments=environments, seed=seed,
+            town,
+            traffic=traffic,
+            exceptions=exceptions,
+            observation=observation,
+            environments=environments,
+            seed=seed,
             progress=lambda part, share: progress(part, 0.5 * share),
-        )  # fmt: skip
+        )
     progress("training", 0.5)
     run = _run(settings, steps)
     total = run["seconds"]

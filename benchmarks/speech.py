@@ -40,9 +40,14 @@ _MARGIN: Final = 0.2  # noise before and behind a span [s]
 
 
 def measure(
-    *, sessions: int = 6, spans: int = 150, seed: int = SEED, synthesizer: str = "hibari",
-    recognizer: str = "pocketsphinx", progress: Progress = ignore_progress,
-) -> Figures:  # fmt: skip
+    *,
+    sessions: int = 6,
+    spans: int = 150,
+    seed: int = SEED,
+    synthesizer: str = "hibari",
+    recognizer: str = "pocketsphinx",
+    progress: Progress = ignore_progress,
+) -> Figures:
     """Speaks and recognises spans of played sessions, in CPU seconds of one thread.
 
     Args:
@@ -90,9 +95,14 @@ def measure(
         **_understood(said, results["clean"]),
         "synthesis_milliseconds": rounded(1000.0 * float(np.median(times))),
         "words_per_second": rounded(sum(len(spoken_words(span.text)) for span in said) / seconds),
-        "synthesizer": synthesizer, "recognizer": recognizer, "sessions": sessions, "spans": len(said), "seed": seed,
-        "audio_seconds": rounded(seconds), "machine": machine(),
-    }  # fmt: skip
+        "synthesizer": synthesizer,
+        "recognizer": recognizer,
+        "sessions": sessions,
+        "spans": len(said),
+        "seed": seed,
+        "audio_seconds": rounded(seconds),
+        "machine": machine(),
+    }
 
 
 def played_spans(sessions: int, spans: int, seed: int, progress: Progress = ignore_progress) -> list[Span]:

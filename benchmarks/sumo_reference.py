@@ -60,10 +60,14 @@ def _write_grid(path: Path, lanes: int, length: float) -> None:
     size = min(_SIZES, key=lambda n: abs(_lanes_of(n) - lanes))
     edges = 4 * size * (size - 1)
     command = [
-        str(Path(sumo.SUMO_HOME) / "bin" / "netgenerate"), "--grid", f"--grid.number={size}",
-        f"--grid.length={max(length / edges, 40.0):.0f}", "--default-junction-type=traffic_light",
-        "--no-turnarounds=true", f"--output-file={path}",
-    ]  # fmt: skip
+        str(Path(sumo.SUMO_HOME) / "bin" / "netgenerate"),
+        "--grid",
+        f"--grid.number={size}",
+        f"--grid.length={max(length / edges, 40.0):.0f}",
+        "--default-junction-type=traffic_light",
+        "--no-turnarounds=true",
+        f"--output-file={path}",
+    ]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 

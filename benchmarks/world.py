@@ -103,7 +103,7 @@ def measure(
 
 def crowd(
     network: TownNetwork, arrays: TownArrays, *, vehicles: int, pedestrians: int, props: int, seed: int
-) -> WorldArrays:  # fmt: skip
+) -> WorldArrays:
     """Returns a world with cars, cyclists, pedestrians, lights and signs, and props that the traffic has to pass."""
     world = empty_world(arrays, vehicles=vehicles, pedestrians=pedestrians, props=props, seed=seed)
     populate(network, arrays, world, seed=seed, vehicles=vehicles, pedestrians=pedestrians)

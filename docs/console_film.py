@@ -43,9 +43,14 @@ def main() -> None:
         subprocess.run(film, check=True)
         frames = [Image.fromarray(frame).resize(SIZE, Image.Resampling.LANCZOS) for frame in imageio.get_reader(video)]
     frames[0].save(
-        DOCS / "console_film.webp", save_all=True, append_images=frames[1:], duration=1000 // FRAMES_PER_SECOND, loop=0,
-        quality=QUALITY, method=4,
-    )  # fmt: skip
+        DOCS / "console_film.webp",
+        save_all=True,
+        append_images=frames[1:],
+        duration=1000 // FRAMES_PER_SECOND,
+        loop=0,
+        quality=QUALITY,
+        method=4,
+    )
 
 
 def _play(out: Path) -> None:
@@ -106,8 +111,12 @@ def _next_way(driver: Any, number: int) -> dict[str, Any]:
     key = next((k for k, row in enumerate(exits) if abs(row[0]) > 30 and (row[0] > 0) == (number % 2 == 0)), 0)
     angle, _, street, junction = exits[key]
     name = "left" if angle > 30 else "right" if angle < -30 else "straight on"
-    return {"name": name, "street": driver.evaluate(f"consoleLink.hello.streets[{street}]"), "key": key + 1,
-            "junction": junction}  # fmt: skip
+    return {
+        "name": name,
+        "street": driver.evaluate(f"consoleLink.hello.streets[{street}]"),
+        "key": key + 1,
+        "junction": junction,
+    }
 
 
 def _say(page: Any, text: str) -> None:

@@ -76,9 +76,7 @@ def role_comparison(specs_of: Callable[[Role, SpaceLimits], tuple[FieldSpec, ...
 
 def pedal_actions() -> list[str]:
     """Returns the tables of both controls."""
-    return [
-        *vector_table(CONTROL_SPECS), "", 'With `control="acceleration"`:', "", *vector_table(ACCELERATION_SPECS),
-    ]  # fmt: skip
+    return [*vector_table(CONTROL_SPECS), "", 'With `control="acceleration"`:', "", *vector_table(ACCELERATION_SPECS)]
 
 
 def navigation_actions() -> list[str]:

@@ -208,11 +208,15 @@ def models() -> str:
     cards = {name: pretrained_card(name) for name in pretrained_names()}
     rows = (
         (
-            f"`{name}`", card.description, f"{pretrained_size(name) / 1e6:.2f} MB", _percent(card.figures["success"]),
-            _percent(card.figures["driving_score"]), f"{card.steps:,}",
+            f"`{name}`",
+            card.description,
+            f"{pretrained_size(name) / 1e6:.2f} MB",
+            _percent(card.figures["success"]),
+            _percent(card.figures["driving_score"]),
+            f"{card.steps:,}",
         )
         for name, card in cards.items()
-    )  # fmt: skip
+    )
     commands = (command for card in cards.values() for command in (*card.commands, card.rollout))
     return "\n".join(
         [
@@ -257,9 +261,14 @@ def curves(runs: dict[str, list[Path]]) -> str:
             if name in BEFORE:
                 axes.plot(*zip(*BEFORE[name], strict=True), color=colour, lw=1.6, ls="--", label=f"{name}, before")
             episodes = logs[0][0]["episodes"]
-            rows += [(name, f"{now[0]['steps'] / 1e3:.0f}",
-                      *(f"{100 * row['success']:.0f} % ({row['seconds']:.0f} s)" for row in now))
-                     for now in shared]  # fmt: skip
+            rows += [
+                (
+                    name,
+                    f"{now[0]['steps'] / 1e3:.0f}",
+                    *(f"{100 * row['success']:.0f} % ({row['seconds']:.0f} s)" for row in now),
+                )
+                for now in shared
+            ]
         axes.axhline(0.8, color=SOFT, lw=0.8, ls="--")
         axes.set(ylim=(-0.02, 1.02), xscale="log", xlabel="training time [s]", ylabel=f"success of {episodes} episodes")
         axes.set_xticks([10, 20, 50, 100, 200, 500, 1000], labels=["10", "20", "50", "100", "200", "500", "1000"])

@@ -129,8 +129,9 @@ def draw_film(path: Path) -> None:
     shots = [
         Image.fromarray(frame).resize(size, Image.Resampling.LANCZOS) for frame in windscreen_frames(WINDSCREEN_FILM)
     ]
-    shots[0].save(path.with_suffix(".webp"), save_all=True, append_images=shots[1:], duration=100, loop=0, quality=60,
-                  method=6)  # fmt: skip
+    shots[0].save(
+        path.with_suffix(".webp"), save_all=True, append_images=shots[1:], duration=100, loop=0, quality=60, method=6
+    )
 
 
 CAMERA_TOWN, CAMERA_SEED, CAMERA_LANDMARK = "midtown", 3, LandmarkName.IKEA

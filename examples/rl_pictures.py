@@ -26,9 +26,12 @@ from dorothie_gym.wrappers import sb3_vec_env
 def make(count: int, frames: int, max_seconds: float) -> VecEnv:
     """Returns some environments whose observations are the last frames (84, 84, 3 * frames)."""
     envs = gym.make_vec(
-        "dorothie_gym/Navigation-v0", num_envs=count, observation="camera", max_seconds=max_seconds,
+        "dorothie_gym/Navigation-v0",
+        num_envs=count,
+        observation="camera",
+        max_seconds=max_seconds,
         autoreset_mode="SameStep",
-    )  # fmt: skip
+    )
     return VecFrameStack(VecMonitor(sb3_vec_env(envs)), frames)
 
 

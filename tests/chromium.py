@@ -26,9 +26,14 @@ WAIT = 60_000
 """Longest time that a page may take on a busy machine [ms]."""
 
 _FLAGS = (
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync",
-)  # fmt: skip
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
 
 
 @contextmanager
@@ -83,9 +88,11 @@ def microphone(samples: Samples, folder: Path) -> tuple[str, ...]:
     file, pause = folder / "microphone.wav", np.zeros(8000, dtype=np.float32)
     file.write_bytes(encode_wav(resample(np.concatenate([pause, samples, pause]), 16000, 48000), 48000))
     return (
-        "--use-fake-ui-for-media-stream", "--use-fake-device-for-media-stream",
-        f"--use-file-for-fake-audio-capture={file}", "--autoplay-policy=no-user-gesture-required",
-    )  # fmt: skip
+        "--use-fake-ui-for-media-stream",
+        "--use-fake-device-for-media-stream",
+        f"--use-file-for-fake-audio-capture={file}",
+        "--autoplay-policy=no-user-gesture-required",
+    )
 
 
 def talk_for(page: Any, seconds: float) -> None:

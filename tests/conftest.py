@@ -120,8 +120,10 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         session.config.stash[_COMPILER] = subprocess.Popen(
             [sys.executable, "-c", COMPILE, *map(str, locks), *map(str, stages)],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(entry or os.getcwd() for entry in sys.path)},
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, pass_fds=locks,
-        )  # fmt: skip
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            pass_fds=locks,
+        )
 
 
 def _is_warm(stage: int) -> bool:

@@ -198,8 +198,10 @@ class FloodedAnnotation(FloodedServer):
 
 
 SERVERS: dict[str, type[FloodedServer]] = {
-    "console": FloodedConsole, "study": FloodedStudy, "annotation": FloodedAnnotation,
-}  # fmt: skip
+    "console": FloodedConsole,
+    "study": FloodedStudy,
+    "annotation": FloodedAnnotation,
+}
 
 
 def frames(port: int, token: str) -> Iterator[None]:
@@ -212,9 +214,12 @@ def frames(port: int, token: str) -> Iterator[None]:
 
 
 def ask(
-    connection: http.client.HTTPConnection, method: str, path: str, body: bytes | None = None,
+    connection: http.client.HTTPConnection,
+    method: str,
+    path: str,
+    body: bytes | None = None,
     headers: dict[str, str] | None = None,
-) -> bytes:  # fmt: skip
+) -> bytes:
     """Sends a request that must succeed; returns the content of the answer."""
     connection.request(method, path, body, headers or {})
     answer = connection.getresponse()

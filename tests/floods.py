@@ -139,9 +139,14 @@ async def _until_closed(reader: asyncio.StreamReader) -> None:
 
 
 KINDS: dict[str, Callable[[Flood], Awaitable[None]]] = {
-    "idle": Flood.idle, "half_headers": Flood.half_headers, "half_bodies": Flood.half_bodies, "sockets": Flood.sockets,
-    "requests": Flood.requests, "pipelined": Flood.pipelined, "garbage": Flood.garbage,
-}  # fmt: skip
+    "idle": Flood.idle,
+    "half_headers": Flood.half_headers,
+    "half_bodies": Flood.half_bodies,
+    "sockets": Flood.sockets,
+    "requests": Flood.requests,
+    "pipelined": Flood.pipelined,
+    "garbage": Flood.garbage,
+}
 
 
 if __name__ == "__main__":

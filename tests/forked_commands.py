@@ -14,9 +14,14 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 IMPORTED = (
-    "dorothie_gym.cli.app", "dorothie_gym.baselines.rl", "dorothie_gym.envs.navigation_vector_env",
-    "dorothie_gym.cli.generate", "matplotlib.figure", "sb3_contrib", "torch._dynamo",
-)  # fmt: skip
+    "dorothie_gym.cli.app",
+    "dorothie_gym.baselines.rl",
+    "dorothie_gym.envs.navigation_vector_env",
+    "dorothie_gym.cli.generate",
+    "matplotlib.figure",
+    "sb3_contrib",
+    "torch._dynamo",
+)
 """Modules that the server imports, if they are installed."""
 
 

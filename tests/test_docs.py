@@ -249,8 +249,10 @@ def test_the_counts_of_the_data_sheet_are_those_of_the_shipped_storyboards_and_t
     errands = [len(board.subgoals) for board in boards]
     at_first = [sum(not subgoal.trigger for subgoal in board.subgoals) for board in boards]
     assert stated(r"with (\w+) to (\w+) errands, of one of (\d+) storyboards") == (
-        min(errands), max(errands), len(boards),
-    )  # fmt: skip
+        min(errands),
+        max(errands),
+        len(boards),
+    )
     assert (min(at_first), max(at_first)) == (min(errands), max(errands)), "the list begins with as many"
     assert stated(
         r"In (\d+) of these an errand can be added, in (\d+) deleted, in (\d+) changed; in (\d+) a place is hidden"
@@ -264,8 +266,9 @@ def test_the_counts_of_the_data_sheet_are_those_of_the_shipped_storyboards_and_t
         sum(bool(board.hidden) for board in boards),
     )
     assert stated(r"at (\d+) Hz; the surrounding .* at each decision, (\d+) in a second") == (
-        FRAME_RATE, EnvConfig().decision_frequency,
-    )  # fmt: skip
+        FRAME_RATE,
+        EnvConfig().decision_frequency,
+    )
     assert f"by default in {100 * EnvConfig().word_error_rate:.1f} % of the words" in text
     assert stated(r"and (\w+) small towns") == (len(town_names()),)
     assert stated(r"(\w+) towns are in `train` and in the seen folds") == (len(SEEN_TOWNS),)

@@ -70,7 +70,12 @@ def test_example_runs(name: str, tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "SDL_VIDEODRIVER": "dummy"}
     run = subprocess.run(
         [sys.executable, str(EXAMPLES / f"{name}.py"), *ARGUMENTS[name].split()],
-        cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=280, check=False,
-    )  # fmt: skip
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+    )
     assert run.returncode == 0, run.stderr
     assert PRINTED[name] in run.stdout

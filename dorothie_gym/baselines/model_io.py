@@ -196,9 +196,11 @@ def decode(outputs: Outputs, task: Tensor, allowed: Tensor | None = None) -> Pre
     action = likeliest(outputs.action, allowed)
     angle = torch.rad2deg(torch.atan2(outputs.angle[:, 1], outputs.angle[:, 0]))
     return Predicted(
-        outputs.move[points, role].argmax(-1), outputs.slot_values[points, role] > 0, action,
+        outputs.move[points, role].argmax(-1),
+        outputs.slot_values[points, role] > 0,
+        action,
         allowed_angle(action, angle),
-    )  # fmt: skip
+    )
 
 
 def likeliest(scores: Tensor, allowed: Tensor | None) -> Tensor:

@@ -144,7 +144,9 @@ take minutes."""
 SOUND_ROWS: Final = (
     ModelEntry(name="TOTO (+ Log-mel Speech)", command="toto-sound", change=lambda config: config, sound="log-mel"),
     ModelEntry(
-        name="TOTO (+ Speech Embedding)", command="toto-embedding", change=lambda config: config,
+        name="TOTO (+ Speech Embedding)",
+        command="toto-embedding",
+        change=lambda config: config,
         sound="speech-embedding",
     ),
     ModelEntry(name="TOTO (+ HuBERT)", command="toto-hubert", change=lambda config: config, sound="hubert"),
@@ -155,12 +157,13 @@ SOUND_ROWS: Final = (
     ModelEntry(
         name="Speech Embedding Only", command="sound-embedding", change=_only(Channel.SPEECH), sound="speech-embedding"
     ),
-    ModelEntry(name="HuBERT Only (weights of a folder)", command="sound-hubert", change=_only(Channel.SPEECH),
-               sound="hubert"),
+    ModelEntry(
+        name="HuBERT Only (weights of a folder)", command="sound-hubert", change=_only(Channel.SPEECH), sound="hubert"
+    ),
     ModelEntry(
         name="Text + Log-mel", command="text-sound", change=_only(Channel.TRANSCRIPT, Channel.SPEECH), sound="log-mel"
     ),
-)  # fmt: skip
+)
 """Models of spoken corpora, whose current utterance is heard as sound. In TOTO without the current speech, the words of
 the current utterance stay, as in the paper's row. They are trained where they are named."""
 
@@ -169,11 +172,17 @@ ALL_ROWS: Final = (*ROWS, *CAMERA_ROWS, *SOUND_ROWS)
 
 _CALLED: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "bert": "text", "bert-trained": "text-trained", "toto-bert": "toto-trained-text", "bert-sound": "text-sound",
-        "detector": "objects", "et": "toto-episodic", "et-bert": "toto-episodic-trained-text",
-        "toto-no-object-detection": "toto-no-objects", "toto-no-vision-history": "toto-no-object-history",
+        "bert": "text",
+        "bert-trained": "text-trained",
+        "toto-bert": "toto-trained-text",
+        "bert-sound": "text-sound",
+        "detector": "objects",
+        "et": "toto-episodic",
+        "et-bert": "toto-episodic-trained-text",
+        "toto-no-object-detection": "toto-no-objects",
+        "toto-no-vision-history": "toto-no-object-history",
     }
-)  # fmt: skip
+)
 _SOURCES: Final = ("", "-boxes", "-detections", "-queries")
 
 FORMER_COMMANDS: Final[Mapping[str, str]] = MappingProxyType(
@@ -291,9 +300,12 @@ def _tokens(config: TOTOConfig, material: Dataset) -> Tensor:
         return _pieces(config, material)
     tokenizer: Any = load_pretrained(find_transformers("minilm").AutoTokenizer, minilm_folder(), "minilm")
     pieces = tokenizer(
-        list(material.columns.texts), padding="max_length", truncation=True, max_length=config.text_tokens,
+        list(material.columns.texts),
+        padding="max_length",
+        truncation=True,
+        max_length=config.text_tokens,
         return_tensors="pt",
-    )  # fmt: skip
+    )
     ids: Tensor = pieces["input_ids"]
     return ids
 

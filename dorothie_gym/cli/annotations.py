@@ -80,9 +80,7 @@ def _known(corpus: Corpus) -> str:
     return f"annotators are {', '.join(names)}" if names else "nobody has; run dorothie-gym annotate"
 
 
-def _export(
-    corpus: Corpus, entry: CorpusEntry, annotator: str, out: Path, to: Format, maps: Path | None
-) -> str:  # fmt: skip
+def _export(corpus: Corpus, entry: CorpusEntry, annotator: str, out: Path, to: Format, maps: Path | None) -> str:
     from dorothie_gym.lab.annotation.formats import export_annotation
     from dorothie_gym.lab.annotation.log import read_annotation
     from dorothie_gym.lab.annotation.source_text import SourceText

@@ -100,7 +100,7 @@ def console(
 
 def _config(
     max_seconds: float | None, word_errors: float | None, absence: float, after: str, away: str, pictures: bool
-) -> ConsoleConfig:  # fmt: skip
+) -> ConsoleConfig:
     from dorothie_gym.lab.console.config import AbsenceRules, AfterAbsence, ConsoleConfig, WhileAway
 
     for name, value, choices in (("--after-absence", after, AfterAbsence), ("--while-away", away, WhileAway)):
@@ -115,9 +115,7 @@ def _config(
     )
 
 
-def _room(
-    town: str, storyboard: str | None, seed: int, roles: str, out: Path | None, config: ConsoleConfig
-) -> Room:  # fmt: skip
+def _room(town: str, storyboard: str | None, seed: int, roles: str, out: Path | None, config: ConsoleConfig) -> Room:
     from dorothie_gym.lab.console.room import Room
     from dorothie_gym.lab.console.seating import parse_roles
     from dorothie_gym.lab.console.town_page import town_page
@@ -132,7 +130,7 @@ def _room(
 
 def _resumed_room(
     folder: Path, town: str | None, storyboard: str | None, roles: str, out: Path, config: ConsoleConfig
-) -> Room:  # fmt: skip
+) -> Room:
     from dorothie_gym.evaluation.rollout.replay import ReplaySources, begin_replay
     from dorothie_gym.lab.console.resuming import Resumed
     from dorothie_gym.lab.console.room import Room
@@ -147,7 +145,7 @@ def _resumed_room(
     seed = engine.scenario.seed
     room = Room(
         engine, parse_roles(roles or resumed.roles), resumed.config(config), seed=seed, folder=out, resumed=resumed
-    )  # fmt: skip
+    )
     town_page(engine.town)
     return room
 

@@ -47,14 +47,16 @@ def cross_play(
     co_wizard: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME|FILE", help="A Co-Wizard, as in `rollout`; repeat it. Default: scripted and silent.",
+            metavar="NAME|FILE",
+            help="A Co-Wizard, as in `rollout`; repeat it. Default: scripted and silent.",
             autocompletion=complete_policy("co_wizard"),
         ),
     ] = None,
     participant: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME|FILE", help="A participant, as in `rollout`; repeat it. Default: scripted and silent.",
+            metavar="NAME|FILE",
+            help="A participant, as in `rollout`; repeat it. Default: scripted and silent.",
             autocompletion=complete_policy("participant"),
         ),
     ] = None,
@@ -86,7 +88,7 @@ def cross_play(
     llm_prices: LlmPrices = None,
     ray: Ray = None,
     as_json: AsJson = False,
-) -> None:  # fmt: skip
+) -> None:
     """Measure every pair of some Co-Wizards and participants over the same sessions, with confidence intervals.
 
     The result does not depend on the number of workers. An interrupted run is resumed by the same command with --out.
@@ -100,15 +102,26 @@ def cross_play(
                 fail(f"{page}: the page is Markdown; give a name that ends in .md")
             check_file(page)
         asked = LanguageModelOptions(
-            url=llm_url, timeout=llm_timeout, tokens=llm_tokens, time=llm_time, pictures=False,
-            cassette=llm_cassette, replay=llm_replay, prices=llm_prices,
-        )  # fmt: skip
+            url=llm_url,
+            timeout=llm_timeout,
+            tokens=llm_tokens,
+            time=llm_time,
+            pictures=False,
+            cassette=llm_cassette,
+            replay=llm_replay,
+            prices=llm_prices,
+        )
         drivers, guides, adversary = _players(co_wizard or USUAL, participant or USUAL, ad_wizard, asked)
         try:
             settings = CrossPlaySettings(
-                co_wizards=drivers, participants=guides, ad_wizard=adversary, towns=parse_towns(towns),
-                sessions=sessions, seed=seed, config=env_config(max_seconds, word_errors),
-            )  # fmt: skip
+                co_wizards=drivers,
+                participants=guides,
+                ad_wizard=adversary,
+                towns=parse_towns(towns),
+                sessions=sessions,
+                seed=seed,
+                config=env_config(max_seconds, word_errors),
+            )
         except ValueError as error:
             fail(str(error))
         folder = Path(tempfile.mkdtemp(prefix="dorothie_gym-cross-play-")) if out is None else out
@@ -135,7 +148,7 @@ def cross_play(
 
 def _players(
     drivers: list[str], guides: list[str], ad_wizard: str, asked: LanguageModelOptions
-) -> tuple[list[Player], list[Player], Player]:  # fmt: skip
+) -> tuple[list[Player], list[Player], Player]:
     """Returns the players of both roles and of the Ad-Wizard; exits if a name or file is unknown."""
     from dorothie_gym.ontology.roles import Role
 
@@ -145,9 +158,7 @@ def _players(
     return [cast[Role.CO_WIZARD] for cast in casts], [first[Role.PARTICIPANT], *others], first[Role.AD_WIZARD]
 
 
-def _play(
-    settings: CrossPlaySettings, folder: Path, workers: int, ray: str | None, *, quiet: bool
-) -> CrossPlayResult:  # fmt: skip
+def _play(settings: CrossPlaySettings, folder: Path, workers: int, ray: str | None, *, quiet: bool) -> CrossPlayResult:
     from dorothie_gym.errors import ProcessError
     from dorothie_gym.evaluation.closed_loop.cross_play import cross_play
 

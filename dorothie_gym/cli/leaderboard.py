@@ -53,7 +53,10 @@ def leaderboard(
     row: Annotated[
         list[str] | None,
         typer.Option(
-            "--row", metavar="NAME|FILE", rich_help_panel=_PANEL, autocompletion=complete_policy("co_wizard"),
+            "--row",
+            metavar="NAME|FILE",
+            rich_help_panel=_PANEL,
+            autocompletion=complete_policy("co_wizard"),
             help="A Co-Wizard, as in `rollout`; repeat it. Default: scripted, lane-follow, random, all shipped models.",
         ),
     ] = None,
@@ -63,13 +66,12 @@ def leaderboard(
     imported: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="FILE.xodr", help="An OpenDRIVE file for the part of imported towns; repeat it.",
+            metavar="FILE.xodr",
+            help="An OpenDRIVE file for the part of imported towns; repeat it.",
             rich_help_panel=_PANEL,
         ),
     ] = None,
-    sessions: Annotated[
-        int, typer.Option(min=1, help="Number of sessions of each row.", rich_help_panel=_PANEL)
-    ] = 100,
+    sessions: Annotated[int, typer.Option(min=1, help="Number of sessions of each row.", rich_help_panel=_PANEL)] = 100,
     max_seconds: MaxSeconds = None,
     check: Annotated[
         bool,
@@ -80,7 +82,7 @@ def leaderboard(
     workers: Players = None,
     ray: Ray = None,
     as_json: AsJson = False,
-) -> None:  # fmt: skip
+) -> None:
     """Rank policies by their rollouts, on a page with intervals, cost and commands, and in a picture.
 
     With --play, one command makes the whole page again: it plays all rows with seed 0, then writes the page. What
@@ -131,9 +133,7 @@ def _print(entries: Sequence[LeaderboardEntry], out: Path, picture: Path) -> Non
     console.print(f"Written: {out}, {picture}", style="dim", markup=False, soft_wrap=True)
 
 
-def _checked(
-    entries: Sequence[LeaderboardEntry], workers: int | None, *, quiet: bool
-) -> tuple[LeaderboardEntry, ...]:  # fmt: skip
+def _checked(entries: Sequence[LeaderboardEntry], workers: int | None, *, quiet: bool) -> tuple[LeaderboardEntry, ...]:
     """Returns the rollouts with the outcome of their check; exits if one has faults."""
     from dorothie_gym.cli.warm_up import compile_first
     from dorothie_gym.errors import ProcessError, RolloutError
@@ -155,7 +155,7 @@ def _checked(
 
 def _plan(
     row: list[str] | None, parts: str, imported: list[str], sessions: int, max_seconds: float | None
-) -> LeaderboardPlan:  # fmt: skip
+) -> LeaderboardPlan:
     """Returns the rollouts to be played; exits if a name or file is unknown."""
     from dorothie_gym.cli.language_model import AnswerTime, LanguageModelOptions
     from dorothie_gym.cli.options import env_config, find_cast
@@ -166,16 +166,25 @@ def _plan(
     for file in imported:
         load_town(file)
     asked = LanguageModelOptions(
-        url=None, timeout=30.0, tokens=300, time=AnswerTime.WAITS, pictures=False, cassette=None, replay=False,
+        url=None,
+        timeout=30.0,
+        tokens=300,
+        time=AnswerTime.WAITS,
+        pictures=False,
+        cassette=None,
+        replay=False,
         prices=None,
-    )  # fmt: skip
+    )
     names = row or list(usual_rows())
     players = [find_cast("scripted", name, "scripted", asked)[Role.CO_WIZARD] for name in names]
     try:
         return LeaderboardPlan(
-            co_wizards=players, parts=tuple(part.strip() for part in parts.split(",") if part.strip()),
-            imported=tuple(imported), sessions=sessions, config=env_config(max_seconds, None),
-        )  # fmt: skip
+            co_wizards=players,
+            parts=tuple(part.strip() for part in parts.split(",") if part.strip()),
+            imported=tuple(imported),
+            sessions=sessions,
+            config=env_config(max_seconds, None),
+        )
     except ValueError as error:
         fail(str(error))
 

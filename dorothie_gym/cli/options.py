@@ -126,9 +126,13 @@ Ray = Annotated[
 
 
 def env_config(
-    max_seconds: float | None, word_errors: float | None, perception: PerceptionModel = PerceptionModel.SYMBOLIC,
-    speech: bool = False, *, pictures: bool = False,
-) -> EnvConfig:  # fmt: skip
+    max_seconds: float | None,
+    word_errors: float | None,
+    perception: PerceptionModel = PerceptionModel.SYMBOLIC,
+    speech: bool = False,
+    *,
+    pictures: bool = False,
+) -> EnvConfig:
     """Returns the engine settings of a command line.
 
     Args:
@@ -168,7 +172,7 @@ def env_config(
 
 def find_cast(
     participant: str, co_wizard: str, ad_wizard: str, language_model: LanguageModelOptions
-) -> dict[Role, Player]:  # fmt: skip
+) -> dict[Role, Player]:
     """Returns the player of each role; exits if a name or file is unknown.
 
     Args:

@@ -197,8 +197,10 @@ def add_sound(video: Path, sound: Path) -> None:
     try:
         ran = subprocess.run(
             [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-y", *inputs, str(part)],
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         if ran.returncode:
             raise SpeechError(f"{video}: the sound cannot be added ({one_line(ran.stderr)}); the pictures are kept")
         part.replace(video)

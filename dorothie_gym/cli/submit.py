@@ -124,6 +124,7 @@ def _print(found: SubmissionCheck, faults: Sequence[str], written: str | None) -
     whose = "by its own policy" if found.played else "by its recorded actions"
     console.print(
         f"Simulated: {len(found.resimulated)} of {found.sessions} sessions{drawn}; the Co-Wizard acted {whose}.",
-        markup=False, soft_wrap=True,
-    )  # fmt: skip
+        markup=False,
+        soft_wrap=True,
+    )
     console.print(f"Claimed, not checked: {', '.join(found.claims) or 'nothing'}", markup=False, soft_wrap=True)

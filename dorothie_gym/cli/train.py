@@ -64,10 +64,11 @@ Epochs = Annotated[
 Detector = Annotated[
     Path | None,
     typer.Option(
-        "--detector", metavar="DIR",
+        "--detector",
+        metavar="DIR",
         help="Models of detections and queries: folder of the trained detector; default OUT/detr/small/seed-0.",
     ),
-]  # fmt: skip
+]
 Hubert = Annotated[
     Path | None,
     typer.Option("--hubert", metavar="DIR", help="Models of HuBERT: folder of its weights (safetensors)."),
@@ -184,8 +185,10 @@ def _train_benchmark_model(
         stdout().print(
             f"Seed {result['seed']}: {result['epochs']} epochs, best {result['best_epoch']}, validation loss "
             f"{result['validation_loss']:.4f}, {result['seconds']:.0f} s; {result['folder']}",
-            style="dim", markup=False, soft_wrap=True,
-        )  # fmt: skip
+            style="dim",
+            markup=False,
+            soft_wrap=True,
+        )
 
 
 def table(
@@ -262,8 +265,10 @@ def _name_former_trainings(jobs: Sequence[Experiment]) -> None:
             stderr().print(
                 f"{places[now] / former}: has trainings of a former version, whose row is called {now} now; they are "
                 "not resumed, but still play, and their predictions can be evaluated",
-                style="dim", markup=False, soft_wrap=True,
-            )  # fmt: skip
+                style="dim",
+                markup=False,
+                soft_wrap=True,
+            )
 
 
 @contextmanager

@@ -92,10 +92,14 @@ def train_rl(
     """
     given = _read_settings(setting or []) | ({} if observation is None else {"observation": observation})
     changes: Given = {
-        "steps": steps, "environments": environments, "workers": workers, "seed": seed,
-        "evaluate_every": evaluate_every, "episodes": episodes,
+        "steps": steps,
+        "environments": environments,
+        "workers": workers,
+        "seed": seed,
+        "evaluate_every": evaluate_every,
+        "episodes": episodes,
         "warm_start": None if warm_start is None else str(warm_start),
-    }  # fmt: skip
+    }
     with _reporting_errors():
         env = env or (CONTINUOUS_ENV if algorithm == "sac" else DEFAULT_ENV)
         _train(algorithm, env, out, given, changes, ray=ray, device=device, as_json=as_json)

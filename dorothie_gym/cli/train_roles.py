@@ -93,9 +93,7 @@ ROLES: Final[Mapping[str, Callable[[Request], RoleReport]]] = MappingProxyType(
 """Training of each learned role by the name of the model."""
 
 
-def train_role(
-    model: str, corpus: Path, out: Path, *, seeds: int, workers: int | None, as_json: bool
-) -> None:  # fmt: skip
+def train_role(model: str, corpus: Path, out: Path, *, seeds: int, workers: int | None, as_json: bool) -> None:
     """Trains players of a role with several seeds, each in a folder of its own, and prints how to play them."""
     from dorothie_gym.support.processors import available_processors
 
@@ -104,9 +102,8 @@ def train_role(
         with stage_progress(quiet=as_json) as on_stage:
             for seed in range(seeds):
                 request = Request(
-                    corpus=corpus, out=out, seed=seed, workers=workers or available_processors(),
-                    on_stage=on_stage,
-                )  # fmt: skip
+                    corpus=corpus, out=out, seed=seed, workers=workers or available_processors(), on_stage=on_stage
+                )
                 found.append((request.folder(model), ROLES[model](request)))
     except KeyboardInterrupt:
         exit_interrupted(f"Interrupted with {len(found)} of {seeds} trainings finished; resume with the same command.")

@@ -14,10 +14,16 @@ VISION_MODELS: Final = ("segformer", "detr")
 _FIGURES: Final[Mapping[str, Mapping[str, str]]] = {
     "segformer": {"miou": "mIoU", "macc": "mAcc", "aacc": "aAcc", "depth_error": "depth error"},
     "detr": {
-        "ap50": "AP50", "ap50_95": "AP50:95", "ap_place": "AP 2 m", "place_error": "place", "range_error": "depth",
-        "size_error": "size", "heading_error": "heading", "axis_error": "axis",
+        "ap50": "AP50",
+        "ap50_95": "AP50:95",
+        "ap_place": "AP 2 m",
+        "place_error": "place",
+        "range_error": "depth",
+        "size_error": "size",
+        "heading_error": "heading",
+        "axis_error": "axis",
     },
-}  # fmt: skip
+}
 _UNITS: Final[Mapping[str, str]] = {"place_error": "m", "heading_error": "deg", "axis_error": "deg"}
 """Units of figures that are no shares."""
 _MEANINGS: Final[Mapping[str, str]] = {
@@ -52,9 +58,15 @@ def train_vision(
         with stage_progress(quiet=as_json) as on_stage:
             for seed in range(seeds):
                 job = VisionExperiment(
-                    corpus=corpus, model=model, size=size, seed=seed, out=out, epochs=epochs,  # type: ignore[arg-type]
-                    inputs=inputs or "predicted", device=device or str(best_device()),  # type: ignore[arg-type]
-                )  # fmt: skip
+                    corpus=corpus,
+                    model=model,
+                    size=size,
+                    seed=seed,
+                    out=out,
+                    epochs=epochs,  # type: ignore[arg-type]
+                    inputs=inputs or "predicted",
+                    device=device or str(best_device()),  # type: ignore[arg-type]
+                )
                 check_experiment(job)
                 results.append(run_vision_experiment(job, workers=workers or available_processors(), on_stage=on_stage))
     except KeyboardInterrupt:
@@ -86,8 +98,10 @@ def _show(model: str, results: Sequence[Mapping[str, Any]]) -> None:
         stdout().print(
             f"Seed {result['seed']}: best epoch {result['best_epoch']} of {len(result['epochs'])}, "
             f"{result['processor_seconds']:.0f} s of processor time; {result['folder']}",
-            style="dim", markup=False, soft_wrap=True,
-        )  # fmt: skip
+            style="dim",
+            markup=False,
+            soft_wrap=True,
+        )
 
 
 def _shown(name: str, value: float | None) -> str:

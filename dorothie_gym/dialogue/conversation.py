@@ -139,7 +139,7 @@ class Conversation:
 
     def say(
         self, speaker: Role, span: Span, now: float, onset: float = 0.0, pace: float = 1.0, seconds: float | None = None
-    ) -> str | None:  # fmt: skip
+    ) -> str | None:
         """Starts an utterance, or appends a span to the current one of the speaker.
 
         Args:

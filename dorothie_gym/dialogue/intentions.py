@@ -76,7 +76,10 @@ TREE_ANSWERS: Final[Mapping[CommunicativeFunction, tuple[str, ...]]] = MappingPr
         CommunicativeFunction.FEEDBACK_ELICITATION: (_OPENS, "a question", "whether the other side is following"),
         CommunicativeFunction.CHECK_QUESTION: (_OPENS, "a question", "whether something inferred is right"),
         CommunicativeFunction.PROPOSITIONAL_QUESTION: (
-            _OPENS, "a question", "something the speaker cannot infer", "yes or no",
+            _OPENS,
+            "a question",
+            "something the speaker cannot infer",
+            "yes or no",
         ),
         CommunicativeFunction.OFFER: (_OPENS, "a question", "something the speaker cannot infer", "yes or no"),
         CommunicativeFunction.SET_QUESTION: (_OPENS, "a question", "something the speaker cannot infer", "any other"),
@@ -91,7 +94,7 @@ TREE_ANSWERS: Final[Mapping[CommunicativeFunction, tuple[str, ...]]] = MappingPr
         CommunicativeFunction.ANSWER: (_REACTS, _DRIVE, "answers it", "anything else"),
         CommunicativeFunction.OTHER: ("nothing to do with the drive",),
     }
-)  # fmt: skip
+)
 """Answers that lead from the root of the decision tree to the move of each function."""
 
 _MOVES: Final = MappingProxyType({function: walk(answers) for function, answers in TREE_ANSWERS.items()})

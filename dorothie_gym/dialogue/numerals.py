@@ -70,9 +70,14 @@ def duration(seconds: float) -> str:
 
 
 _SHORT_TIMES = (
-    (12.0, "ten seconds"), (17.0, "fifteen seconds"), (25.0, "twenty seconds"), (38.0, "half a minute"),
-    (52.0, "forty-five seconds"), (75.0, "a minute"), (105.0, "a minute and a half"),
-)  # fmt: skip
+    (12.0, "ten seconds"),
+    (17.0, "fifteen seconds"),
+    (25.0, "twenty seconds"),
+    (38.0, "half a minute"),
+    (52.0, "forty-five seconds"),
+    (75.0, "a minute"),
+    (105.0, "a minute and a half"),
+)
 """Words for times below a limit [s]."""
 
 

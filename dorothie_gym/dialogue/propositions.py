@@ -140,8 +140,12 @@ _Kind: TypeAlias = type[enum.Enum] | type[bool] | type[int] | type[str] | str
 _ANY: Final = "proposition"
 _PLACE: Final[Mapping[str, _Kind]] = {"place": LandmarkName}
 _ACTION: Final[Mapping[str, _Kind]] = {
-    "action": ActionValue, "direction": Direction, "street": StreetName, "place": LandmarkName, "speed": int,
-}  # fmt: skip
+    "action": ActionValue,
+    "direction": Direction,
+    "street": StreetName,
+    "place": LandmarkName,
+    "speed": int,
+}
 
 PARAMETERS: Final[Mapping[Predicate, Mapping[str, _Kind]]] = MappingProxyType(
     {
@@ -229,9 +233,7 @@ class Proposition:
     @property
     def asks(self) -> bool:
         """Returns whether an argument is asked for, here or in a proposition inside."""
-        return any(
-            value is ASKED or (isinstance(value, Proposition) and value.asks) for _, value in self.arguments
-        )  # fmt: skip
+        return any(value is ASKED or (isinstance(value, Proposition) and value.asks) for _, value in self.arguments)
 
     @property
     def opposite(self) -> Proposition:

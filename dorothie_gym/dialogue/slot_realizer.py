@@ -76,7 +76,7 @@ class SlotRealizer:
         "manner",
         "random",
         "values",
-    )  # fmt: skip
+    )
 
     def __init__(
         self,

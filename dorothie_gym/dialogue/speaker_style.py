@@ -73,9 +73,7 @@ class _StyleSpread:
     proper: float
 
 
-def draw_style(
-    role: Role, rng: np.random.Generator, leanings: Mapping[str, float] | None = None
-) -> SpeakerStyle:  # fmt: skip
+def draw_style(role: Role, rng: np.random.Generator, leanings: Mapping[str, float] | None = None) -> SpeakerStyle:
     """Samples the style of a speaker for a session.
 
     Args:

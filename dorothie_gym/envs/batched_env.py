@@ -41,9 +41,14 @@ class BatchedEnv(Restorable, Generic[C, B]):
     metadata: dict[str, object] = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(
-        self, num_envs: int, town: Towns, config: C, render_mode: str | None, threads: int | None,
+        self,
+        num_envs: int,
+        town: Towns,
+        config: C,
+        render_mode: str | None,
+        threads: int | None,
         autoreset_mode: str | AutoresetMode,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Checks the arguments and loads the towns; the batches are made by `_make_batches`.
 
         Raises:
@@ -110,6 +115,8 @@ class BatchedEnv(Restorable, Generic[C, B]):
         """Returns the kind of environment, the towns and the settings."""
         towns = [town.identity for town in self.towns]
         return {
-            **super().compatibility(), "the number of environments": len(towns), "the towns": towns,
+            **super().compatibility(),
+            "the number of environments": len(towns),
+            "the towns": towns,
             "the settings": self.config,
-        }  # fmt: skip
+        }

@@ -121,10 +121,15 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         )
         self._make_batches(
             lambda each, numbers, threads: SessionBatch(
-                each, storyboard, config=self.config, max_cycles=max_cycles, limits=self.limits, numbers=numbers,
+                each,
+                storyboard,
+                config=self.config,
+                max_cycles=max_cycles,
+                limits=self.limits,
+                numbers=numbers,
                 threads=threads,
             )
-        )  # fmt: skip
+        )
         places = [self._places[number] for number in range(num_envs)]
         self.engines: tuple[SessionEngine, ...] = tuple(batch.engines[row] for batch, row in places)
         self._over = np.zeros(num_envs, dtype=np.bool_)
@@ -187,7 +192,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         self, actions: BatchedActions
     ) -> tuple[
         dict[str, Stacked], dict[str, NDArray[np.float64]], dict[str, Flags], dict[str, Flags], dict[str, Infos]
-    ]:  # fmt: skip
+    ]:
         """Plays a decision in every environment; those that are over begin anew, as the autoreset mode says.
 
         Args:
@@ -223,9 +228,12 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         if mode is AutoresetMode.SAME_STEP and self._over.any():
             observations, infos = self._begin_at_once(observations, outcomes)
         return (
-            observations, rewards, {agent: terminated.copy() for agent in _AGENTS},
-            {agent: truncated.copy() for agent in _AGENTS}, infos,
-        )  # fmt: skip
+            observations,
+            rewards,
+            {agent: terminated.copy() for agent in _AGENTS},
+            {agent: truncated.copy() for agent in _AGENTS},
+            infos,
+        )
 
     def render_one(self, number: int) -> NDArray[np.uint8] | None:
         """Draws the session of one environment, as `DuoWizardEnv` does; None without a render mode."""

@@ -136,9 +136,15 @@ class NavigationContinuousEnv(DrivingEnv[NDArray[np.float32]]):
         render_view: str = "map",
     ) -> None:
         config = NavigationConfig(
-            traffic=traffic, exceptions=exceptions, weights=weights_of(reward), max_seconds=max_seconds,
-            patience=patience, decision_frequency=decision_frequency, observation=observation, camera=camera,
-        )  # fmt: skip
+            traffic=traffic,
+            exceptions=exceptions,
+            weights=weights_of(reward),
+            max_seconds=max_seconds,
+            patience=patience,
+            decision_frequency=decision_frequency,
+            observation=observation,
+            camera=camera,
+        )
         super().__init__(town, storyboard, config, render_mode, view, render_view, pedals=True)
         self.action_space, self.observation_space = control_space(control), driver_space(config, path_space())
         self.control = control

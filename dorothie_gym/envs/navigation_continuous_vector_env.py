@@ -62,9 +62,15 @@ class NavigationContinuousVectorEnv(DrivingVectorEnv):
         render_view: str = RenderView.MAP,
     ) -> None:
         config = NavigationConfig(
-            traffic=traffic, exceptions=exceptions, weights=weights_of(reward), max_seconds=max_seconds,
-            patience=patience, decision_frequency=decision_frequency, observation=observation, camera=camera,
-        )  # fmt: skip
+            traffic=traffic,
+            exceptions=exceptions,
+            weights=weights_of(reward),
+            max_seconds=max_seconds,
+            patience=patience,
+            decision_frequency=decision_frequency,
+            observation=observation,
+            camera=camera,
+        )
         super().__init__(
             num_envs, town, storyboard, config, driver_space(config, path_space()), control_space(control), render_mode,
             view, render_view, threads, autoreset_mode, pedals=True,

@@ -100,9 +100,15 @@ class NavigationEnv(DrivingEnv[np.int64]):
         render_view: str = "map",
     ) -> None:
         config = NavigationConfig(
-            guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
-            max_seconds=max_seconds, patience=patience, observation=observation, camera=camera,
-        )  # fmt: skip
+            guidance=guidance,
+            traffic=traffic,
+            exceptions=exceptions,
+            weights=weights_of(reward),
+            max_seconds=max_seconds,
+            patience=patience,
+            observation=observation,
+            camera=camera,
+        )
         super().__init__(town, storyboard, config, render_mode, view, render_view, pedals=False)
         self.action_space = spaces.Discrete(len(ACTIONS))
         self.observation_space = driver_space(config, navigation_space())

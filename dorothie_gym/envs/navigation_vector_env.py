@@ -77,9 +77,15 @@ class NavigationVectorEnv(DrivingVectorEnv):
         render_view: str = RenderView.MAP,
     ) -> None:
         config = NavigationConfig(
-            guidance=guidance, traffic=traffic, exceptions=exceptions, weights=weights_of(reward),
-            max_seconds=max_seconds, patience=patience, observation=observation, camera=camera,
-        )  # fmt: skip
+            guidance=guidance,
+            traffic=traffic,
+            exceptions=exceptions,
+            weights=weights_of(reward),
+            max_seconds=max_seconds,
+            patience=patience,
+            observation=observation,
+            camera=camera,
+        )
         super().__init__(
             num_envs, town, storyboard, config, driver_space(config, navigation_space()), spaces.Discrete(len(ACTIONS)),
             render_mode, view, render_view, threads, autoreset_mode, pedals=False,

@@ -120,10 +120,15 @@ def across(
         there, _ = local_coordinates(points, offsets, ends, other, x, y)
         there = min(max(there, 0.0), points[offsets[other + 1] - 1, STATION])
         gap = opposite_gap(
-            x, y, heading, height,
-            value_at(points, offsets, other, X, there), value_at(points, offsets, other, Y, there),
-            value_at(points, offsets, other, HEADING, there), value_at(points, offsets, other, HEIGHT, there),
-        )  # fmt: skip
+            x,
+            y,
+            heading,
+            height,
+            value_at(points, offsets, other, X, there),
+            value_at(points, offsets, other, Y, there),
+            value_at(points, offsets, other, HEADING, there),
+            value_at(points, offsets, other, HEIGHT, there),
+        )
         if gap < least:
             found, at, least = other, there, gap
     return found, at, least
@@ -131,9 +136,15 @@ def across(
 
 @compiled
 def opposite_gap(
-    x: float, y: float, heading: float, height: float, other_x: float, other_y: float, other_heading: float,
+    x: float,
+    y: float,
+    heading: float,
+    height: float,
+    other_x: float,
+    other_y: float,
+    other_heading: float,
     other_height: float,
-) -> float:  # fmt: skip
+) -> float:
     """Returns the distance to a point on another lane, infinite if that is not opposite and oncoming [m]."""
     if abs((other_heading - heading + math.pi) % (2 * math.pi) - math.pi) < MIN_OPPOSITION:
         return math.inf
@@ -185,10 +196,8 @@ class LaneEdges:
         for lane in town.lanes:
             at = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / LANE_SAMPLING) + 1))
             rows.append(
-                np.column_stack(
-                    [np.interp(at, lane.stations, column) for column in (*lane.points.T, lane.widths / 2)]
-                )
-            )  # fmt: skip
+                np.column_stack([np.interp(at, lane.stations, column) for column in (*lane.points.T, lane.widths / 2)])
+            )
         self._discs = np.concatenate(rows)  # (n, 4) x, y, z, radius
         self._tree = cKDTree(self._discs[:, :2])
         self._widest = float(self._discs[:, 3].max())

@@ -32,9 +32,15 @@ from dorothie_gym.support.compilation.records import RecordArray
 
 @compiled
 def find_departures(
-    graph: RoutingGraph, search: RouteSearch, lane: int, station: float, goal_lane: int, goal_station: float,
-    blocked: RecordArray[PlaceRecord], count: int,
-) -> int:  # fmt: skip
+    graph: RoutingGraph,
+    search: RouteSearch,
+    lane: int,
+    station: float,
+    goal_lane: int,
+    goal_station: float,
+    blocked: RecordArray[PlaceRecord],
+    count: int,
+) -> int:
     """Writes the edges from a start to `search.extra`: along its lane, and lane changes and U-turns that begin there.
 
     Args:
@@ -95,9 +101,15 @@ def _add_manoeuvres(
 
 @compiled
 def _connect(
-    graph: RoutingGraph, extra: RecordArray[RoutingEdge], number: int, lane: int, station: float,
-    goal_lane: int, goal_station: float, nearest: float,
-) -> int:  # fmt: skip
+    graph: RoutingGraph,
+    extra: RecordArray[RoutingEdge],
+    number: int,
+    lane: int,
+    station: float,
+    goal_lane: int,
+    goal_station: float,
+    nearest: float,
+) -> int:
     """Adds edges from the start right to the goal, from the lane changes and U-turns found; returns the new number."""
     manoeuvres, cell = number, cell_at(graph, goal_lane, goal_station)
     goal, weight = len(graph.rows) - 2, graph.lanes[goal_lane].weight
@@ -224,9 +236,14 @@ def find_route(
 
 @compiled
 def find_costs(
-    graph: RoutingGraph, search: RouteSearch, lane: int, station: float, blocked: RecordArray[PlaceRecord], count: int,
+    graph: RoutingGraph,
+    search: RouteSearch,
+    lane: int,
+    station: float,
+    blocked: RecordArray[PlaceRecord],
+    count: int,
     costs: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Writes the costs to a goal [m]; infinite without a route.
 
     Args:

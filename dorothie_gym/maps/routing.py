@@ -263,8 +263,9 @@ class Router:
         found[self.cell(*start)] = True
         return found[: self._graph.cells]
 
-    def onward(self, start: Place, blocked: Sequence[Place] = (), stands: Sequence[Place] = (),
-               held: Place | None = None) -> NDArray[np.bool_]:  # fmt: skip
+    def onward(
+        self, start: Place, blocked: Sequence[Place] = (), stands: Sequence[Place] = (), held: Place | None = None
+    ) -> NDArray[np.bool_]:
         """Returns which nodes of the graph a car can reach by driving on from a place, despite roadblocks (nodes,).
 
         Nodes are the starts of the cells in order, then the tails of the lanes. The cell of the start counts if the car

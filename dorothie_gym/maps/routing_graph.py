@@ -382,9 +382,15 @@ def add_changes(
 
 @compiled
 def _add_change(
-    graph: RoutingGraph, lane: int, beside: int, entry: int, begin: float, road: float,
-    edges: RecordArray[RoutingEdge], count: int,
-) -> int:  # fmt: skip
+    graph: RoutingGraph,
+    lane: int,
+    beside: int,
+    entry: int,
+    begin: float,
+    road: float,
+    edges: RecordArray[RoutingEdge],
+    count: int,
+) -> int:
     """Adds a lane change of length `road` [m] if the lanes lie side by side there."""
     leave, end = begin + CHANGE_LEAD, begin + road
     x, y = _position(graph, lane, leave)

@@ -349,7 +349,7 @@ def _roadblock(state: AdWizardState, observation: ObservationMapping, now: float
     marks = read_landmarks(observation, state.town)
     suits = suits_roadblock(
         marks, lane, station, town_lane.length, config.roadblock_margins, config.roadblock_clearance
-    )  # fmt: skip
+    )
     if town_lane.in_junction or not suits:
         return None, state
     point = town_lane.position(round(station))
@@ -363,9 +363,13 @@ def _roadblock(state: AdWizardState, observation: ObservationMapping, now: float
 
 
 def suits_roadblock(
-    marks: Rows[PlaceOfLandmark], lane: int, station: float, length: float, margins: tuple[float, float],
+    marks: Rows[PlaceOfLandmark],
+    lane: int,
+    station: float,
+    length: float,
+    margins: tuple[float, float],
     clearance: float,
-) -> bool:  # fmt: skip
+) -> bool:
     """Returns whether a roadblock at a place leaves room before it, behind it, and around landmarks.
 
     Args:

@@ -43,7 +43,7 @@ CONSPICUOUS: Final[Mapping[W, Callable[[Mapping[W, float]], float]]] = MappingPr
         W.FOG_FALLOFF: lambda now: now[W.FOG_FALLOFF] / 1.5 * (now[W.FOG_DENSITY] > FOG_LIMIT),
         W.WETNESS: lambda now: now[W.WETNESS] / 45.0,
     }
-)  # fmt: skip
+)
 """How conspicuous each parameter is; it is noticed from 1 on, and its end below `OVER`. The sun is noticed when it is
 within 15 degrees of the horizon, or stands elsewhere than at noon."""
 

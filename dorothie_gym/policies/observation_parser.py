@@ -65,7 +65,7 @@ IN_VIEW = 45.0
 
 def landmarks_in_view(
     observation: ObservationMapping, landmarks: Sequence[SeenLandmark]
-) -> Sequence[SeenLandmark] | None:  # fmt: skip
+) -> Sequence[SeenLandmark] | None:
     """Returns those landmarks of an observation that the picture shows; None without perception by a camera."""
     flags = observation.get("landmarks_in_view")
     return None if flags is None else [mark for mark in landmarks if flags[mark.row]]
@@ -73,7 +73,7 @@ def landmarks_in_view(
 
 def nearest_landmark(
     observation: ObservationMapping, landmarks: Sequence[SeenLandmark], x: float, y: float
-) -> SeenLandmark | None:  # fmt: skip
+) -> SeenLandmark | None:
     """Returns the landmark of an observation that is closest to a point [m]; None if none is in view from there."""
     shown = landmarks_in_view(observation, landmarks)
     seen = landmarks if shown is None else shown

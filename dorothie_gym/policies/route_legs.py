@@ -108,9 +108,14 @@ def find_manoeuvre(legs: RecordArray[LegRecord], count: int, leg: int, station: 
 
 @compiled
 def needs_switch(
-    tables: RouteTables, lane: int, station: float, wanted: int, behind: float, blocked: RecordArray[PlaceRecord],
+    tables: RouteTables,
+    lane: int,
+    station: float,
+    wanted: int,
+    behind: float,
+    blocked: RecordArray[PlaceRecord],
     places: int,
-) -> bool:  # fmt: skip
+) -> bool:
     """Returns whether a lane change before a junction has to be commanded apart from the turn.
 
     Without it the car would reach another junction, run into what blocks its lane, or cross the junction in its

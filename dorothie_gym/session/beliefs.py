@@ -182,9 +182,7 @@ class MapNames:
         )
 
 
-def goals_on_map(
-    scenario: Scenario, names: Sequence[LandmarkName], recognised: Sequence[int] = ()
-) -> list[GoalAhead]:  # fmt: skip
+def goals_on_map(scenario: Scenario, names: Sequence[LandmarkName], recognised: Sequence[int] = ()) -> list[GoalAhead]:
     """Returns the places of goals on the Co-Wizard's map, in the order of the names.
 
     Args:
@@ -297,7 +295,7 @@ class BeliefTracker:
 
     def guess(
         self, name: LandmarkName, lane: int, station: float, *, pose: Array, covariance: Array, sight: float
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Updates the estimate of a landmark with a mark on the map.
 
         Args:

@@ -130,9 +130,7 @@ class DialogueChannel:
             return self._conversation.say(role, span, now, speech.onset, speech.pace)
         return self._say_aloud(self._spoken, role, span, speech, now)
 
-    def _say_aloud(
-        self, spoken: SpokenChannel, role: Role, span: Span, speech: Speech, now: float
-    ) -> str | None:  # fmt: skip
+    def _say_aloud(self, spoken: SpokenChannel, role: Role, span: Span, speech: Speech, now: float) -> str | None:
         if not self._conversation.has_room(role):
             return self._conversation.say(role, span, now)  # refuses
         samples = spoken.speak(role, span.text, speech.pace)

@@ -99,9 +99,14 @@ class LiveSession:
     """
 
     def __init__(
-        self, town: Town, network: TownNetwork, scenario: Scenario, config: EnvConfig, limits: SpaceLimits,
+        self,
+        town: Town,
+        network: TownNetwork,
+        scenario: Scenario,
+        config: EnvConfig,
+        limits: SpaceLimits,
         arrays: WorldArrays | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Begins a session, or takes over one of which only the world has been played.
 
         Args:
@@ -116,7 +121,7 @@ class LiveSession:
         world_seed, word_seed, ear_seed, style_seed, voice_seed = session_seeds(scenario)
         self.world = World(
             town, config.world, seed=world_seed, departure=scenario.departure, network=network, arrays=arrays
-        )  # fmt: skip
+        )
         self.task = TaskState(scenario.storyboard)
         self.beliefs = BeliefTracker(town, scenario)
         self._exceptions = ExceptionExecutor(self.world, self.task, limits.props)

@@ -146,9 +146,11 @@ class RoleArrays(CachedViews):
         """What the compiled code writes, in all rows."""
         observed = {role: buffer.arrays for role, buffer in self.observations.items()}
         return ViewArrays(
-            _named(ParticipantArrays, observed[Role.PARTICIPANT]), _named(CoWizardArrays, observed[Role.CO_WIZARD]),
-            _named(AdWizardArrays, observed[Role.AD_WIZARD]), _named(MaskArrays, self.masks[Role.CO_WIZARD].arrays),
-        )  # fmt: skip
+            _named(ParticipantArrays, observed[Role.PARTICIPANT]),
+            _named(CoWizardArrays, observed[Role.CO_WIZARD]),
+            _named(AdWizardArrays, observed[Role.AD_WIZARD]),
+            _named(MaskArrays, self.masks[Role.CO_WIZARD].arrays),
+        )
 
     def written_row(self, row: int) -> ViewArrays:
         """Returns what the compiled code writes in one row, as arrays with a single row."""

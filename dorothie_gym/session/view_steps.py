@@ -119,7 +119,7 @@ def write_objects(world: WorldArrays, objects: Array, believed: Array) -> None:
     cosine, sine = pm.cos(turn), pm.sin(turn)
     count = see(
         world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], car.x, car.y, world.clock[0].frame, 0
-    )  # fmt: skip
+    )
     for row in range(len(objects)):
         if row >= count:
             for column in range(objects.shape[1]):
@@ -137,9 +137,7 @@ def write_objects(world: WorldArrays, objects: Array, believed: Array) -> None:
 
 
 @compiled
-def write_lanes(
-    course: RecordArray[CoursePointRecord], count: int, here: int, table: NDArray[np.int64]
-) -> None:  # fmt: skip
+def write_lanes(course: RecordArray[CoursePointRecord], count: int, here: int, table: NDArray[np.int64]) -> None:
     """Writes the lanes of a path from a point on, in order and without repetition, as 1 + lane number; then zeros."""
     row, last = 0, -1
     for k in range(here, count):
@@ -265,8 +263,9 @@ def observe_as_ad_wizard(world: WorldArrays, views: AdWizardArrays, number: int)
 
 
 @compiled
-def write_masks(town: TownArrays, options: TurnOptions, world: WorldArrays, physical: NDArray[np.int8],
-                angle: NDArray[np.int8]) -> None:  # fmt: skip
+def write_masks(
+    town: TownArrays, options: TurnOptions, world: WorldArrays, physical: NDArray[np.int8], angle: NDArray[np.int8]
+) -> None:
     """Writes the masks of the Co-Wizard's physical actions and of their angles.
 
     Args:

@@ -130,13 +130,17 @@ class Actors(CachedViews):
         """Replaces the arrays by bigger ones if so many more actors do not fit."""
         state = self.arrays
         free = (
-            int((state.vehicles["kind"] == Kind.EMPTY).sum()), int((state.pedestrians["state"] == Walk.EMPTY).sum()),
+            int((state.vehicles["kind"] == Kind.EMPTY).sum()),
+            int((state.pedestrians["state"] == Walk.EMPTY).sum()),
             int((~state.props["present"]).sum()),
-        )  # fmt: skip
+        )
         missing = [max(n - there, 0) for n, there in zip((vehicles, pedestrians, props), free, strict=True)]
         if any(missing):
             more = [math.ceil(n / MORE) * MORE for n in missing]
             self.arrays = grown(
-                self.town_arrays, state, vehicles=len(state.vehicles) + more[0],
-                pedestrians=len(state.pedestrians) + more[1], props=len(state.props) + more[2],
-            )  # fmt: skip
+                self.town_arrays,
+                state,
+                vehicles=len(state.vehicles) + more[0],
+                pedestrians=len(state.pedestrians) + more[1],
+                props=len(state.props) + more[2],
+            )

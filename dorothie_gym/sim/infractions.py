@@ -43,15 +43,16 @@ class WorldEventKind(enum.StrEnum):
 
 
 INFRACTION_KINDS = (
-    WorldEventKind.COLLISION, WorldEventKind.RED_LIGHT, WorldEventKind.STOP_SIGN, WorldEventKind.OFF_ROAD,
+    WorldEventKind.COLLISION,
+    WorldEventKind.RED_LIGHT,
+    WorldEventKind.STOP_SIGN,
+    WorldEventKind.OFF_ROAD,
     WorldEventKind.WRONG_WAY,
-)  # fmt: skip
+)
 """Kinds of infractions, in the order of `codes.Breach`; their data names place and counterpart."""
 
 _RULES = frozenset(INFRACTION_KINDS) - {WorldEventKind.COLLISION}
-_SIGNALS = {
-    WorldEventKind.RED_LIGHT: ObjectClass.TRAFFIC_LIGHT, WorldEventKind.STOP_SIGN: ObjectClass.TRAFFIC_SIGN,
-}  # fmt: skip
+_SIGNALS = {WorldEventKind.RED_LIGHT: ObjectClass.TRAFFIC_LIGHT, WorldEventKind.STOP_SIGN: ObjectClass.TRAFFIC_SIGN}
 """Class of the signal that is disregarded."""
 
 
@@ -115,10 +116,14 @@ class WorldEventLog(CachedViews):
             self._add(WorldEventKind.HAZARD_END, frame, reason=kind.label, seconds=seconds)
         else:
             self._add(
-                WorldEventKind.COLLISION, frame,
+                WorldEventKind.COLLISION,
+                frame,
                 **_place(int(event.lane), float(event.station), float(event.x), float(event.y)),
-                key=int(event.key), other=kind.label, own_fault=bool(event.own), speed=round(float(event.value), 2),
-            )  # fmt: skip
+                key=int(event.key),
+                other=kind.label,
+                own_fault=bool(event.own),
+                speed=round(float(event.value), 2),
+            )
 
     def _note_breach(self, breach: BreachRecord) -> None:
         """Notes a breach of a rule, with the light or sign, or the nearest lane."""

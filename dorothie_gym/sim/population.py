@@ -68,7 +68,7 @@ def add_vehicle(
     number = int(empty[0])
     _place_vehicle(
         town, world, number, int(kind), int(lane), float(station), float(desired), np.zeros(POOL, dtype=np.int64)
-    )  # fmt: skip
+    )
     return number
 
 
@@ -157,7 +157,7 @@ def _put_pedestrian(
 
 def add_street_walker(
     network: TownNetwork, town: TownArrays, world: WorldArrays, lane: int, station: float
-) -> int | None:  # fmt: skip
+) -> int | None:
     """Adds a pedestrian beside a lane, or to the right of those beside it.
 
     Such pedestrians stay at their street, and cross it anywhere but near junctions.
@@ -227,7 +227,7 @@ def add_prop(
 
 def move_prop(
     network: TownNetwork, town: TownArrays, world: WorldArrays, number: int, lane: int, station: float
-) -> None:  # fmt: skip
+) -> None:
     """Moves a prop to another place, across a lane; it keeps its key.
 
     Args:
@@ -418,9 +418,14 @@ def _footways(network: TownNetwork) -> Array:
 @direct
 @compiled
 def _fill_footways(
-    town: TownArrays, world: WorldArrays, walks: NDArray[np.int64], shares: Array, room: int,
-    place: RecordArray[PedestrianRecord], pool: NDArray[np.int64],
-) -> None:  # fmt: skip
+    town: TownArrays,
+    world: WorldArrays,
+    walks: NDArray[np.int64],
+    shares: Array,
+    room: int,
+    place: RecordArray[PedestrianRecord],
+    pool: NDArray[np.int64],
+) -> None:
     """Adds pedestrians at free places.
 
     Args:

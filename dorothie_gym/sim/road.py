@@ -390,9 +390,12 @@ def enlarged(town: TownArrays, arrays: WorldArrays, vehicles: int) -> WorldArray
         vehicles: number of rows.
     """
     bigger = empty_world(
-        town, vehicles=vehicles, pedestrians=len(arrays.pedestrians), props=len(arrays.props),
+        town,
+        vehicles=vehicles,
+        pedestrians=len(arrays.pedestrians),
+        props=len(arrays.props),
         seed=int(arrays.clock[0].random),
-    )  # fmt: skip
+    )
     for name in ("vehicles", "pedestrians", "props", "lamps", "busy", "clock"):
         old = getattr(arrays, name)
         getattr(bigger, name)[: len(old)] = old

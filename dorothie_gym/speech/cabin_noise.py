@@ -93,9 +93,12 @@ def _coloured(shape: NDArray[np.float64], length: int, rng: np.random.Generator)
 def _shape(name: str, length: int, gain: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the amplitude of a source by frequency, of an A-weighted power of 1: corner and slope are set by hand."""
     corner, slope = {
-        "idle": (60.0, -9.0), "road": (150.0, -9.0), "air": (300.0, -6.0), "rain": (2000.0, -3.0),
+        "idle": (60.0, -9.0),
+        "road": (150.0, -9.0),
+        "air": (300.0, -6.0),
+        "rain": (2000.0, -3.0),
         "talk": (500.0, LONG_TERM_SLOPE),
-    }[name]  # fmt: skip
+    }[name]
     frequencies = np.fft.rfftfreq(length, 1.0 / SAMPLE_RATE)
     # a slope in dB per octave is a power of the frequency
     shape = np.maximum(frequencies / corner, 1.0) ** (slope / (20.0 * pm.log10(2.0)))
@@ -124,9 +127,11 @@ def _weighted(samples: NDArray[np.floating]) -> NDArray[np.float64]:
 def _a_weighting(length: int) -> NDArray[np.float64]:
     """Returns the gain of A-weighting by frequency, for transforms of a length."""
     squared = np.square(np.fft.rfftfreq(length, 1.0 / SAMPLE_RATE))
-    gain = 12194.0**2 * squared**2 / (
-        (squared + 20.6**2) * np.sqrt((squared + 107.7**2) * (squared + 737.9**2)) * (squared + 12194.0**2)
-    )  # fmt: skip
+    gain = (
+        12194.0**2
+        * squared**2
+        / ((squared + 20.6**2) * np.sqrt((squared + 107.7**2) * (squared + 737.9**2)) * (squared + 12194.0**2))
+    )
     return np.asarray(gain * 10.0 ** (2.0 / 20.0))
 
 

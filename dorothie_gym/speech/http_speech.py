@@ -70,9 +70,7 @@ class HttpSynthesizer:
         SpeechError: httpx is not installed.
     """
 
-    def __init__(
-        self, url: str, model: str, voices: Sequence[str], *, key: str = "", timeout: float = TIMEOUT
-    ) -> None:  # fmt: skip
+    def __init__(self, url: str, model: str, voices: Sequence[str], *, key: str = "", timeout: float = TIMEOUT) -> None:
         if not voices:
             raise ValueError("voices is empty; name at least one voice of the server")
         self._server, self._model = _Server(url, key, timeout), model
@@ -83,9 +81,13 @@ class HttpSynthesizer:
         """Returns a spoken text at 16 kHz; see `Synthesizer.synthesize`. Servers may ignore the seed."""
         check_request(text, rate)
         request = {
-            "model": self._model, "input": text, "voice": voice or self.voices[0], "speed": rate, "seed": seed,
+            "model": self._model,
+            "input": text,
+            "voice": voice or self.voices[0],
+            "speed": rate,
+            "seed": seed,
             "response_format": "wav",
-        }  # fmt: skip
+        }
         body = self._server.post("audio/speech", json=request)
         try:
             with wave.open(io.BytesIO(body)) as file:
@@ -119,9 +121,12 @@ class HttpRecognizer:
         """Returns the words of an audio; see `Recognizer.recognize`. Hints are sent as the prompt."""
         audio = resample(checked_samples(samples, sample_rate), sample_rate, SAMPLE_RATE)
         form = {
-            "model": self._model, "language": "en", "temperature": "0", "response_format": "verbose_json",
+            "model": self._model,
+            "language": "en",
+            "temperature": "0",
+            "response_format": "verbose_json",
             "timestamp_granularities[]": "word",
-        }  # fmt: skip
+        }
         if hints:
             form["prompt"] = ", ".join(hints)
         body = self._server.post(

@@ -41,7 +41,7 @@ def read_dictionary(path: Path) -> Mapping[str, tuple[str, ...]]:
 
 def pronunciations(
     words: Iterable[str], dictionary: Mapping[str, Sequence[str]], phonemes: Callable[[str], str]
-) -> dict[str, tuple[str, ...]]:  # fmt: skip
+) -> dict[str, tuple[str, ...]]:
     """Returns the pronunciations of words in ARPAbet: those of a dictionary, and that of the synthesiser.
 
     Both are needed: the dictionary has variants of common words ("to", "the"), and the synthesiser knows names.

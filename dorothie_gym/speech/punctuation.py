@@ -99,7 +99,7 @@ class PunctuationModel:
 
     def _extend(
         self, following: dict[tuple[str, str], _Path], ends: tuple[str, str], path: _Path, added: Sequence[str]
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Adds a path that goes on by some tokens, if it is the best one to its last two tokens."""
         (first, second), (score, tokens) = ends, path
         for token in added:

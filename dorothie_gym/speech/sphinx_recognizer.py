@@ -68,11 +68,14 @@ class SphinxRecognizer:
             dictionary.write_text(language.dictionary, encoding="utf-8")
             try:
                 self._decoder: Any = sphinx.Decoder(
-                    hmm=str(models / "en-us"), lm=str(arpa), dict=str(dictionary), loglevel="FATAL",
+                    hmm=str(models / "en-us"),
+                    lm=str(arpa),
+                    dict=str(dictionary),
+                    loglevel="FATAL",
                     # the second pass over the words of the first takes a third of the time and corrects nothing: on
                     # 120 spans in the noise of the car, the word error rate is 5.1 % with it and 4.8 % without
                     fwdflat=False,
-                )  # fmt: skip
+                )
             except RuntimeError as error:  # it does not tell which file
                 raise SpeechError(_NO_MODEL.format(path=models / "en-us")) from error
 

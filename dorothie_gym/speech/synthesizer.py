@@ -108,9 +108,14 @@ def chosen_voice(voice: str, voices: Sequence[str], synthesizer: str) -> str:
 
 
 def say(
-    synthesizer: Synthesizer, text: str, voice: Voice | None = None, *, rate: float = 1.0, seed: int = 0,
+    synthesizer: Synthesizer,
+    text: str,
+    voice: Voice | None = None,
+    *,
+    rate: float = 1.0,
+    seed: int = 0,
     sample_rate: int = 16000,
-) -> Samples:  # fmt: skip
+) -> Samples:
     """Returns a text as spoken by a voice with its rate and pitch, at a sample rate.
 
     Args:

@@ -138,7 +138,7 @@ def estimate(sentences: Iterable[tuple[Sequence[str], float]], words: Iterable[s
 
 def _smoothed(
     counts: Mapping[tuple[str, str], float], unigrams: Mapping[str, float]
-) -> tuple[dict[tuple[str, str], float], dict[str, float]]:  # fmt: skip
+) -> tuple[dict[tuple[str, str], float], dict[str, float]]:
     following: dict[str, dict[str, float]] = defaultdict(dict)
     for (first, word), count in counts.items():
         following[first][word] = count

@@ -43,9 +43,14 @@ class WhisperRecognizer:
         """Returns the words of an audio; see `Recognizer.recognize`. Its one hypothesis has the weight 1."""
         audio = resample(checked_samples(samples, sample_rate), sample_rate, SAMPLE_RATE)
         segments, _ = self._model.transcribe(
-            audio, language="en", beam_size=5, temperature=0.0, condition_on_previous_text=False, word_timestamps=True,
+            audio,
+            language="en",
+            beam_size=5,
+            temperature=0.0,
+            condition_on_previous_text=False,
+            word_timestamps=True,
             hotwords=" ".join(hints) or None,
-        )  # fmt: skip
+        )
         found = [word for segment in segments for word in segment.words or ()]
         words = tuple(
             RecognizedWord(text=text, start=float(word.start), end=float(word.end), confidence=float(word.probability))

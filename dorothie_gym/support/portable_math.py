@@ -36,7 +36,7 @@ __all__ = [
     "power",
     "sin",
     "tan",
-]  # fmt: skip
+]
 
 _PI: Final = 3.141592653589793
 _TWO_PI: Final = 2.0 * _PI

@@ -186,7 +186,7 @@ _FIRST_PERSON = tuple(
         (r"\byou\b(?=$|[.,;:!?])", "me"),
         (r"\byou\b", "I"),
     )
-)  # fmt: skip
+)
 _OF_SPEAKER = re.compile(r"\b(?:I|I'm|I've|I'll|me|my|mine|we|we're|we've|us|our|ours)\b", re.IGNORECASE)
 
 _LEADS = re.compile(

@@ -145,12 +145,15 @@ def _cameras(config: EnvConfig) -> list[CameraConfig]:
         cameras.append(PERCEPTION_CAMERA)
     return [
         dataclasses.replace(
-            camera, width=samples * camera.width, height=samples * camera.height, antialiasing=False,
+            camera,
+            width=samples * camera.width,
+            height=samples * camera.height,
+            antialiasing=False,
             outputs=(CameraOutput.INSTANCE,),
         )
         for camera in cameras
         for samples in {1, camera.samples}
-    ]  # fmt: skip
+    ]
 
 
 def _check_pictures(where: str, k: int, observations: ByAgent, others: ByAgent) -> None:

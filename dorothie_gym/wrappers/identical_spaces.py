@@ -48,11 +48,9 @@ class IdenticalSpaces(ParallelEnv[str, FlatVector, Flat]):
         self.render_mode = env.render_mode
         self.possible_agents = list(env.possible_agents)
         self._actions = {
-            agent: FlatActions(
-                env.action_space(agent), (fields or {}).get(agent), noop(Role(agent), env.limits)
-            )
+            agent: FlatActions(env.action_space(agent), (fields or {}).get(agent), noop(Role(agent), env.limits))
             for agent in self.possible_agents
-        }  # fmt: skip
+        }
         self._observations = {agent: FlatObservations(env.observation_space(agent)) for agent in self.possible_agents}
         entries = max(len(flat.nvec) for flat in self._actions.values())
         self.nvec: Flat = np.ones(entries, dtype=np.int64)

@@ -44,18 +44,21 @@ def names(corpus: Corpus) -> str:
 
 def test_sessions_are_found_in_their_folds(corpus: Corpus) -> None:
     assert len(corpus) == 6 and names(corpus) == "abcdef"
-    assert corpus.folds == {
-        Fold.TRAIN: 2, Fold.VAL_SEEN: 1, Fold.VAL_UNSEEN: 1, Fold.TEST_SEEN: 1, Fold.TEST_UNSEEN: 1,
-    }  # fmt: skip
+    assert corpus.folds == {Fold.TRAIN: 2, Fold.VAL_SEEN: 1, Fold.VAL_UNSEEN: 1, Fold.TEST_SEEN: 1, Fold.TEST_UNSEEN: 1}
     assert sorted(session.name for session in corpus) == list("abcdef")
 
 
 @pytest.mark.parametrize(
     ("fold", "found"),
     [
-        (Fold.TRAIN, "ab"), ("val", "cd"), ("seen", "ce"), ("unseen", "df"), ("test/unseen", "f"), (Fold.VAL_SEEN, "c"),
+        (Fold.TRAIN, "ab"),
+        ("val", "cd"),
+        ("seen", "ce"),
+        ("unseen", "df"),
+        ("test/unseen", "f"),
+        (Fold.VAL_SEEN, "c"),
     ],
-)  # fmt: skip
+)
 def test_corpus_is_filtered_by_fold(corpus: Corpus, fold: str, found: str) -> None:
     assert names(corpus.filter(fold=fold)) == found
 

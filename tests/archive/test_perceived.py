@@ -51,9 +51,13 @@ def now(recorded: Session) -> tuple[list[int], np.ndarray]:  # type: ignore[type
 
 def test_objects_are_relative_to_the_car() -> None:
     """The car faces south and y grows southwards, so objects in the east are to its left."""
-    scene = Surroundings(actors=one_look(np.concatenate([
-        actor(ActorKind.PEDESTRIAN, 40.0, 10.0, 0.0), actor(ActorKind.VEHICLE, 10.0, 22.0, math.pi / 2),
-    ])))  # fmt: skip
+    scene = Surroundings(
+        actors=one_look(
+            np.concatenate(
+                [actor(ActorKind.PEDESTRIAN, 40.0, 10.0, 0.0), actor(ActorKind.VEHICLE, 10.0, 22.0, math.pi / 2)]
+            )
+        )
+    )
     kinds, values = now(replace(standing(10.0, 10.0, math.pi / 2), scene=scene))
     assert kinds == [ObjectKind.VEHICLE, ObjectKind.PEDESTRIAN], "the nearest first"
     np.testing.assert_allclose(values[0], [12.0, 0.0, 12.0, 0.0, 0.0, 3.0, 4.5, 1.8], atol=1e-5)

@@ -32,10 +32,16 @@ def no_town():
     """A town without lanes and streets."""
     graph = town_graph()
     return replace(
-        graph, lanes=graph.lanes[:0], road=graph.road[:0], junction=graph.junction[:0], street=graph.street[:0],
-        edges=graph.edges[:, :0], edge_types=graph.edge_types[:0], members=graph.members[:0],
+        graph,
+        lanes=graph.lanes[:0],
+        road=graph.road[:0],
+        junction=graph.junction[:0],
+        street=graph.street[:0],
+        edges=graph.edges[:, :0],
+        edge_types=graph.edge_types[:0],
+        members=graph.members[:0],
         member_start=graph.member_start[:1],
-    )  # fmt: skip
+    )
 
 
 def on_no_lane(given):
@@ -50,9 +56,14 @@ def inputs(points=6, spec=None, seed=0, towns=1, room=0):
     )
     generator = np.random.default_rng(seed)
     lengths = {
-        "move": spec.moves, "utterance": spec.utterances, "action": spec.actions, "window": spec.window,
-        "objects": spec.objects, "landmark": spec.landmarks, "street": spec.streets,
-    }  # fmt: skip
+        "move": spec.moves,
+        "utterance": spec.utterances,
+        "action": spec.actions,
+        "window": spec.window,
+        "objects": spec.objects,
+        "landmark": spec.landmarks,
+        "street": spec.streets,
+    }
     masks = {
         name: np.arange(length + room) < generator.integers(1, length + 1, points)[:, None]
         for name, length in lengths.items()

@@ -103,20 +103,22 @@ Damage = Callable[[Parts], bytes]
 WRONG_FILES: Final[Mapping[str, tuple[Damage, str]]] = MappingProxyType(
     {
         "header longer than any file": (
-            lambda parts: struct.pack("<Q", 2**60) + parts.file()[8:], f"its header takes {2**60} bytes, and the file"
+            lambda parts: struct.pack("<Q", 2**60) + parts.file()[8:],
+            f"its header takes {2**60} bytes, and the file",
         ),
         "nothing but an absurd length": (lambda parts: struct.pack("<Q", 2**60), f"its header takes {2**60} bytes"),
         "header without an end": (lambda parts: parts.file()[:40], "and the file has 32 for it"),
         "empty": (lambda parts: b"", "its header takes 0 bytes, and the file has 0 for it"),
         "header that is no JSON": (
-            lambda parts: struct.pack("<Q", 4) + b"nope" + parts.file()[8:], "header, column 1: not JSON"
+            lambda parts: struct.pack("<Q", 4) + b"nope" + parts.file()[8:],
+            "header, column 1: not JSON",
         ),
         "header that is a list": (lambda parts: parts.file([1, 2]), "its header is no JSON object"),
         "header that is no text": (lambda parts: struct.pack("<Q", 2) + b"\xff\xfe", "its header is no text"),
         "cut numbers": (lambda parts: parts.file()[:-2], "is it cut off?"),
         "more numbers": (lambda parts: parts.file() + b"more", "bytes behind its header; expected"),
     }
-)  # fmt: skip
+)
 """Damage of a whole file, and what the message says."""
 
 WRONG_TENSORS: Final[Mapping[str, tuple[Damage, str]]] = MappingProxyType(
@@ -145,7 +147,7 @@ WRONG_TENSORS: Final[Mapping[str, tuple[Damage, str]]] = MappingProxyType(
         "missing": (_missing, "is missing; expected floating-point numbers ({shape})"),
         "no finite number": (_not_finite, "has a weight that is no finite number"),
     }
-)  # fmt: skip
+)
 """Damage of a tensor, and what the message says."""
 
 

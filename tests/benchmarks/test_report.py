@@ -35,9 +35,14 @@ VECTOR = {
     "vector_steps_per_second": 31000.0, "sync_steps_per_second": 1300.0, "async_steps_per_second": 800.0,
 }  # fmt: skip
 IMPORT = {
-    "town": "brookside", "seconds": {"package": 0.07, "first_environment": 1.3, "first_step": 1.6},
-    "highway_env_seconds": 0.6, "ratio": 2.167, "spread": 0.02, "package_spread": 0.1, "highway_env_spread": 0.1,
-}  # fmt: skip
+    "town": "brookside",
+    "seconds": {"package": 0.07, "first_environment": 1.3, "first_step": 1.6},
+    "highway_env_seconds": 0.6,
+    "ratio": 2.167,
+    "spread": 0.02,
+    "package_spread": 0.1,
+    "highway_env_spread": 0.1,
+}
 
 
 def reported(report: Any, figures: dict[str, Any], **changes: Any) -> Report:
@@ -63,9 +68,13 @@ def test_environment_report_is_in_simulated_time() -> None:
 
 def test_environment_report_lists_missing_measurements() -> None:
     report = reported(
-        env_report, ENV, sumo_substeps_per_second=None, sumo_spread=None, sumo_missing="no SUMO",
+        env_report,
+        ENV,
+        sumo_substeps_per_second=None,
+        sumo_spread=None,
+        sumo_missing="no SUMO",
         two_processes_scaling=None,
-    )  # fmt: skip
+    )
     assert [row.value for row in report.rows] == [35.0, 2200.0]
     assert report.notes[-2:] == ("two processes were not measured on a single core", "no SUMO")
 

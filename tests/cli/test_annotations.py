@@ -151,7 +151,7 @@ def test_annotate_prints_a_link_for_each_person_and_ends_at_a_signal(tmp_path: P
             assert page.startswith("http://127.0.0.1:")
             request = urllib.request.Request(
                 page.replace("/annotate", "/api/seat"), headers={"Authorization": f"Bearer {token}"}
-            )  # fmt: skip
+            )
             with urllib.request.urlopen(request, timeout=30) as answer:
                 seat = json.load(answer)
             assert seat["name"] == "anna" and seat["sessions"] == [["s", True], ["silent", False], ["t", True]]
@@ -183,9 +183,11 @@ def test_links_live_on_after_a_kill_until_new_ones_are_asked_for(tmp_path: Path)
     tokens: dict[str, str] = {}
     people = ("--annotator", "anna", "--adjudicator", "carol")
     for options, new in (
-        (people, ["anna", "carol"]), ((*people, "--annotator", "ben"), ["ben"]), (people, []),
+        (people, ["anna", "carol"]),
+        ((*people, "--annotator", "ben"), ["ben"]),
+        (people, []),
         ((*people, "--new-links"), ["anna", "carol"]),
-    ):  # fmt: skip
+    ):
         old = dict(tokens)
         with _serve(tmp_path, *options) as server:
             try:

@@ -83,9 +83,13 @@ def test_report_is_printed_in_words() -> None:
     release(Path("log_1"))
     told = converted("log_1", "out", "--to", "native").stdout
     for part in (
-        "release, ", "300 frames -> out", "kept, not understood: ad_wizardlog.csv: type 'camera_shake'",
-        "turn angles: positive left, agreement 1.0, turns 1", "lane switch values: 2 1, 3 1", "1 of 1 sessions written",
-    ):  # fmt: skip
+        "release, ",
+        "300 frames -> out",
+        "kept, not understood: ad_wizardlog.csv: type 'camera_shake'",
+        "turn angles: positive left, agreement 1.0, turns 1",
+        "lane switch values: 2 1, 3 1",
+        "1 of 1 sessions written",
+    ):
         assert part in told
 
 

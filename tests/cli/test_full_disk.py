@@ -45,13 +45,11 @@ SHORT = ("--episodes", "1", "--set", "max_seconds=10", "--set", "traffic=none", 
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "train": ("train", "toto", "--corpus", "CORPUS", "--seeds", "1", "--encoder", "hashing", "--workers", "1"),
-    "train-rl": (
-        "train-rl", "a2c", "--steps", "512", "--environments", "2", "--evaluate-every", "256", *SHORT
-    ),
+    "train-rl": ("train-rl", "a2c", "--steps", "512", "--environments", "2", "--evaluate-every", "256", *SHORT),
     "two trainings": ("train", "toto", "--corpus", "CORPUS", "--seeds", "2", "--encoder", "hashing", "--workers", "2"),
     "table": ("table", "--corpus", "CORPUS", "--models", "tfidf", "--seeds", "1"),
     "dqn": ("train-rl", "dqn", "--steps", "512", "--environments", "2", "--evaluate-every", "256", *SHORT),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")

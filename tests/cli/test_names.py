@@ -45,8 +45,12 @@ def test_envs_lists_every_registered_environment() -> None:
 def test_package_is_a_program() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "dorothie_gym", "--version"],
-        capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": str(ROOT)}, timeout=60,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        timeout=60,
+    )
     assert re.fullmatch(r"dorothie-gym \S+\n", done.stdout)
 
 

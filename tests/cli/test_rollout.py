@@ -75,9 +75,12 @@ def test_ctrl_c_names_the_results_and_the_command_that_resumes(tmp_path: Path) -
     arguments = [*SHORT[:4], "--max-seconds", "40", "--workers", "1", "--sessions", "40", "--out", str(out)]
     process = subprocess.Popen(
         [sys.executable, "-m", "dorothie_gym.cli", "rollout", *arguments],
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}, text=True, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        text=True,
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
     while process.poll() is None and not list(out.glob("sessions/*/session.json")):
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)

@@ -56,9 +56,14 @@ def interrupted(
     words = [str(corpus) if word == "CORPUS" else word for word in COMMANDS[name]]
     process = subprocess.Popen(
         [sys.executable, "-m", "dorothie_gym", *words],
-        cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True, start_new_session=True,
-        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        text=True,
+        start_new_session=True,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
     time.sleep(seconds)
     (os.killpg if whole_group else os.kill)(process.pid, sent)
     _, errors = process.communicate(timeout=60)

@@ -28,8 +28,10 @@ def sound_of(video: Path) -> np.ndarray:
     ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="needs the extra 'video'").get_ffmpeg_exe()
     raw = subprocess.run(
         [ffmpeg, "-v", "error", "-i", str(video), "-f", "s16le", "-ac", "1", "-ar", "16000", "-"],
-        capture_output=True, check=True, env=dict(os.environ),
-    ).stdout  # fmt: skip
+        capture_output=True,
+        check=True,
+        env=dict(os.environ),
+    ).stdout
     return np.frombuffer(raw, "<i2") / 32768
 
 

@@ -107,8 +107,11 @@ def test_warm_up_without_a_cache_is_refused() -> None:
     # the tests' own process has chosen a folder for numba
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA")}
     result = subprocess.run(
-        [sys.executable, "-m", "dorothie_gym", "warm-up"], capture_output=True, text=True, check=False,
+        [sys.executable, "-m", "dorothie_gym", "warm-up"],
+        capture_output=True,
+        text=True,
+        check=False,
         env={**inherited, "DOROTHIE_GYM_CACHE": "", "PYTHONPATH": str(Path(__file__).parents[2])},
-    )  # fmt: skip
+    )
     assert result.returncode == 2 and result.stdout == "" and result.stderr.count("\n") == 1
     assert "DOROTHIE_GYM_CACHE is empty" in result.stderr

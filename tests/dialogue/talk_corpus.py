@@ -53,10 +53,14 @@ CAR = {
     M.REPLY_W: 3,
 }  # fmt: skip
 NEXT = {
-    M.REPLY_Y: [M.INSTRUCT], M.REPLY_N: [M.INSTRUCT, M.EXPLAIN], M.EXPLAIN: [M.INSTRUCT, M.QUERY_YN, M.EXPLAIN],
-    M.ACKNOWLEDGE: [M.EXPLAIN, M.QUERY_W, M.QUERY_YN], M.CONFIRM: [M.EXPLAIN], M.INSTRUCT: [M.INSTRUCT, M.EXPLAIN],
+    M.REPLY_Y: [M.INSTRUCT],
+    M.REPLY_N: [M.INSTRUCT, M.EXPLAIN],
+    M.EXPLAIN: [M.INSTRUCT, M.QUERY_YN, M.EXPLAIN],
+    M.ACKNOWLEDGE: [M.EXPLAIN, M.QUERY_W, M.QUERY_YN],
+    M.CONFIRM: [M.EXPLAIN],
+    M.INSTRUCT: [M.INSTRUCT, M.EXPLAIN],
     M.REPLY_W: [M.EXPLAIN],
-}  # fmt: skip
+}
 ACTIONS = {
     ActionValue.J_TURN: 40, ActionValue.LANE_FOLLOW: 18, ActionValue.STOP: 14, ActionValue.LANE_SWITCH: 7,
     ActionValue.U_TURN: 6, ActionValue.SPEED_CHANGE: 7, ActionValue.LIGHT_CHANGE: 3, ActionValue.START: 5,
@@ -110,9 +114,11 @@ class Sampler:
                 return DialogueAct.of(move), self.one_of(errands())
             heard = ["why", "seen", None] if human else ["ordered", "ordered", "told", "answered", "done", "chat"]
             topic = {
-                M.ACKNOWLEDGE: [*heard, "sorry", "align"], M.CONFIRM: ["taken"], M.EXPLAIN: [None, *TOPICS],
+                M.ACKNOWLEDGE: [*heard, "sorry", "align"],
+                M.CONFIRM: ["taken"],
+                M.EXPLAIN: [None, *TOPICS],
                 M.IRRELEVANT: [None, "reply"],
-            }.get(move, [None])  # fmt: skip
+            }.get(move, [None])
             return DialogueAct.of(move), Wording(topic=self.one_of(topic) if rng.random() < 0.5 else None)
         drawn = rng.random()
         action = self.weighted(ACTIONS)

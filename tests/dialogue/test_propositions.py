@@ -70,15 +70,17 @@ def test_arguments_give_the_slots_of_an_act():
     effect = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
     cause = Proposition.of(Predicate.RED, object=ObjectClass.TRAFFIC_LIGHT)
     assert Proposition.of(Predicate.BECAUSE, effect=effect, cause=cause).slots() == {
-        ActionValue.STOP, ObjectClass.TRAFFIC_LIGHT,
-    }  # fmt: skip
+        ActionValue.STOP,
+        ObjectClass.TRAFFIC_LIGHT,
+    }
 
 
 def test_open_questions_ask_for_the_slot_that_is_left_open():
     assert Proposition.of(Predicate.GOAL, place=ASKED).slots() == {LandmarkName.QUERIED}
     assert Proposition.of(Predicate.TASK, place=LandmarkName.KFC, status=ASKED).slots() == {
-        LandmarkName.KFC, GoalStatus.QUERIED,
-    }  # fmt: skip
+        LandmarkName.KFC,
+        GoalStatus.QUERIED,
+    }
     assert Proposition.of(Predicate.ARRIVES_IN, seconds=ASKED).slots() == frozenset()
 
 

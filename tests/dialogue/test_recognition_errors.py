@@ -32,10 +32,15 @@ def test_shipped_profile_is_a_measurement_of_thousands_of_words() -> None:
 @pytest.mark.parametrize(
     ("word", "kind"),
     [
-        ("the", WordClass.COMMON), ("left,", WordClass.COMMON), ("Baits", WordClass.NAME), ("baits", WordClass.NAME),
-        ("KFC?", WordClass.NAME), ("turquoise", WordClass.RARE), ("f", WordClass.COMMON),
+        ("the", WordClass.COMMON),
+        ("left,", WordClass.COMMON),
+        ("Baits", WordClass.NAME),
+        ("baits", WordClass.NAME),
+        ("KFC?", WordClass.NAME),
+        ("turquoise", WordClass.RARE),
+        ("f", WordClass.COMMON),
     ],
-)  # fmt: skip
+)
 def test_words_have_classes(word: str, kind: WordClass) -> None:
     assert word_class(word) is kind
 

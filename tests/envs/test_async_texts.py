@@ -58,8 +58,12 @@ def with_texts() -> list[str]:
 
 def test_five_of_the_ids_have_texts() -> None:
     assert {name.split("/")[1] for name in with_texts()} >= {
-        "CoWizard-v0", "Participant-v0", "UfN-v0", "RfN-v0", "NfD-v0",
-    }  # fmt: skip
+        "CoWizard-v0",
+        "Participant-v0",
+        "UfN-v0",
+        "RfN-v0",
+        "NfD-v0",
+    }
 
 
 @pytest.mark.parametrize("name", with_texts())

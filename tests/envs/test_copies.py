@@ -117,12 +117,14 @@ ENVIRONMENTS: dict[str, Callable[[], Any]] = {
         "Town-v0",
         config={
             "observation": {
-                "type": "GrayscaleObservation", "observation_shape": (32, 32), "stack_size": 2,
+                "type": "GrayscaleObservation",
+                "observation_shape": (32, 32),
+                "stack_size": 2,
                 "weights": [0.3, 0.6, 0.1],
             },
         },
     ),
-}  # fmt: skip
+}
 
 
 COPIES: dict[str, Callable[[Any], Any]] = {

@@ -321,11 +321,15 @@ for _ in range(4):
 def test_sessions_are_the_same_bytes_compiled_and_in_plain_python() -> None:
     found = [
         subprocess.run(
-            [sys.executable, "-c", IN_PLAIN_PYTHON], env={**os.environ, "NUMBA_DISABLE_JIT": disabled},
-            cwd=Path(__file__).resolve().parents[2], capture_output=True, text=True, check=True,
+            [sys.executable, "-c", IN_PLAIN_PYTHON],
+            env={**os.environ, "NUMBA_DISABLE_JIT": disabled},
+            cwd=Path(__file__).resolve().parents[2],
+            capture_output=True,
+            text=True,
+            check=True,
         ).stdout
         for disabled in ("0", "1")
-    ]  # fmt: skip
+    ]
     assert found[0] == found[1] != ""
 
 

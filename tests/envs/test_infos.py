@@ -205,9 +205,10 @@ def test_refusals_have_a_reason_by_kind_of_action() -> None:
     env = gym.make("dorothie_gym/CoWizard-v0")
     _, info = env.reset(seed=1)
     assert info["refused"] == {"speech": False, "mental": False, "physical": False} and info["refusal_reason"] == ""
-    assert info["reward_terms"] == dict.fromkeys(
-        ("subgoal", "success", "collision", "time", "refusal", "talk"), 0.0
-    ) and info["is_success"] is False  # fmt: skip
+    assert (
+        info["reward_terms"] == dict.fromkeys(("subgoal", "success", "collision", "time", "refusal", "talk"), 0.0)
+        and info["is_success"] is False
+    )
     action = {**env.get_wrapper_attr("noop_action"), "physical": 6}
     *_, info = env.step(action)
     assert info["refused"] == {"speech": False, "mental": False, "physical": True}

@@ -239,11 +239,15 @@ def test_values_lie_in_the_ranges_of_their_fields() -> None:
 @pytest.mark.parametrize(
     ("settings", "named"),
     [
-        ({"guidance": "signs"}, "guidance"), ({"traffic": "thick"}, "traffic"), ({"exceptions": 5.0}, "exceptions"),
-        ({"patience": 1.0}, "patience"), ({"max_seconds": 0.0}, "max_seconds"), ({"reward": "nice"}, "reward"),
+        ({"guidance": "signs"}, "guidance"),
+        ({"traffic": "thick"}, "traffic"),
+        ({"exceptions": 5.0}, "exceptions"),
+        ({"patience": 1.0}, "patience"),
+        ({"max_seconds": 0.0}, "max_seconds"),
+        ({"reward": "nice"}, "reward"),
         ({"render_mode": "ascii"}, "render_mode"),
     ],
-)  # fmt: skip
+)
 def test_error_names_invalid_setting(settings: dict[str, Any], named: str) -> None:
     with pytest.raises(ValueError, match=named):
         NavigationEnv(**settings)

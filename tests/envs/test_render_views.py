@@ -175,8 +175,10 @@ def test_every_environment_with_a_car_shows_its_windscreen(name: str) -> None:
         frames[view] = picture
         env.close()
     assert {view: frame.shape for view, frame in frames.items()} == {
-        "map": (800, 1280, 3), "camera": (720, 1280, 3), "both": (720, 1280, 3),
-    }  # fmt: skip
+        "map": (800, 1280, 3),
+        "camera": (720, 1280, 3),
+        "both": (720, 1280, 3),
+    }
     assert all(frame.dtype == np.uint8 for frame in frames.values())
     sky = frames["both"][: TOP // 6, :LEFT].astype(int)
     assert (sky[..., 2] >= sky[..., 0]).mean() > 0.5, "the sky is above"
@@ -222,10 +224,13 @@ def test_subtitles_show_what_is_said_in_the_colour_of_its_speaker() -> None:
     assert inks() == {palette.SUBTITLE_GROUND}
     words = "Please go to the red house over there."
     speech = ParticipantAction(speech=Speech(act=DialogueAct(move=DialogueMove.INSTRUCT), text=words))
-    env.step({
-        "participant": speech.encode(env.limits), "co_wizard": noop(Role.CO_WIZARD, env.limits),
-        "ad_wizard": noop(Role.AD_WIZARD, env.limits),
-    })  # fmt: skip
+    env.step(
+        {
+            "participant": speech.encode(env.limits),
+            "co_wizard": noop(Role.CO_WIZARD, env.limits),
+            "ad_wizard": noop(Role.AD_WIZARD, env.limits),
+        }
+    )
     assert palette.SUBTITLE_PARTICIPANT in inks() and palette.SUBTITLE_CO_WIZARD not in inks()
     for _ in range(14):  # until it was said, and some time ago
         env.step({agent: noop(Role(agent), env.limits) for agent in env.agents})

@@ -39,9 +39,14 @@ def run(code: str, folder: Path) -> str:
     file = folder / "example.py"
     file.write_text(code, encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, str(file)], capture_output=True, text=True, timeout=280, check=False, cwd=folder,
+        [sys.executable, str(file)],
+        capture_output=True,
+        text=True,
+        timeout=280,
+        check=False,
+        cwd=folder,
         env={**os.environ, MINARI_FOLDER: str(folder / "datasets")},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
 

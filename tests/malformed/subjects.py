@@ -168,7 +168,7 @@ def _opendrive_town(folder: Path) -> None:
         + xodr.geometry(
             '<paramPoly3 aU="0" bU="20" cU="0" dU="0" aV="0" bV="0" cV="1" dV="0"/>', 20.0, s=50.0, x=142.0, y=35.0
         )
-    )  # fmt: skip
+    )
     text = xodr.opendrive(
         xodr.road(1, plan=plan, sections=sections, link=onward, profile=profile, more=signals + crossing),
         xodr.road(2, length=70.0, plan=second, offset='<laneOffset s="0" a="0.1" b="0" c="0" d="0"/>'),

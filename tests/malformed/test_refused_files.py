@@ -93,7 +93,7 @@ def test_pipes_and_devices_are_refused_in_place_of_every_file(no_file: Callable[
         (("evaluate",), "text.parquet", "row"),
         (("evaluate",), "empty.parquet", ""),
     ],
-)  # fmt: skip
+)
 def test_large_deep_and_recursive_files_are_refused(
     command: tuple[str, ...], name: str, content: str, tmp_path: Path
 ) -> None:

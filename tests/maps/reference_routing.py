@@ -33,7 +33,7 @@ from dorothie_gym.maps.routing_graph import (
     U_TURN_LENGTH,
     U_TURN_REST,
     USUAL_SPEED,
-)  # fmt: skip
+)
 
 IntArray = NDArray[np.int64]
 

@@ -30,8 +30,13 @@ def test_sensors() -> None:
 
 def test_names_are_those_of_the_original_tool() -> None:
     assert {kind.value for kind in PropKind} == {
-        "tree", "constructioncone", "dumpster", "streetbarrier", "trafficcone", "trafficsign",
-    }  # fmt: skip
+        "tree",
+        "constructioncone",
+        "dumpster",
+        "streetbarrier",
+        "trafficcone",
+        "trafficsign",
+    }
 
 
 @pytest.mark.parametrize("kind", PropKind)

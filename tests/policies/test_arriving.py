@@ -32,10 +32,12 @@ class Guide(Human):
         assert self.state.task.goal is not None
         where = self.env.town.lanes[lane]
         self.observation |= {
-            "time": np.array([50.0]), "speed": np.array([speed]),
-            "lane": np.int64(lane), "station": np.array([station]),
+            "time": np.array([50.0]),
+            "speed": np.array([speed]),
+            "lane": np.int64(lane),
+            "station": np.array([station]),
             "pose": np.array([*where.position(station), where.heading_at(station)]),
-        }  # fmt: skip
+        }
         progress = RouteProgress.plan(self.env.town, (lane, station), self.state.task.goal.place)
         self.state.route = self.state.route.with_progress(progress)
         self.state.motion = replace(self.state.motion, standing_since=None if speed else 40.0)
@@ -121,9 +123,11 @@ def test_car_that_does_not_move_is_asked_why_instead_of_being_told_a_third_time(
     further, why, start = (
         DialogueAct.of(move, action)
         for move, action in (
-            (M.INSTRUCT, ActionValue.LANE_FOLLOW), (M.QUERY_W, ActionValue.STOP), (M.INSTRUCT, ActionValue.START),
+            (M.INSTRUCT, ActionValue.LANE_FOLLOW),
+            (M.QUERY_W, ActionValue.STOP),
+            (M.INSTRUCT, ActionValue.START),
         )
-    )  # fmt: skip
+    )
     assert told == [further, further, why, further, start, why]
 
 

@@ -72,10 +72,12 @@ def test_standstill_at_red_light_is_not_asked_about(lit):
         if lit and env.town.light(lane.id, time) is not LightColour.RED:
             break
         observation |= {
-            "time": np.array([time]), "speed": np.zeros(1), "lane": np.int64(lane.id),
+            "time": np.array([time]),
+            "speed": np.zeros(1),
+            "lane": np.int64(lane.id),
             "station": np.array([lane.length - 4.0]),
             "pose": np.array([*lane.position(lane.length - 4.0), lane.heading_at(lane.length - 4.0)]),
-        }  # fmt: skip
+        }
         action, state = policy.step(observation, state)
         speech = ParticipantAction.decode(action, env.limits).speech
         asked += speech is not None and ActionValue.STOP in speech.act.values(Slot.ACTION)

@@ -52,9 +52,14 @@ def test_given_traits_hold_and_leave_the_others_alone():
 
 @pytest.mark.parametrize(
     ("given", "message"),
-    [("tallness=1", "no trait 'tallness'"), ("patience=2", "0..1"), ("patience=0.9..0.1", "0..1"),
-     ("directions=east", "turns, landmarks, vague"), ("patience", "0..1")],
-)  # fmt: skip
+    [
+        ("tallness=1", "no trait 'tallness'"),
+        ("patience=2", "0..1"),
+        ("patience=0.9..0.1", "0..1"),
+        ("directions=east", "turns, landmarks, vague"),
+        ("patience", "0..1"),
+    ],
+)
 def test_wrong_traits_are_refused(given, message):
     with pytest.raises(ValueError, match=message):
         parse_traits(given)

@@ -35,9 +35,12 @@ LIMIT = 10_000_000
 """Largest size of all shipped models [bytes]."""
 
 CO_WIZARDS = (
-    "pretrained:co-wizard", "pretrained:maskable-ppo", "pretrained:ppo", "pretrained:reader",
+    "pretrained:co-wizard",
+    "pretrained:maskable-ppo",
+    "pretrained:ppo",
+    "pretrained:reader",
     "pretrained:toto",
-)  # fmt: skip
+)
 NAMES = tuple(sorted((*CO_WIZARDS, "pretrained:participant")))
 
 
@@ -48,9 +51,12 @@ def call(*arguments: str) -> Result:
 def play(name: str, folder: Path, sessions: int, seconds: float) -> RolloutResult:
     role = Role.PARTICIPANT if "participant" in name else Role.CO_WIZARD
     settings = RolloutSettings(
-        cast={**ALL_SCRIPTED, role: find_player(name, role)}, towns=("brookside",),
-        sessions=sessions, seed=7, config=EnvConfig(max_seconds=seconds),
-    )  # fmt: skip
+        cast={**ALL_SCRIPTED, role: find_player(name, role)},
+        towns=("brookside",),
+        sessions=sessions,
+        seed=7,
+        config=EnvConfig(max_seconds=seconds),
+    )
     return roll_out(settings, folder)
 
 

@@ -161,10 +161,14 @@ def test_car_rests_at_red_light_until_green(colour):
     talk.state.route = talk.state.route.with_progress(None)
     talk.state.intentions = talk.state.intentions.directed(None)
     at_light = {
-        "motion": np.int64(Motion.HAZARD), "hazard": np.int64(ObjectClass.TRAFFIC_LIGHT.value), "speed": np.zeros(1),
-        "time": np.array([float(time)]), "lane": np.int64(lane.id), "station": np.array([lane.length - 4.0]),
+        "motion": np.int64(Motion.HAZARD),
+        "hazard": np.int64(ObjectClass.TRAFFIC_LIGHT.value),
+        "speed": np.zeros(1),
+        "time": np.array([float(time)]),
+        "lane": np.int64(lane.id),
+        "station": np.array([lane.length - 4.0]),
         "exits": np.zeros_like(talk.observations["co_wizard"]["exits"]),
-    }  # fmt: skip
+    }
     view = view_of(talk, **at_light)
     rest(talk.state, view, np.random.default_rng(0))
     assert talk.state.commands.rest_until == time + talk.state.config.red_light_time

@@ -40,9 +40,11 @@ SESSIONS: dict[str, dict[str, Any]] = {
     "word-errors": {"seconds": 60.0, "word_error_rate": 0.2},
     "speech": {"seconds": 30.0, "channel": ChannelKind.SPEECH},
     "camera": {
-        "seconds": 15.0, "perception": PerceptionModel.CAMERA, "camera": CameraConfig(width=96, height=64),
+        "seconds": 15.0,
+        "perception": PerceptionModel.CAMERA,
+        "camera": CameraConfig(width=96, height=64),
     },
-}  # fmt: skip
+}
 """Kinds of sessions and their settings."""
 
 COUNTS = {"text": 5, "word-errors": 3, "speech": 2, "camera": 2}

@@ -40,10 +40,9 @@ BATCHES: dict[str, tuple[str, ...]] = {
 
 SHARED = ("shared_maps/*",)
 
-COUNTS = (
-    {"imported_maps": 2, "console": 1, "error_lines": 10, "predictions": 2, "navigation_episodes": 2}
-    | {f"sessions/{name}": 12 for name in town_names()}
-)  # fmt: skip
+COUNTS = {"imported_maps": 2, "console": 1, "error_lines": 10, "predictions": 2, "navigation_episodes": 2} | {
+    f"sessions/{name}": 12 for name in town_names()
+}
 """Least number of parts."""
 
 same_processor = pytest.mark.skipif(
@@ -71,8 +70,11 @@ def check(*patterns: str) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "tests.portability.digests", *patterns],
         env={**os.environ, "PYTHONPATH": str(ROOT), "SDL_VIDEODRIVER": "dummy"},
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     wanted = {part: value for part, value in matching(kept["parts"], patterns).items() if not missing(part)}
     assert wanted

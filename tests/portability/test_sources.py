@@ -67,9 +67,10 @@ def _is_exact(power: ast.BinOp) -> bool:
 def test_sessions_use_portable_functions(package: str) -> None:
     found = [
         f"{file.relative_to(PACKAGE)}:{fault}"
-        for file in files() if file.relative_to(PACKAGE).parts[0] == package
+        for file in files()
+        if file.relative_to(PACKAGE).parts[0] == package
         for fault in faults(ast.parse(file.read_text()))
-    ]  # fmt: skip
+    ]
     assert found == []
 
 

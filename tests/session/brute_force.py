@@ -41,9 +41,7 @@ class BruteForce:
         self._first = np.concatenate(([0], np.cumsum(counts))).astype(int)
         self._counts = counts
         self._oncoming = oncoming_lanes(town)
-        self._moves = [
-            self._moves_from(lane.id, k * STEP, k) for lane in town.lanes for k in range(counts[lane.id])
-        ]  # fmt: skip
+        self._moves = [self._moves_from(lane.id, k * STEP, k) for lane in town.lanes for k in range(counts[lane.id])]
         self._sites: dict[int, list[int]] = {}
         for site in town.sites:
             self._sites.setdefault(self._node(site.lane, site.station), []).append(site.id)

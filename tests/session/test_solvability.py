@@ -37,18 +37,20 @@ def random_action(world: World, rng: np.random.Generator) -> AdWizardAction:
     streets = [lane.id for lane in lanes if not lane.in_junction]
     if rng.random() < 0.5:
         x, y = world.car.position
-        near = [
-            k for k in streets if np.hypot(lanes[k].points[:, 0] - x, lanes[k].points[:, 1] - y).min() < 120.0
-        ]  # fmt: skip
+        near = [k for k in streets if np.hypot(lanes[k].points[:, 0] - x, lanes[k].points[:, 1] - y).min() < 120.0]
         streets = near or streets
     lane = int(rng.choice(streets))
     least = min(30.0, lanes[lane].length)
     return AdWizardAction(
-        exception=KINDS[int(rng.integers(len(KINDS)))], prop=tuple(PropKind)[int(rng.integers(len(PropKind)))],
-        item=int(rng.integers(max(len(world.actors.props), 1))), count=int(rng.integers(6)),
-        extent=int(rng.integers(80)), sensor=tuple(Sensor)[int(rng.integers(len(Sensor)))], on=True,
+        exception=KINDS[int(rng.integers(len(KINDS)))],
+        prop=tuple(PropKind)[int(rng.integers(len(PropKind)))],
+        item=int(rng.integers(max(len(world.actors.props), 1))),
+        count=int(rng.integers(6)),
+        extent=int(rng.integers(80)),
+        sensor=tuple(Sensor)[int(rng.integers(len(Sensor)))],
+        on=True,
         place=LanePosition(lane=lane, metres=round(rng.uniform(least, lanes[lane].length))),
-    )  # fmt: skip
+    )
 
 
 def props(world: World) -> list[tuple[int, float]]:

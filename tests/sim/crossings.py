@@ -69,9 +69,7 @@ def crossing(
     lit = tuple(signal.id for signal in signals if signal.kind is SignalKind.TRAFFIC_LIGHT)
     programmes = [LightProgramme(junction_id=CROSSING, signals=lit, phases=tuple(phases), offset=offset)] if lit else []
     junction = Junction(id=CROSSING, position=(0.0, 0.0), connectors=tuple(range(8, 20)))
-    return Town(
-        name="crossing", lanes=made, links=links, junctions=[junction], signals=signals, programmes=programmes
-    )  # fmt: skip
+    return Town(name="crossing", lanes=made, links=links, junctions=[junction], signals=signals, programmes=programmes)
 
 
 def lit_crossing(first: str = "ns", green: float = 20.0) -> Town:

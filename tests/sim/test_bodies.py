@@ -237,8 +237,11 @@ def test_pedestrians_are_moving_objects_of_highway_env(brookside: TownNetwork) -
         record = holder.arrays.pedestrians[pedestrian.row]
         assert isinstance(pedestrian, RoadObject) and isinstance(pedestrian, Pedestrian)
         assert (*pedestrian.position, pedestrian.heading, pedestrian.speed) == (
-            record.x, record.y, record.heading, record.speed
-        )  # fmt: skip
+            record.x,
+            record.y,
+            record.heading,
+            record.speed,
+        )
         assert (pedestrian.key, pedestrian.crashed, pedestrian.state) == (record.key, False, Walk(record.state))
         assert pedestrian.lane_index == brookside.get_closest_lane_index(pedestrian.position, pedestrian.heading)
         assert pedestrian.station == pedestrian.lane.local_coordinates(pedestrian.position)[0]

@@ -85,13 +85,9 @@ def crowd(name="brookside", seed=3):
 
 def run(disabled, hash_seed):
     """The digests of ten seconds of traffic, and of a session, by another process."""
-    environment = {
-        **os.environ, "NUMBA_DISABLE_JIT": disabled, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(ROOT)
-    }  # fmt: skip
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(ROOT)}
     code = TEN_SECONDS + TEN_SECONDS_OF_A_SESSION
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], env=environment, capture_output=True, text=True
-    )  # fmt: skip
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return dict(zip(("traffic", "session"), done.stdout.split(), strict=True))
 

@@ -92,9 +92,14 @@ def way(
     """Poses at successive frames."""
     count = len(places)
     return np.column_stack(
-        (np.array(places), np.full(count, heading), speeds or np.full(count, 8.0), np.zeros(count),
-         np.full(count, turning))
-    )  # fmt: skip
+        (
+            np.array(places),
+            np.full(count, heading),
+            speeds or np.full(count, 8.0),
+            np.zeros(count),
+            np.full(count, turning),
+        )
+    )
 
 
 def watch_in(town: Town) -> TrajectoryWatch:
@@ -137,9 +142,7 @@ def test_stand_too_far_before_the_line_does_not_count(stands_at: float | None, b
     town = crossing({"s": SignalKind.STOP})
     watch = watch_in(town)
     places = northwards(24.5, 60)
-    speeds = [
-        0.0 if stands_at is not None and abs(y - 2.5 - 12.0 - stands_at) < 0.1 else 8.0 for _, y in places
-    ]  # fmt: skip
+    speeds = [0.0 if stands_at is not None and abs(y - 2.5 - 12.0 - stands_at) < 0.1 else 8.0 for _, y in places]
     assert (0.0 in speeds) == (stands_at is not None)
     # cut in two, as decisions cut it
     found = watch.look(way(places[:40], NORTH, speeds=speeds[:40]), 0)

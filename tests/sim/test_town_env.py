@@ -68,9 +68,12 @@ FEATURES = [
 ]  # fmt: skip
 KINEMATICS = {"type": "Kinematics"}
 GREY = {
-    "type": "GrayscaleObservation", "observation_shape": (48, 32), "stack_size": 3, "weights": [0.3, 0.6, 0.1],
+    "type": "GrayscaleObservation",
+    "observation_shape": (48, 32),
+    "stack_size": 3,
+    "weights": [0.3, 0.6, 0.1],
     "scaling": 2.0,
-}  # fmt: skip
+}
 OBSERVATIONS: dict[str, tuple[dict[str, Any], Any]] = {
     "kinematics": ({"type": "Kinematics"}, (5, 5)),
     "all features": ({**KINEMATICS, "features": FEATURES, "observe_intentions": True, "see_behind": True}, (5, 13)),
@@ -93,7 +96,7 @@ OBSERVATIONS: dict[str, tuple[dict[str, Any], Any]] = {
         ((5, 5), (16, 2), (3, 48, 32)),
     ),
     "one of many": ({"type": "MultiAgentObservation", "observation_config": {"type": "Kinematics"}}, ((5, 5),)),
-}  # fmt: skip
+}
 
 
 def shapes(observation: Any) -> Any:
@@ -138,9 +141,11 @@ ACTIONS: dict[str, tuple[dict[str, Any], type[Vehicle], Any]] = {
     "discrete": (DISCRETE, Vehicle, spaces.Discrete(9)),
     "discrete throttle": ({**DISCRETE, "lateral": False, "actions_per_axis": 5}, Vehicle, spaces.Discrete(5)),
     "one of many": (
-        {"type": "MultiAgentAction", "action_config": META}, MDPVehicle, spaces.Tuple([spaces.Discrete(5)])
+        {"type": "MultiAgentAction", "action_config": META},
+        MDPVehicle,
+        spaces.Tuple([spaces.Discrete(5)]),
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", ACTIONS)

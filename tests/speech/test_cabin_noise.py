@@ -10,8 +10,12 @@ from dorothie_gym.speech.cabin_noise import active_rms
 
 def test_noise_grows_with_speed_rain_wind_and_talk() -> None:
     quiet = CabinState(speed=10.0)
-    for louder in (CabinState(speed=20.0), CabinState(speed=10.0, rain=50.0), CabinState(speed=10.0, wind=80.0),
-                   CabinState(speed=10.0, talkers=3)):  # fmt: skip
+    for louder in (
+        CabinState(speed=20.0),
+        CabinState(speed=10.0, rain=50.0),
+        CabinState(speed=10.0, wind=80.0),
+        CabinState(speed=10.0, talkers=3),
+    ):
         assert noise_level(louder) > noise_level(quiet)
         assert signal_to_noise(louder) < signal_to_noise(quiet)
 

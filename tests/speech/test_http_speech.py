@@ -95,7 +95,7 @@ def test_text_is_spoken_and_recognised_by_a_server(server: tuple[str, type[Handl
 )
 def test_faulty_answers_are_reported(
     server: tuple[str, type[Handler]], answer: tuple[int, bytes], message: str
-) -> None:  # fmt: skip
+) -> None:
     url, handler = server
     handler.answers["/v1/audio/transcriptions"] = answer
     with pytest.raises(SpeechError, match=message):

@@ -33,8 +33,10 @@ def test_words_of_whisper_become_spoken_words(tmp_path: Path, monkeypatch: pytes
 
         def transcribe(self, audio: np.ndarray, **options: object) -> tuple[list[SimpleNamespace], None]:
             asked.update(options, samples=len(audio))
-            words = [SimpleNamespace(word=" Turn", start=0.1, end=0.4, probability=0.9),
-                     SimpleNamespace(word=" KFC.", start=0.4, end=0.9, probability=0.5)]  # fmt: skip
+            words = [
+                SimpleNamespace(word=" Turn", start=0.1, end=0.4, probability=0.9),
+                SimpleNamespace(word=" KFC.", start=0.4, end=0.9, probability=0.5),
+            ]
             return [SimpleNamespace(words=words)], None
 
     module = ModuleType("faster_whisper")

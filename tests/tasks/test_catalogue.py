@@ -53,6 +53,10 @@ def test_unknown_landmarks_are_not_found(text):
 def test_duplicate_value_raises_error():
     with pytest.raises(ValueError, match=r"KFC.menuitems"):
         LandmarkKind(
-            name=LandmarkName.KFC, category="c", label="KFC", noun="KFC", repeatable=False,
+            name=LandmarkName.KFC,
+            category="c",
+            label="KFC",
+            noun="KFC",
+            repeatable=False,
             attributes={"menuitems": ("a", "a")},
-        )  # fmt: skip
+        )

@@ -177,11 +177,16 @@ def test_both_hidden_fields_are_read_with_and_without_dollar_sign():
 def test_messages_are_read_and_filled_with_the_values_of_the_town():
     fields = plain(
         {
-            "destination": "$P", "description": "Buy $I at $P", "reason": "$P is cheap", "delete": True,
+            "destination": "$P",
+            "description": "Buy $I at $P",
+            "reason": "$P is cheap",
+            "delete": True,
             "messages": {"delete": {"from": "the boss of $P", "by": "radio call", "text": "$P is closed, so go home."}},
         },
-        {}, variables=[["P", "places.cafe"]], dependents=[["I", "P.menuitems"]],
-    )  # fmt: skip
+        {},
+        variables=[["P", "places.cafe"]],
+        dependents=[["I", "P.menuitems"]],
+    )
     subgoal = bind(parse(fields), grid_places(24), np.random.default_rng(0)).subgoals[0]
     assert subgoal.reason == "Coco is cheap"
     assert subgoal.messages.trigger is None and subgoal.messages.change is None

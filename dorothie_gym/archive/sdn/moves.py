@@ -35,9 +35,7 @@ MAX_SPEECH_GAP: Final = 20
 MAX_CANDIDATES: Final = 50
 """Latest stretches of one speaker that are candidates for a move."""
 
-_SAMPLE_FIELDS: Final = {
-    "utterance", "act", "slot_type", "slot_val", "is_sog", "is_eog", "is_sot", "is_eot", MORE,
-}  # fmt: skip
+_SAMPLE_FIELDS: Final = {"utterance", "act", "slot_type", "slot_val", "is_sog", "is_eog", "is_sot", "is_eot", MORE}
 _ACT_FIELDS: Final = {"move", "slots", "exchange", "transaction", "span", "utterance", "start", "end", MORE}
 
 

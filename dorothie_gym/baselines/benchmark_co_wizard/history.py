@@ -87,10 +87,13 @@ class History:
         encoded = self.encoded.said(record)
         dropped = (*self.encoded.utterances, record)[: -len(encoded.utterances)]
         return replace(
-            self, encoded=encoded, events=self.events + len(spans), utterances=self.utterances + 1,
+            self,
+            encoded=encoded,
+            events=self.events + len(spans),
+            utterances=self.utterances + 1,
             landmark=_last_landmark((record,)) or self.landmark,
             named_before=_last_landmark(dropped) or self.named_before,
-        )  # fmt: skip
+        )
 
     def corrected(self, spans: Sequence[Span]) -> Self:
         """Returns the history with other acts for the participant's last utterance, which keeps its words."""

@@ -45,9 +45,7 @@ SAID_AGAIN_AFTER: Final = 8.0
 _ANSWERS: Final = (DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFIRM)
 _REASONS_AND_TIMES: Final = (Predicate.BECAUSE, Predicate.STANDS, Predicate.ARRIVES_IN)
 _STATEMENTS: Final = (*_ANSWERS, DialogueMove.REPLY_W, DialogueMove.EXPLAIN)
-_ABOUT_THE_GOAL: Final = (
-    Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY, Predicate.ARRIVED, Predicate.KNOWS,
-)  # fmt: skip
+_ABOUT_THE_GOAL: Final = (Predicate.CLOSE, Predicate.HAS_ROUTE, Predicate.RIGHT_WAY, Predicate.ARRIVED, Predicate.KNOWS)
 
 
 def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -> Remark | None:
@@ -122,9 +120,13 @@ def said_again(utterance: Utterance | None, memory: Memory) -> Remark | None:
 
 
 def is_sayable(
-    remark: Remark, topic: str, memory: Memory, view: CoWizardView, utterance: Utterance | None,
+    remark: Remark,
+    topic: str,
+    memory: Memory,
+    view: CoWizardView,
+    utterance: Utterance | None,
     answer: Remark | None = None,
-) -> bool:  # fmt: skip
+) -> bool:
     """Returns whether a remark is not ruled out.
 
     Ruled out is what the evidence denies, an answer about something that was not asked, an acknowledgement instead of

@@ -143,9 +143,11 @@ def acting_inputs(scene: Scene, memory: Memory, *, queued: bool) -> tuple[Inputs
 def blank_inputs() -> Inputs:
     """Returns inputs of the second step without content, with the command "none" as the only one."""
     return Inputs(
-        state=np.zeros(STATE_SIZE + KEPT * UTTERANCE_SIZE, dtype=np.float32), words=word_rows(""),
-        options=np.zeros((MAX_COMMANDS, COMMAND_SIZE), dtype=np.float32), rows=(0,),
-    )  # fmt: skip
+        state=np.zeros(STATE_SIZE + KEPT * UTTERANCE_SIZE, dtype=np.float32),
+        words=word_rows(""),
+        options=np.zeros((MAX_COMMANDS, COMMAND_SIZE), dtype=np.float32),
+        rows=(0,),
+    )
 
 
 def _step(scene: Scene, memory: Memory) -> RouteStep | None:
@@ -153,9 +155,14 @@ def _step(scene: Scene, memory: Memory) -> RouteStep | None:
 
 
 def _inputs(
-    scene: Scene, memory: Memory, vectors: list[list[float]], rows: tuple[int, ...], most: int, queued: bool,
+    scene: Scene,
+    memory: Memory,
+    vectors: list[list[float]],
+    rows: tuple[int, ...],
+    most: int,
+    queued: bool,
     step: RouteStep | None,
-) -> Inputs:  # fmt: skip
+) -> Inputs:
     state = [*scene.car, *state_vector(memory, scene.view, step, scene.utterances, queued=queued), *scene.talk]
     options = np.zeros((most, PLACE_SIZE if most == MAX_PLACES else COMMAND_SIZE), dtype=np.float32)
     if vectors:

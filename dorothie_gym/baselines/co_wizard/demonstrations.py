@@ -76,7 +76,7 @@ class Pupil:
 
     def decide(
         self, observation: ObservationMapping, on_example: OnExample, turn: Turn | None = None
-    ) -> tuple[Scene, Memory, Lesson]:  # fmt: skip
+    ) -> tuple[Scene, Memory, Lesson]:
         """Lets the teacher decide, and hands on the example; returns scene, memory after listening, and lesson.
 
         Args:
@@ -125,7 +125,7 @@ def follow(session: Session, town: Town, on_example: OnExample) -> None:
 
 def practise(
     player: LearnedCoWizard, engine: SessionEngine, seed: int, on_example: OnExample, *, share: float, talking: float
-) -> None:  # fmt: skip
+) -> None:
     """Plays a session in which teacher and player take turns; hands on the teacher's decisions as examples.
 
     Args:
@@ -177,7 +177,7 @@ class _Practice:
 
     def decide(
         self, observation: ObservationMapping, on_example: OnExample, *, leads: bool, talks: bool
-    ) -> CoWizardAction:  # fmt: skip
+    ) -> CoWizardAction:
         """Takes a decision: the player's where it leads, with the teacher's words unless it talks."""
         turn = self._player.play(observation, self._state, silent=not talks) if leads else None
         scene, memory, lesson = self._pupil.decide(observation, on_example, turn if talks else None)

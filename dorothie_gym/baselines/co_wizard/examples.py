@@ -65,9 +65,14 @@ def make_example(
     update = lesson.update
     before = scene.memory.values
     idle = not (
-        scene.heard or lesson.physical or lesson.remarks or update.goal or update.status or any(update.fresh)
+        scene.heard
+        or lesson.physical
+        or lesson.remarks
+        or update.goal
+        or update.status
+        or any(update.fresh)
         or update.values != before
-    )  # fmt: skip
+    )
     if idle and rng.random() >= IDLE_SHARE:
         return None
     goal = update.goal
@@ -161,9 +166,11 @@ def batch_of(found: Sequence[Example], forms: Sequence[str]) -> Batch:
         words=torch.from_numpy(np.stack([one.listening.words for one in found]).astype(np.int16)),
         places=reals([one.listening.options for one in found]),
         place_count=whole([len(one.listening.rows) for one in found]),
-        before=whole([one.before for one in found]), values=whole([one.values for one in found]),
+        before=whole([one.before for one in found]),
+        values=whole([one.values for one in found]),
         fresh=reals([np.asarray(one.fresh, dtype=np.float32) for one in found]),
-        goal=whole([one.goal for one in found]), status=whole([one.status for one in found]),
+        goal=whole([one.goal for one in found]),
+        status=whole([one.status for one in found]),
         acting=reals([one.acting.state for one in found]),
         commands=reals([one.acting.options for one in found]),
         command_count=whole([len(one.acting.rows) for one in found]),
@@ -171,4 +178,4 @@ def batch_of(found: Sequence[Example], forms: Sequence[str]) -> Batch:
         first=whole([number(one.remarks[0]) for one in found]),
         second=whole([number(one.remarks[1]) for one in found]),
         weight=torch.tensor([one.weight for one in found], dtype=torch.float32),
-    )  # fmt: skip
+    )

@@ -40,9 +40,12 @@ from dorothie_gym.session.spaces.actions import Physical
 from dorothie_gym.sim.state.codes import Motion
 
 HAZARDS: Final = (
-    ObjectClass.TRAFFIC_LIGHT, ObjectClass.VEHICLES, ObjectClass.PEDESTRIAN, ObjectClass.STATIC,
+    ObjectClass.TRAFFIC_LIGHT,
+    ObjectClass.VEHICLES,
+    ObjectClass.PEDESTRIAN,
+    ObjectClass.STATIC,
     ObjectClass.TRAFFIC_SIGN,
-)  # fmt: skip
+)
 PHYSICAL: Final = tuple(PhysicalAction)
 TOPICS: Final = (*(str(predicate) for predicate in Predicate), *(move.label for move in DialogueMove))
 """What remarks are about: their predicate or, without content, their move."""
@@ -69,9 +72,11 @@ def state_vector(
         queued: whether own remarks wait to be said.
     """
     return [
-        *_road(memory, view), *_route(memory, view, step), *_remembered(memory, view),
+        *_road(memory, view),
+        *_route(memory, view, step),
+        *_remembered(memory, view),
         *_talk(memory, view, utterances, queued),
-    ]  # fmt: skip
+    ]
 
 
 def _one_hot(index: int, size: int) -> list[float]:
@@ -121,17 +126,23 @@ def _road(memory: Memory, view: CoWizardView) -> list[float]:
     counts = [sum(thing.kind is kind for thing in view.objects) for kind in HAZARDS]
     props = [thing.distance for thing in view.objects if thing.kind is ObjectClass.STATIC]
     return [
-        float(choice is not None), *_distance(choice.distance if choice is not None else AWAY),
-        float(choice is not None and choice.distance < 24.0), float(choice is not None and choice.distance < 75.0),
+        float(choice is not None),
+        *_distance(choice.distance if choice is not None else AWAY),
+        float(choice is not None and choice.distance < 24.0),
+        float(choice is not None and choice.distance < 75.0),
         float(choice is not None and choice.distance < 85.0),
         float(choice is not None and choice.distance - stopping_distance(view.speed) < 8.0),
-        *(float(direction in directions) for direction in Direction), len(directions) / 4.0,
-        float(memory.town.lanes[view.lane].in_junction), float(meant is not None and meant.junction == memory.junction),
-        float(memory.junction < 0), float(ordered is not None),
+        *(float(direction in directions) for direction in Direction),
+        len(directions) / 4.0,
+        float(memory.town.lanes[view.lane].in_junction),
+        float(meant is not None and meant.junction == memory.junction),
+        float(memory.junction < 0),
+        float(ordered is not None),
         float(choice is not None and choice.lane == memory.asked_lane),
         float(choice is not None and choice.junction == memory.junction_of_action),
-        *(min(count, 8) / 8.0 for count in counts), *_distance(min(props, default=AWAY)),
-    ]  # fmt: skip
+        *(min(count, 8) / 8.0 for count in counts),
+        *_distance(min(props, default=AWAY)),
+    ]
 
 
 def ordered_exit(memory: Memory, view: CoWizardView, choice: Choice | None) -> Exit | None:
@@ -228,12 +239,15 @@ def _place(mark: SeenLandmark, memory: Memory, view: CoWizardView, utterances: S
         heard = utterances[k] if k < len(utterances) and view.time - utterances[k].time < 20.0 else None
         places, streets = (heard.places, heard.streets) if heard is not None else ((), ())
         told += [
-            float(mark.name in places), float(bool(places) and places[0] is mark.name),
-            float(bool(places) and places[-1] is mark.name), float(mark.street in streets), float(bool(streets)),
+            float(mark.name in places),
+            float(bool(places) and places[0] is mark.name),
+            float(bool(places) and places[-1] is mark.name),
+            float(mark.street in streets),
+            float(bool(streets)),
             float(heard is not None and mark.name in heard.heard.words.dropped),
             float(heard is not None and mark.name in heard.heard.words.past),
             float(mark.name in places and mark.street in streets),
-        ]  # fmt: skip
+        ]
     return [
         *told, float(latest is not None), float(mark.row == memory.goal_mark), float(mark.name is memory.goal),
         float(mark.name is memory.former), float(mark.place in memory.ruled_out), float(mark.name in SHARED_NAMES),
@@ -258,9 +272,13 @@ def command_vectors(
 
 
 def _command(
-    command: Physical | None, memory: Memory, view: CoWizardView, step: RouteStep | None, way: Exit | None,
+    command: Physical | None,
+    memory: Memory,
+    view: CoWizardView,
+    step: RouteStep | None,
+    way: Exit | None,
     names: dict[int, Direction],
-) -> list[float]:  # fmt: skip
+) -> list[float]:
     if command is None:
         return [1.0, *[0.0] * (COMMAND_SIZE - 1)]
     action, angle = command.action, command.angle

@@ -186,9 +186,11 @@ class Memory:
     def seen(self, view: CoWizardView, *, heard: bool) -> Memory:
         """Brings standstill, route and times up to date with an observation."""
         memory = replace(
-            self, clock=self.clock.ticked(view.time), heard_at=view.time if heard else self.heard_at,
+            self,
+            clock=self.clock.ticked(view.time),
+            heard_at=view.time if heard else self.heard_at,
             navigator=self.navigator.followed(self.town, view),
-        )  # fmt: skip
+        )
         return memory._standing(view)._carrying_on(view)
 
     def _standing(self, view: CoWizardView) -> Memory:
@@ -203,9 +205,13 @@ class Memory:
         return replace(memory, reason=reason, reason_since=view.time)
 
     def updated(
-        self, update: Update, view: CoWizardView, named: Sequence[LandmarkName], streets: Sequence[StreetName],
+        self,
+        update: Update,
+        view: CoWizardView,
+        named: Sequence[LandmarkName],
+        streets: Sequence[StreetName],
         distance: int | None,
-    ) -> Memory:  # fmt: skip
+    ) -> Memory:
         """Stores an output of the network.
 
         Args:
@@ -266,9 +272,10 @@ class Memory:
 
     def _sending(self, update: Mental) -> Memory:
         kept = tuple(
-            one for one in self.updates
+            one
+            for one in self.updates
             if one != update and not (one.action is update.action is MentalAction.KNOWLEDGE_UPDATE)
-        )  # fmt: skip
+        )
         return replace(self, updates=(*kept, update))
 
     def _with_status(self, update: Update, named: Sequence[LandmarkName]) -> Memory:
@@ -308,9 +315,13 @@ class Memory:
 
     def _aiming(self, mark: SeenLandmark, view: CoWizardView) -> Memory:
         memory = replace(
-            self, goal=mark.name, former=self.goal if self.goal is not mark.name else self.former, goal_mark=mark.row,
-            goal_at=view.time, navigator=self.navigator.to(self.town, view, mark.place),
-        )  # fmt: skip
+            self,
+            goal=mark.name,
+            former=self.goal if self.goal is not mark.name else self.former,
+            goal_mark=mark.row,
+            goal_at=view.time,
+            navigator=self.navigator.to(self.town, view, mark.place),
+        )
         memory = memory._sending(Mental(action=MentalAction.GOAL_UPDATE, goals=(mark.name,)))
         return memory._noting(mark.name, GoalStatus.ONGOING)
 

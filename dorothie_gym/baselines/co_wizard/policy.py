@@ -101,9 +101,7 @@ class LearnedCoWizard(Policy[LearnedState]):
 
     reads_mask = True
 
-    def __init__(
-        self, network: CoWizardNetwork, vocabulary: Sequence[str], limits: SpaceLimits | None = None
-    ) -> None:  # fmt: skip
+    def __init__(self, network: CoWizardNetwork, vocabulary: Sequence[str], limits: SpaceLimits | None = None) -> None:
         """Prepares the policy.
 
         Args:
@@ -120,7 +118,7 @@ class LearnedCoWizard(Policy[LearnedState]):
         style = draw_style(Role.CO_WIZARD, np.random.default_rng((seed, 0)))
         return LearnedState(
             seed=seed, attention=Attention.begin(town), voice=SpeechState(role=Role.CO_WIZARD, style=style)
-        )  # fmt: skip
+        )
 
     def step(self, observation: ObservationMapping, state: LearnedState) -> tuple[ActionDict, LearnedState]:
         """Updates the memory, and chooses a command and remarks."""
@@ -150,15 +148,24 @@ class LearnedCoWizard(Policy[LearnedState]):
         physical = commands[command]
         voice = voice.plan(*remarks)
         speech, voice = voice.speak(
-            view.time, view.speaking, rng, _scene(view, memory), interval=memory.clock.interval,
+            view.time,
+            view.speaking,
+            rng,
+            _scene(view, memory),
+            interval=memory.clock.interval,
             other_speaking=view.other_speaking,
-        )  # fmt: skip
+        )
         mental, attention = finished(scene, memory, physical, remarks)
         action = CoWizardAction(speech=speech, physical=physical, mental=mental)
         return Turn(
-            scene=scene, memory=memory, action=action, remarks=remarks, queued=queued, silent=silent,
+            scene=scene,
+            memory=memory,
+            action=action,
+            remarks=remarks,
+            queued=queued,
+            silent=silent,
             state=replace(state, attention=attention, voice=voice, count=state.count + 1),
-        )  # fmt: skip
+        )
 
     def _listen(self, scene: Scene, inputs: Inputs) -> Update:
         """Returns the likeliest update of the memory."""
@@ -173,13 +180,14 @@ class LearnedCoWizard(Policy[LearnedState]):
             goal = len(GoalEvent) + inputs.rows[goal - len(GoalEvent)]
         return Update(
             values=tuple(int(part.argmax()) for part in np.split(logits, starts[1:])),
-            fresh=tuple(flag > 0.0 for flag in heard.fresh[0].tolist()), goal=goal,
+            fresh=tuple(flag > 0.0 for flag in heard.fresh[0].tolist()),
+            goal=goal,
             status=int(heard.status[0].argmax()),
-        )  # fmt: skip
+        )
 
     def _act(
         self, scene: Scene, memory: Memory, inputs: Inputs, rng: np.random.Generator, *, silent: bool
-    ) -> tuple[int, tuple[Remark, ...]]:  # fmt: skip
+    ) -> tuple[int, tuple[Remark, ...]]:
         """Returns the index of the likeliest command, and the remarks that are drawn."""
         scores, first, hidden = self._network.act(*_tensors(inputs))
         command = int(scores[0].argmax())
@@ -202,9 +210,15 @@ class LearnedCoWizard(Policy[LearnedState]):
         return command, (remark,) if more is None else (remark, more)
 
     def _draw(
-        self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Sources, rng: np.random.Generator,
-        *, joined: bool = False,
-    ) -> tuple[int, Remark | None]:  # fmt: skip
+        self,
+        shares: NDArray[np.float64],
+        scene: Scene,
+        memory: Memory,
+        available: Sources,
+        rng: np.random.Generator,
+        *,
+        joined: bool = False,
+    ) -> tuple[int, Remark | None]:
         """Returns the number of a form and its remark, drawn among those that are sayable; None for silence."""
         latest, answer = scene.utterances[0] if scene.utterances else None, available.get("answer")
         answer = answer if isinstance(answer, Remark) else None
@@ -221,9 +235,11 @@ def _tensors(inputs: Inputs) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, 
     """Returns inputs as a batch of one, rounded as in training."""
     state, options = (array.astype(np.float16).astype(np.float32) for array in (inputs.state, inputs.options))
     return (
-        torch.from_numpy(state)[None], torch.from_numpy(inputs.words)[None], torch.from_numpy(options)[None],
+        torch.from_numpy(state)[None],
+        torch.from_numpy(inputs.words)[None],
+        torch.from_numpy(options)[None],
         torch.tensor([len(inputs.rows)]),
-    )  # fmt: skip
+    )
 
 
 def _scene(view: CoWizardView, memory: Memory) -> WordingContext:

@@ -96,10 +96,12 @@ def form_of(remark: Remark, available: Sources) -> str | None:
         content = remark.wording.content
         slots = sorted(_coded(value, available) for value in remark.act.slots)
         page = {
-            "move": remark.act.move.label, "slots": slots,
+            "move": remark.act.move.label,
+            "slots": slots,
             "meaning": [_form(said, available) for said in remark.meaning],
-            "content": None if content is None else _form(content, available), "wording": wording,
-        }  # fmt: skip
+            "content": None if content is None else _form(content, available),
+            "wording": wording,
+        }
     except LookupError:
         return None
     return json.dumps(page, separators=(",", ":"), sort_keys=True)
@@ -111,8 +113,10 @@ def _whole_form(source: str) -> str:
 
 def _form(said: Proposition, available: Sources) -> list[Any]:
     return [
-        str(said.predicate), int(said.negated), [[name, _coded(value, available)] for name, value in said.arguments],
-    ]  # fmt: skip
+        str(said.predicate),
+        int(said.negated),
+        [[name, _coded(value, available)] for name, value in said.arguments],
+    ]
 
 
 def _coded(value: object, available: Sources) -> Any:
@@ -154,9 +158,11 @@ def filled(form: str, available: Sources, *, joined: bool = False) -> Remark | N
         content = None if page["content"] is None else _filled(page["content"], available)
         move = next(move for move in DialogueMove if move.label == page["move"])
         return Remark(
-            act=DialogueAct.of(move, *slots), wording=Wording(**wording, content=content),
-            meaning=tuple(_filled(said, available) for said in page["meaning"]), joined=joined,
-        )  # fmt: skip
+            act=DialogueAct.of(move, *slots),
+            wording=Wording(**wording, content=content),
+            meaning=tuple(_filled(said, available) for said in page["meaning"]),
+            joined=joined,
+        )
     except LookupError:
         return None
 

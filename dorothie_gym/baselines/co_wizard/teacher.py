@@ -85,7 +85,7 @@ class Teacher:
 
     def decide(
         self, observation: ObservationMapping, named: Sequence[LandmarkName], streets: Sequence[StreetName]
-    ) -> Lesson:  # fmt: skip
+    ) -> Lesson:
         """Takes a decision.
 
         Args:
@@ -109,9 +109,13 @@ class Teacher:
         own = () if waiting else _new((), after)
         self._state, self._physical = state, physical
         return Lesson(
-            update=update, physical=physical, remarks=(*heard, *own), queued=bool(former.speech.queue), action=action,
+            update=update,
+            physical=physical,
+            remarks=(*heard, *own),
+            queued=bool(former.speech.queue),
+            action=action,
             ready=view.time >= state.commands.ready_at,
-        )  # fmt: skip
+        )
 
     def drove(self, physical: Physical | None) -> None:
         """Puts the physical action of the player into the state."""
@@ -136,7 +140,7 @@ class Teacher:
         if any(remark.act.move in QUESTIONS for remark in lesson.remarks):
             state.dialogue = replace(
                 state.dialogue, asked_at=before.asked_at, asked_lane=before.asked_lane, proposed=before.proposed
-            )  # fmt: skip
+            )
         for remark in remarks:
             if remark.act.move in QUESTIONS:
                 state.dialogue = _asking(state.dialogue, remark, view)
@@ -161,9 +165,12 @@ def _new(before: Sequence[Remark], after: Sequence[Remark]) -> tuple[Remark, ...
 
 
 def _update(
-    former: CoWizardState, state: CoWizardState, view: CoWizardView, named: Sequence[LandmarkName],
+    former: CoWizardState,
+    state: CoWizardState,
+    view: CoWizardView,
+    named: Sequence[LandmarkName],
     streets: Sequence[StreetName],
-) -> Update:  # fmt: skip
+) -> Update:
     intentions, before, dialogue = state.intentions, former.intentions, state.dialogue
     directive, known = intentions.directive, before.directive
     order = 0
@@ -196,9 +203,11 @@ def _update(
         "creeping": heard and intentions.creeping and state.beliefs.place != former.beliefs.place,
     }
     return Update(
-        values=tuple(values[name] for name in VARIABLES), fresh=tuple(bool(fresh[name]) for name in FRESH),
-        goal=_goal_event(former, state, view, named), status=_status(former, state, named),
-    )  # fmt: skip
+        values=tuple(values[name] for name in VARIABLES),
+        fresh=tuple(bool(fresh[name]) for name in FRESH),
+        goal=_goal_event(former, state, view, named),
+        status=_status(former, state, named),
+    )
 
 
 def _counted_down(known: object, directive: object) -> bool:
@@ -207,9 +216,7 @@ def _counted_down(known: object, directive: object) -> bool:
     return same and skips[0] is not None and skips[1] is not None and skips[1] == skips[0] - 1
 
 
-def _goal_event(
-    former: CoWizardState, state: CoWizardState, view: CoWizardView, named: Sequence[LandmarkName]
-) -> int:  # fmt: skip
+def _goal_event(former: CoWizardState, state: CoWizardState, view: CoWizardView, named: Sequence[LandmarkName]) -> int:
     old, new = former.beliefs, state.beliefs
     if new.goal is None:
         return GoalEvent.KEEP if old.goal is None else GoalEvent.CLEAR

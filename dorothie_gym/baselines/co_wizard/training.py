@@ -65,7 +65,7 @@ class CoWizardTraining(RoundSettings):
 
 def train_co_wizard(
     settings: CoWizardTraining, out: Path, *, workers: int, on_stage: OnStage, lessons: Path | None = None
-) -> tuple[Stage, ...]:  # fmt: skip
+) -> tuple[Stage, ...]:
     """Trains a Co-Wizard; a started training is resumed. See `train_in_rounds`."""
     torch.set_num_threads(1)  # small layers: more threads only wait for each other, and change the last bits
     learner = CoWizardLearner(settings=settings)
@@ -107,15 +107,22 @@ class CoWizardLearner:
         network = CoWizardNetwork(Layout.of(len(vocabulary))) if plan.former is None else load_network(plan.former)[0]
         on_stage(plan.title, 0, plan.epochs)
         loss = fit(
-            network, examples, partial(loss_of, network), epochs=plan.epochs,
+            network,
+            examples,
+            partial(loss_of, network),
+            epochs=plan.epochs,
             seed=settings.seed * 1000 + plan.number,
             on_epoch=lambda epoch, _: on_stage(plan.title, epoch, plan.epochs),
-        )  # fmt: skip
+        )
         page = ModelPage(
-            format=MODEL_FORMAT, kind=KIND, layout=network.layout, vocabulary=vocabulary,
-            steps=len(examples) * plan.epochs, seconds=round(processor_seconds() - self.begun, 1),
+            format=MODEL_FORMAT,
+            kind=KIND,
+            layout=network.layout,
+            vocabulary=vocabulary,
+            steps=len(examples) * plan.epochs,
+            seconds=round(processor_seconds() - self.begun, 1),
             settings={**settings.as_json(), "corpus": settings.corpus.name},
-        )  # fmt: skip
+        )
         save_network(network, page, plan.folder)
         return Stage(name=plan.folder.name, examples=len(examples), loss=loss)
 

@@ -62,9 +62,14 @@ def save_model(network: nn.Module, page: RoleModelPage, folder: Path, dtype: tor
 
 
 def load_model(
-    folder: Path, page_type: type[Page], kind: str, version: int, *, make: Callable[[Page], Network | None],
+    folder: Path,
+    page_type: type[Page],
+    kind: str,
+    version: int,
+    *,
+    make: Callable[[Page], Network | None],
     check_form: Callable[[str], object],
-) -> tuple[Network, Page]:  # fmt: skip
+) -> tuple[Network, Page]:
     """Reads a model.
 
     Args:

@@ -141,9 +141,14 @@ class Learner(Protocol):
 
 
 def train_in_rounds(
-    learner: Learner, settings: RoundSettings, out: Path, *, workers: int, on_stage: OnStage,
+    learner: Learner,
+    settings: RoundSettings,
+    out: Path,
+    *,
+    workers: int,
+    on_stage: OnStage,
     lessons: Path | None = None,
-) -> tuple[Stage, ...]:  # fmt: skip
+) -> tuple[Stage, ...]:
     """Trains a model; a started training is resumed.
 
     Args:
@@ -190,15 +195,19 @@ def train_in_rounds(
 
 
 def _fit_plan(
-    settings: RoundSettings, number: int, folder: Path, files: Sequence[Path], corpus_files: Sequence[Path],
+    settings: RoundSettings,
+    number: int,
+    folder: Path,
+    files: Sequence[Path],
+    corpus_files: Sequence[Path],
     former: Path | None,
-) -> FitPlan:  # fmt: skip
+) -> FitPlan:
     last = number == settings.rounds
     epochs = settings.first_epochs if former is None else settings.last_epochs if last else settings.epochs
     title = "Fit to the corpus" if former is None else f"Fit, round {number} of {settings.rounds}"
     return FitPlan(
         number=number, folder=folder, files=files, corpus_files=corpus_files, former=former, epochs=epochs, title=title
-    )  # fmt: skip
+    )
 
 
 def practice_plans(seeds: Sequence[int], sessions: int, branch: int, folder: Path) -> list[PracticePlan]:
@@ -230,9 +239,11 @@ Plan = TypeVar("Plan", CorpusPlan, PracticePlan)
 
 
 def gather(
-    prepare: Callable[[], Callable[[Plan], None]], plans: Sequence[Plan], workers: int,
+    prepare: Callable[[], Callable[[Plan], None]],
+    plans: Sequence[Plan],
+    workers: int,
     report: Callable[[int, int], None],
-) -> None:  # fmt: skip
+) -> None:
     """Makes the missing files of sessions."""
     missing = [plan for plan in plans if not plan.file.is_file()]
     report(len(plans) - len(missing), len(plans))

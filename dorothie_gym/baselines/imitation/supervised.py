@@ -41,9 +41,14 @@ OnEpoch = Callable[[int, float], None]
 
 
 def fit(
-    network: nn.Module, examples: Examples, loss_of: Callable[[Examples], Tensor], *, epochs: int, seed: int,
+    network: nn.Module,
+    examples: Examples,
+    loss_of: Callable[[Examples], Tensor],
+    *,
+    epochs: int,
+    seed: int,
     on_epoch: OnEpoch,
-) -> float:  # fmt: skip
+) -> float:
     """Fits a network to examples and returns the mean loss of the last epoch.
 
     Args:

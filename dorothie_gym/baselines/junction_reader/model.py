@@ -254,8 +254,8 @@ class JunctionReader(TOTO):
         street = self._street_names(inputs, torch.where(there, self.exit_lane[row], -1))
         sides = torch.stack((angles >= 30, angles <= -30, angles.abs() < 30), dim=-1).float()  # (B, X, 3)
         numbers = torch.stack(
-            (turn.cos(), turn.sin(), seen.float(), along * seen, (nearer / POSITION_UNIT) * seen), dim=-1,
-        )  # fmt: skip
+            (turn.cos(), turn.sin(), seen.float(), along * seen, (nearer / POSITION_UNIT) * seen), dim=-1
+        )
         tokens = self.exit(torch.cat((numbers, sides, self._told_way(inputs, sides), street), dim=-1))
         return tokens, there, angles, distance
 

@@ -112,6 +112,7 @@ def speaking_inputs(scene: Scene, memory: Memory) -> Inputs:
         state += utterance_vector(scene.utterances[k] if k < len(scene.utterances) else None, scene.view.time)
     text = scene.utterances[0].heard.words.text if scene.heard else ""
     return Inputs(
-        state=np.asarray(state, dtype=np.float32), words=word_rows(text),
+        state=np.asarray(state, dtype=np.float32),
+        words=word_rows(text),
         errands=np.zeros((MAX_ERRANDS, ERRAND_SIZE), dtype=np.float32),
-    )  # fmt: skip
+    )

@@ -98,9 +98,7 @@ def follow(session: Session, town: Town, on_example: OnExample) -> None:
         engine.step(actions)
 
 
-def practise(
-    player: LearnedParticipant, engine: SessionEngine, seed: int, on_example: OnExample, share: float
-) -> None:  # fmt: skip
+def practise(player: LearnedParticipant, engine: SessionEngine, seed: int, on_example: OnExample, share: float) -> None:
     """Plays a session in which teacher and player guide the car in turns; hands on the examples.
 
     Args:
@@ -112,9 +110,7 @@ def practise(
     """
     engine.reset(seed=seed)
     town, limits = engine.town, engine.limits
-    others: dict[Role, AnyPolicy] = {
-        Role.CO_WIZARD: ScriptedCoWizard(limits), Role.AD_WIZARD: ScriptedAdWizard(limits)
-    }  # fmt: skip
+    others: dict[Role, AnyPolicy] = {Role.CO_WIZARD: ScriptedCoWizard(limits), Role.AD_WIZARD: ScriptedAdWizard(limits)}
     states = {role: policy.initial_state(policy_seed(seed, role), town) for role, policy in others.items()}
     own = policy_seed(seed, PARTICIPANT)
     pupil, rng = Pupil(town, own, Teacher(town, limits, own, AVERAGE)), np.random.default_rng((own, 2))

@@ -43,9 +43,13 @@ class Example:
 
 
 def make_example(
-    scene: Scene, choosing: Inputs, speaking: Inputs, choice: Choice, remarks: Sequence[str | None],
+    scene: Scene,
+    choosing: Inputs,
+    speaking: Inputs,
+    choice: Choice,
+    remarks: Sequence[str | None],
     rng: np.random.Generator,
-) -> Example | None:  # fmt: skip
+) -> Example | None:
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
@@ -65,14 +69,19 @@ def make_example(
         target = 1 + choosing.numbers.index(choice.target) if choice.target in choosing.numbers else UNKNOWN
     padded = (*remarks, *[""] * MOST_REMARKS)[:MOST_REMARKS]
     return Example(
-        choosing=choosing, speaking=speaking, guides=guides, target=target, guiding=choice.guiding, remarks=padded,
+        choosing=choosing,
+        speaking=speaking,
+        guides=guides,
+        target=target,
+        guiding=choice.guiding,
+        remarks=padded,
         weight=1.0 / IDLE_SHARE if idle else 1.0,
-    )  # fmt: skip
+    )
 
 
 def forms_of_remarks(
     remarks: Sequence[Remark], memory: Memory, scene: Scene, available: Mapping[str, object]
-) -> list[str | None]:  # fmt: skip
+) -> list[str | None]:
     """Returns the forms of remarks; None for those that are not learnt, and for all behind them."""
     found: list[str | None] = []
     for one in remarks[:MOST_REMARKS]:
@@ -115,8 +124,10 @@ def batch_of(found: Sequence[Example], forms: Sequence[str]) -> Batch:
         words=torch.from_numpy(np.stack([one.choosing.words for one in found]).astype(np.int16)),
         errands=reals([one.choosing.errands for one in found]),
         errand_count=whole([len(one.choosing.numbers) for one in found]),
-        guides=whole([int(one.guides) for one in found]), target=whole([one.target for one in found]),
+        guides=whole([int(one.guides) for one in found]),
+        target=whole([one.target for one in found]),
         guiding=whole([int(one.guiding) for one in found]),
-        speaking=reals([one.speaking.state for one in found]), remarks=whole(remarks),
+        speaking=reals([one.speaking.state for one in found]),
+        remarks=whole(remarks),
         weight=torch.tensor([one.weight for one in found], dtype=torch.float32),
-    )  # fmt: skip
+    )

@@ -41,9 +41,14 @@ _WAITS: Final = (1.6, 4.0, 6.0, 9.0, 10.0, 40.0)
 
 _MOVES: Final = tuple(DialogueMove)
 _ACTIONS: Final = (
-    ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH, ActionValue.LANE_FOLLOW, ActionValue.STOP,
-    ActionValue.START, ActionValue.SPEED_CHANGE,
-)  # fmt: skip
+    ActionValue.J_TURN,
+    ActionValue.U_TURN,
+    ActionValue.LANE_SWITCH,
+    ActionValue.LANE_FOLLOW,
+    ActionValue.STOP,
+    ActionValue.START,
+    ActionValue.SPEED_CHANGE,
+)
 
 
 def state_vector(memory: Memory, view: ParticipantView, utterances: Sequence[Utterance]) -> list[float]:
@@ -55,9 +60,13 @@ def state_vector(memory: Memory, view: ParticipantView, utterances: Sequence[Utt
         utterances: last utterances of the car, the latest first.
     """
     return [
-        *_car(memory, view), *_route(memory, view), *_stop(memory, view), *_tasks(memory, view),
-        *_own_talk(memory, view), *_question(memory, view, utterances),
-    ]  # fmt: skip
+        *_car(memory, view),
+        *_route(memory, view),
+        *_stop(memory, view),
+        *_tasks(memory, view),
+        *_own_talk(memory, view),
+        *_question(memory, view, utterances),
+    ]
 
 
 def _one_hot(index: int, size: int) -> list[float]:
@@ -343,9 +352,7 @@ def _is_wanted(memory: Memory, view: ParticipantView, said: Proposition) -> bool
         own = first_new_street(view.raw, memory.records.town, view.lane, memory.records.route.progress)
         return own is None or own is street
     if step.direction is Direction.STRAIGHT or step.key[0] == "on":
-        return action in (ActionValue.LANE_FOLLOW, ActionValue.J_TURN, None) and direction in (
-            None, Direction.STRAIGHT
-        )  # fmt: skip
+        return action in (ActionValue.LANE_FOLLOW, ActionValue.J_TURN, None) and direction in (None, Direction.STRAIGHT)
     return action in (step.action, None) and direction in (step.direction, None)
 
 
@@ -354,7 +361,7 @@ def _is_wanted(memory: Memory, view: ParticipantView, said: Proposition) -> bool
 
 def errand_vectors(
     memory: Memory, view: ParticipantView, utterances: Sequence[Utterance]
-) -> tuple[list[list[float]], tuple[int, ...]]:  # fmt: skip
+) -> tuple[list[list[float]], tuple[int, ...]]:
     """Returns a vector for each subgoal that may be reached now, and their numbers."""
     latest = utterances[0] if utterances and utterances[0].time >= view.time else None
     found = [one for one in view.subgoals if one.open and one.allowed and view.landmark(one.landmark) is not None]

@@ -258,7 +258,7 @@ def _name(view: ParticipantView, subgoal: SeenSubgoal) -> LandmarkName | None:
 
 def _is_wrong_turn(
     step: StepKey | None, former: RouteProgress, now: RouteProgress, view: ParticipantView, config: ParticipantConfig
-) -> bool:  # fmt: skip
+) -> bool:
     """Returns whether the car has just left the route at a turn that was announced."""
     if step is None or step[0] != "turn" or now.route is former.route:
         return False

@@ -56,7 +56,7 @@ class ParticipantNetwork(nn.Module):
 
     def choose(
         self, state: Tensor, words: Tensor, errands: Tensor, count: Tensor, guides: Tensor
-    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+    ) -> tuple[Tensor, Tensor]:
         """Returns the logits of keeping the target and of each errand (b, 1 + k), and that of guiding (b,).
 
         Args:

@@ -61,7 +61,7 @@ class LearnedParticipant(Policy[LearnedState]):
 
     def __init__(
         self, network: ParticipantNetwork, vocabulary: Sequence[str], limits: SpaceLimits | None = None
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Prepares the policy.
 
         Args:
@@ -124,9 +124,14 @@ class LearnedParticipant(Policy[LearnedState]):
         return tuple(remarks)
 
     def _draw(
-        self, shares: NDArray[np.float64], scene: Scene, memory: Memory, available: Mapping[str, object], *,
+        self,
+        shares: NDArray[np.float64],
+        scene: Scene,
+        memory: Memory,
+        available: Mapping[str, object],
+        *,
         joined: bool,
-    ) -> tuple[int, Remark | None]:  # fmt: skip
+    ) -> tuple[int, Remark | None]:
         """Returns the number of a form and its remark, drawn among those that are not denied; None for silence."""
         while chosen := drawn(shares, scene.rng):
             form = self._vocabulary[chosen]
@@ -150,9 +155,13 @@ def finished(scene: Scene, memory: Memory, remarks: Sequence[Remark]) -> tuple[S
     records = memory.records
     context = None if records.speech.idle else scene_of(records, view)
     speech, voice = records.speech.speak(
-        view.time, view.speaking, scene.rng, context, interval=records.clock.interval,
+        view.time,
+        view.speaking,
+        scene.rng,
+        context,
+        interval=records.clock.interval,
         other_speaking=view.other_speaking,
-    )  # fmt: skip
+    )
     return speech, Attention(memory=memory.spoken(voice, view), utterances=scene.utterances)
 
 

@@ -62,16 +62,20 @@ def next_step(records: ParticipantState, view: ParticipantView) -> RouteStep | N
     if crossing is not None and not switch:
         straight = crossing.direction is Direction.STRAIGHT
         return RouteStep(
-            key=("turn", crossing.lane, crossing.exit.connector), distance=crossing.distance,
-            action=ActionValue.LANE_FOLLOW if straight else ActionValue.J_TURN, direction=crossing.direction,
+            key=("turn", crossing.lane, crossing.exit.connector),
+            distance=crossing.distance,
+            action=ActionValue.LANE_FOLLOW if straight else ActionValue.J_TURN,
+            direction=crossing.direction,
             junction=crossing,
-        )  # fmt: skip
+        )
     if manoeuvre is not None and manoeuvre[0] is not LaneEntry.U_TURN:
         left = manoeuvre[0] is LaneEntry.CHANGE_LEFT
         return RouteStep(
-            key=("lane", view.lane, int(left)), distance=manoeuvre[1], action=ActionValue.LANE_SWITCH,
+            key=("lane", view.lane, int(left)),
+            distance=manoeuvre[1],
+            action=ActionValue.LANE_SWITCH,
             direction=Direction.LEFT if left else Direction.RIGHT,
-        )  # fmt: skip
+        )
     left_over = progress.left(view.station)
     return RouteStep(key=("on", view.lane, 0), distance=left_over, action=ActionValue.LANE_FOLLOW)
 
@@ -120,9 +124,7 @@ def note_remark(records: ParticipantState, view: ParticipantView, remark: Remark
         records.conversation = records.conversation.after_mentioning_lights(now)
 
 
-def _note_order(
-    records: ParticipantState, view: ParticipantView, remark: Remark, actions: Sequence[object]
-) -> None:  # fmt: skip
+def _note_order(records: ParticipantState, view: ParticipantView, remark: Remark, actions: Sequence[object]) -> None:
     """Enters an order into records."""
     now, ends = view.time, about_to_arrive(records, view)
     if records.task.goal is not None and not records.task.announced:

@@ -140,17 +140,21 @@ def form_of(remark: Remark, available: Mapping[str, object]) -> str | None:
     try:
         content = remark.wording.content
         coded = replace(
-            remark, meaning=tuple(_coded(said, texts) for said in remark.meaning),
+            remark,
+            meaning=tuple(_coded(said, texts) for said in remark.meaning),
             wording=_reworded(remark.wording, None if content is None else _coded(content, texts)),
-        )  # fmt: skip
+        )
     except LookupError:
         return None
     form = forms.form_of(coded, plain)
     if form is None:
         return None
     names = next((names for moves, names in _POINTERS if remark.act.move in moves), ())
-    constants = {(type(value).__name__, getattr(value, "name", "")): name for name in names
-                 if (value := available.get(name)) is not None}  # fmt: skip
+    constants = {
+        (type(value).__name__, getattr(value, "name", "")): name
+        for name in names
+        if (value := available.get(name)) is not None
+    }
     page = _pointing(json.loads(form), constants)
     page["slots"] = sorted(page["slots"])
     if remark.urgent:
@@ -189,10 +193,11 @@ def filled(form: str, available: Mapping[str, object], *, joined: bool = False) 
     try:
         content = found.wording.content
         return replace(
-            found, meaning=tuple(_decoded(said, available) for said in found.meaning),
+            found,
+            meaning=tuple(_decoded(said, available) for said in found.meaning),
             wording=_reworded(found.wording, None if content is None else _decoded(content, available)),
             urgent=bool(json.loads(form).get("urgent", False)),
-        )  # fmt: skip
+        )
     except LookupError:
         return None
 
@@ -253,9 +258,12 @@ _PLACES: Final = (
     "goal", "done", "added", "dropped", "moved", "former", "place0", "place1", "later0", "later1", "near", "beside",
 )  # fmt: skip
 _VALUES: Final[Mapping[str, object]] = {
-    "manoeuvre": ActionValue.J_TURN, "turn": Direction.LEFT, "said_action": ActionValue.J_TURN,
-    "said_turn": Direction.LEFT, "said_object": ObjectClass.VEHICLES,
-}  # fmt: skip
+    "manoeuvre": ActionValue.J_TURN,
+    "turn": Direction.LEFT,
+    "said_action": ActionValue.J_TURN,
+    "said_turn": Direction.LEFT,
+    "said_object": ObjectClass.VEHICLES,
+}
 _STREETS: Final = ("goal_street", "street0", "street1", "onto", "here", "new_street", "cross")
 
 
@@ -293,7 +301,5 @@ def stop_remark(memory: Memory) -> Remark | None:
         stop = order(DialogueMove.INSTRUCT, ActionValue.STOP, urgent=True)
         return replace(stop, text=guidance.stop_text)
     here = Proposition.of(Predicate.CLOSE, place=None if goal is None else goal.name)
-    said = intend(
-        CommunicativeFunction.INFORM, here, elided=("place",), wording=Wording(topic="here"), urgent=True
-    )  # fmt: skip
+    said = intend(CommunicativeFunction.INFORM, here, elided=("place",), wording=Wording(topic="here"), urgent=True)
     return replace(said, text=guidance.stop_text)

@@ -67,9 +67,11 @@ class Teacher:
         spoke = state.speech.last is not former.speech.last
         after = (*state.speech.said[-1:], *state.speech.queue) if spoke else state.speech.queue
         return Lesson(
-            target=state.task.target, guiding=state.guidance.guiding, remarks=_new(former.speech.queue, after),
+            target=state.task.target,
+            guiding=state.guidance.guiding,
+            remarks=_new(former.speech.queue, after),
             action=action,
-        )  # fmt: skip
+        )
 
     def settle(self, memory: Memory, *, spoke: bool) -> None:
         """Puts into the state what the player has chosen and said instead.

@@ -64,9 +64,7 @@ class Demonstrations:
     def of(cls, decisions: Iterable[tuple[Vector, NDArray[np.bool_], int]]) -> Demonstrations:
         """Stacks single decisions, at least one."""
         observations, masks, actions = zip(*decisions, strict=True)
-        return cls(
-            torch.from_numpy(np.stack(observations)), torch.from_numpy(np.stack(masks)), torch.tensor(actions)
-        )  # fmt: skip
+        return cls(torch.from_numpy(np.stack(observations)), torch.from_numpy(np.stack(masks)), torch.tensor(actions))
 
     def __len__(self) -> int:
         """Returns the number of decisions."""
@@ -94,9 +92,7 @@ def read_demonstrations(
     return Demonstrations.of(found)
 
 
-def replayable_sessions(
-    corpus: Path, fold: str, on_stage: OnStage = ignore_stage
-) -> Iterator[tuple[Session, Town]]:  # fmt: skip
+def replayable_sessions(corpus: Path, fold: str, on_stage: OnStage = ignore_stage) -> Iterator[tuple[Session, Town]]:
     """Yields the sessions of a fold with their towns; raises `SessionError` if one cannot be replayed."""
     towns: dict[str, Town] = {}
     entries = Corpus.load(corpus).filter(fold=fold).entries
@@ -181,10 +177,13 @@ def clone(
         chosen = _distribution(policy, held_out, torch.arange(len(held_out))).get_actions(deterministic=True)
     right, is_action = chosen == held_out.actions, held_out.actions != NOTHING
     return CloningResult(
-        decisions=len(training), epochs=epoch, losses=(before, lowest), agreement=float(right.float().mean()),
+        decisions=len(training),
+        epochs=epoch,
+        losses=(before, lowest),
+        agreement=float(right.float().mean()),
         majority=float((held_out.actions == training.actions.mode().values).float().mean()),
         action_agreement=float(right[is_action].float().mean()),
-    )  # fmt: skip
+    )
 
 
 class CriticWarmUp(BaseCallback):

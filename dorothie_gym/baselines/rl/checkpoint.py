@@ -314,9 +314,7 @@ def _tensors_under(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str
     return {name[len(prefix) :]: value for name, value in tensors.items() if name.startswith(prefix)}
 
 
-def _optimiser(
-    name: str, groups: Mapping[str, object], tensors: Mapping[str, torch.Tensor]
-) -> dict[str, object]:  # fmt: skip
+def _optimiser(name: str, groups: Mapping[str, object], tensors: Mapping[str, torch.Tensor]) -> dict[str, object]:
     """Returns the state of an optimiser, as torch's `state_dict` has it."""
     state: dict[int, dict[str, torch.Tensor]] = {}
     for key, value in _tensors_under(f"{name}/", tensors).items():

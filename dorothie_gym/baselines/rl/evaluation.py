@@ -82,23 +82,26 @@ class Episodes:
     def joined(cls, parts: Sequence[Episodes]) -> Episodes:
         """Returns the episodes of several parts."""
         return cls(
-            np.concatenate([part.successes for part in parts]), np.concatenate([part.rewards for part in parts]),
+            np.concatenate([part.successes for part in parts]),
+            np.concatenate([part.rewards for part in parts]),
             np.concatenate([part.lengths for part in parts]),
-        )  # fmt: skip
+        )
 
     @property
     def statistics(self) -> EpisodeStatistics:
         """Means over the episodes."""
         low, high = wilson_interval(int(self.successes.sum()), len(self.successes))
         return EpisodeStatistics(
-            success=float(self.successes.mean()), low=low, high=high, reward=float(self.rewards.mean()),
-            length=float(self.lengths.mean()), episodes=len(self.successes),
-        )  # fmt: skip
+            success=float(self.successes.mean()),
+            low=low,
+            high=high,
+            reward=float(self.rewards.mean()),
+            length=float(self.lengths.mean()),
+            episodes=len(self.successes),
+        )
 
 
-def evaluate_settings(
-    settings: TrainingSettings, act: Act, episodes: int, seed: int = FIRST_SEED
-) -> EpisodeStatistics:  # fmt: skip
+def evaluate_settings(settings: TrainingSettings, act: Act, episodes: int, seed: int = FIRST_SEED) -> EpisodeStatistics:
     """Plays episodes of the environment of a training, with consecutive seeds; of several towns, so many in each.
 
     Args:

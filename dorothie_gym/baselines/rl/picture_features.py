@@ -36,11 +36,14 @@ class PictureFeatures(BaseFeaturesExtractor):
         super().__init__(observation_space, STREET + DASHBOARD)
         first, second, third = channels
         convolutions = nn.Sequential(
-            nn.Conv2d(observation_space.shape[0], first, 8, stride=4), nn.ReLU(),
-            nn.Conv2d(first, second, 4, stride=2), nn.ReLU(),
-            nn.Conv2d(second, third, 3), nn.ReLU(),
+            nn.Conv2d(observation_space.shape[0], first, 8, stride=4),
+            nn.ReLU(),
+            nn.Conv2d(first, second, 4, stride=2),
+            nn.ReLU(),
+            nn.Conv2d(second, third, 3),
+            nn.ReLU(),
             nn.Flatten(),
-        )  # fmt: skip
+        )
         with torch.no_grad():
             width = convolutions(torch.zeros(1, *observation_space.shape)).shape[1]
         self.street = nn.Sequential(convolutions, nn.Linear(width, STREET), nn.ReLU())

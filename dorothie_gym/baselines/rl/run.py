@@ -50,9 +50,10 @@ class TrainingEvaluation:
         """Reads the output of `as_json`."""
         outcome = {name: value for name, value in page.items() if name not in ("steps", "seconds")}
         return cls(
-            steps=int(page["steps"]), seconds=float(page["seconds"]),
+            steps=int(page["steps"]),
+            seconds=float(page["seconds"]),
             outcome=checked(outcome, EpisodeStatistics, "evaluation"),
-        )  # fmt: skip
+        )
 
 
 OnProgress: TypeAlias = Callable[[int, int, TrainingEvaluation | None], None]

@@ -166,10 +166,13 @@ class Detector(nn.Module):
         self.config = config
         library = transformers()
         backbone = library.ResNetConfig(
-            num_channels=config.encoded, embedding_size=min(config.backbone_sizes[0], 64),
-            hidden_sizes=list(config.backbone_sizes), depths=list(config.backbone_depths),
-            layer_type="bottleneck" if config.bottleneck else "basic", out_features=["stage2", "stage3", "stage4"],
-        )  # fmt: skip
+            num_channels=config.encoded,
+            embedding_size=min(config.backbone_sizes[0], 64),
+            hidden_sizes=list(config.backbone_sizes),
+            depths=list(config.backbone_depths),
+            layer_type="bottleneck" if config.bottleneck else "basic",
+            out_features=["stage2", "stage3", "stage4"],
+        )
         self.settings: Any = library.DeformableDetrConfig(
             use_timm_backbone=False, backbone_config=backbone, backbone=None, use_pretrained_backbone=False,
             num_channels=config.encoded, num_queries=config.queries, two_stage_num_proposals=config.queries,
@@ -186,9 +189,12 @@ class Detector(nn.Module):
         self.kinds = nn.Embedding(CLASSES, config.encoded)
         self.detr: Any = library.DeformableDetrForObjectDetection(self.settings)
         self.solid_head = nn.Sequential(
-            nn.Linear(config.size, config.size), nn.ReLU(), nn.Linear(config.size, config.size), nn.ReLU(),
+            nn.Linear(config.size, config.size),
+            nn.ReLU(),
+            nn.Linear(config.size, config.size),
+            nn.ReLU(),
             nn.Linear(config.size, SOLID),
-        )  # fmt: skip
+        )
         self.detr.model.backbone.requires_grad_(True)  # the library freezes it, as if it were trained already
         self._start_heads()
         self.register_state_dict_post_hook(_drop_shared)  # type: ignore[no-untyped-call]
@@ -240,9 +246,12 @@ class Detector(nn.Module):
         if self.config.two_stage:  # objects of any kind at the cells of the encoder, which the library leaves out
             objects = [{**label, "class_labels": torch.zeros_like(label["class_labels"])} for label in labels]
             proposals = found.enc_outputs_coord_logits.sigmoid()
-            loss = loss + self.detr.loss_function(
-                found.enc_outputs_class, objects, rgb.device, proposals, self._without_layers, None, None
-            )[0]  # fmt: skip
+            loss = (
+                loss
+                + self.detr.loss_function(
+                    found.enc_outputs_class, objects, rgb.device, proposals, self._without_layers, None, None
+                )[0]
+            )
         if self.config.solid_loss:
             loss = loss + self.config.solid_loss * self._solid_loss(found, labels, wanted)
         return loss

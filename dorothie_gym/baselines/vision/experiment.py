@@ -154,14 +154,15 @@ def _run(job: VisionExperiment, workers: int, on_stage: OnStage) -> dict[str, ob
     else:
         learner = ObjectLearner(config, training, validation, job.seed, device)
     about = {
-        "model": job.model, "version": __version__, "pictures": [training.key, validation.key], "inputs": job.inputs,
-    }  # fmt: skip
+        "model": job.model,
+        "version": __version__,
+        "pictures": [training.key, validation.key],
+        "inputs": job.inputs,
+    }
     if reader is not None:
         about["segformer"] = checkpoints.sha256_of(job.segformer / BEST_FILE)
     stepped: OnStep = lambda done, planned, loss: on_stage(f"steps, loss {loss:.3f}", done, planned)  # noqa: E731
-    epochs = train_learner(
-        learner, job.folder, seed=job.seed, about=about, clock=time.process_time, on_step=stepped
-    )  # fmt: skip
+    epochs = train_learner(learner, job.folder, seed=job.seed, about=about, clock=time.process_time, on_step=stepped)
     on_stage("tests", 0, len(TESTS))
     tested = {}
     for number, (name, fold) in enumerate(TESTS.items()):
@@ -192,9 +193,13 @@ def sampling_of(config: SegFormerConfig | DetectorConfig) -> FrameSampling:
     if isinstance(config, SegFormerConfig):
         return FrameSampling(width=config.width, height=config.height)
     return FrameSampling(
-        width=config.width, height=config.height, spacing=_OBJECT_SPACING, wait=_OBJECT_WAIT, most=_OBJECT_MOST,
+        width=config.width,
+        height=config.height,
+        spacing=_OBJECT_SPACING,
+        wait=_OBJECT_WAIT,
+        most=_OBJECT_MOST,
         pixels=LEAST_PIXELS,
-    )  # fmt: skip
+    )
 
 
 def load_segformer(folder: Path, device: torch.device) -> SegFormer:

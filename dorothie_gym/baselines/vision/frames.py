@@ -76,8 +76,12 @@ _NEAR: Final = 45.0  # [m] farther road users have few pixels
 _TRIED: Final = 2  # pictures that are looked at for one that is chosen
 _FORMAT: Final = 2
 _OUTPUTS: Final = (
-    CameraOutput.RGB, CameraOutput.DEPTH, CameraOutput.SEMANTIC, CameraOutput.INSTANCE, CameraOutput.BOXES,
-)  # fmt: skip
+    CameraOutput.RGB,
+    CameraOutput.DEPTH,
+    CameraOutput.SEMANTIC,
+    CameraOutput.INSTANCE,
+    CameraOutput.BOXES,
+)
 
 
 @dataclass(frozen=True, kw_only=True)

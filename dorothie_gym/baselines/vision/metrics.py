@@ -115,9 +115,15 @@ class PictureBoxes:
         true, found = self.kinds == kind, np.flatnonzero(self.detected_kinds == kind)
         found = found[np.argsort(-self.scores[found], kind="stable")]
         return PictureBoxes(
-            self.true[true], self.kinds[true], self.ignored[true], self.spaces[true], self.detected[found],
-            self.detected_kinds[found], self.scores[found], self.detected_spaces[found],
-        )  # fmt: skip
+            self.true[true],
+            self.kinds[true],
+            self.ignored[true],
+            self.spaces[true],
+            self.detected[found],
+            self.detected_kinds[found],
+            self.scores[found],
+            self.detected_spaces[found],
+        )
 
 
 Closeness: TypeAlias = Callable[[PictureBoxes], Array]

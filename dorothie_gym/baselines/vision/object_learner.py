@@ -119,9 +119,11 @@ def targets(boxes: NDArray[np.void], config: DetectorConfig) -> Targets:
     columns = (left + right) / 2 / width, (top + bottom) / 2 / height, (right - left) / width, (bottom - top) / height
     solids, known = solids_of(chosen, focals_of(config))
     return Targets(
-        torch.from_numpy(np.stack(columns, axis=1)), torch.from_numpy(kinds_of(chosen)), torch.from_numpy(solids),
+        torch.from_numpy(np.stack(columns, axis=1)),
+        torch.from_numpy(kinds_of(chosen)),
+        torch.from_numpy(solids),
         torch.from_numpy(known),
-    )  # fmt: skip
+    )
 
 
 def _window(zoom: float) -> tuple[float, float, float]:
@@ -232,9 +234,11 @@ def object_figures(pictures: Sequence[PictureBoxes]) -> dict[str, float]:
     """
     precisions = average_precisions(pictures)
     figures = {
-        "ap50": float(precisions[0]), "ap50_95": float(precisions.mean()),
-        "ap_place": place_precision(pictures), **space_errors(pictures, turned=TURNED),
-    }  # fmt: skip
+        "ap50": float(precisions[0]),
+        "ap50_95": float(precisions.mean()),
+        "ap_place": place_precision(pictures),
+        **space_errors(pictures, turned=TURNED),
+    }
     for number, kind in enumerate(KINDS):
         single = [picture.of_kind(number) for picture in pictures]
         figures[f"ap50_{kind.name.lower()}"] = float(average_precisions(single, (0.5,))[0])

@@ -131,11 +131,15 @@ class SegFormer(nn.Module):
         library = transformers()
         self.encoder: Any = library.SegformerModel(
             library.SegformerConfig(
-                depths=list(config.depths), hidden_sizes=list(config.hidden_sizes),
-                num_attention_heads=list(config.heads), mlp_ratios=[config.mlp_ratio] * 4,
-                hidden_dropout_prob=0.0, attention_probs_dropout_prob=0.0, drop_path_rate=0.1 * (config.dropout > 0),
+                depths=list(config.depths),
+                hidden_sizes=list(config.hidden_sizes),
+                num_attention_heads=list(config.heads),
+                mlp_ratios=[config.mlp_ratio] * 4,
+                hidden_dropout_prob=0.0,
+                attention_probs_dropout_prob=0.0,
+                drop_path_rate=0.1 * (config.dropout > 0),
             )
-        )  # fmt: skip
+        )
         self.projections = nn.ModuleList(nn.Conv2d(size, config.decoder, 1) for size in config.hidden_sizes)
         self.norm = nn.BatchNorm2d(config.decoder)
         self.dropout = nn.Dropout2d(config.dropout)

@@ -52,9 +52,15 @@ def solids_of(boxes: NDArray[np.void], focals: Focals) -> tuple[NDArray[np.float
     known, depth = z >= NEAREST_MIDDLE, np.maximum(z, NEAREST_MIDDLE)
     turned = heading - np.arctan2(x, depth)
     columns = (
-        0.5 + focals.x * x / depth, 0.5 + focals.y * y / depth, np.log(depth),
-        np.log(length), np.log(width), np.log(height), np.sin(turned), np.cos(turned),
-    )  # fmt: skip
+        0.5 + focals.x * x / depth,
+        0.5 + focals.y * y / depth,
+        np.log(depth),
+        np.log(length),
+        np.log(width),
+        np.log(height),
+        np.sin(turned),
+        np.cos(turned),
+    )
     return np.stack(columns, axis=1).astype(np.float32), known
 
 

@@ -98,9 +98,13 @@ class DrivingBatch(DrivingRows):
         start_world(self._network, RowHolder(self, number), self._session_config.world, seeds, scenario.departure)
         marks = scenario.storyboard.landmarks[: self._limits.landmarks]
         write_scenario(
-            scenario, [self._row_of_costs((mark.lane, mark.station), ()) for mark in marks],
-            number, self._drivers, self._guidances, self._drives,
-        )  # fmt: skip
+            scenario,
+            [self._row_of_costs((mark.lane, mark.station), ()) for mark in marks],
+            number,
+            self._drivers,
+            self._guidances,
+            self._drives,
+        )
         self._noted.discard(number)
         self._faulty.discard(number)
         if self._config.exceptions > 0.0:

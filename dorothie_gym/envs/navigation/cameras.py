@@ -92,10 +92,13 @@ class DrivingCameras:
         world = None if face.live is None else face.live.world
         pose = eye.pose_on(float(car["x"]), float(car["y"]), float(car["height"]), float(car["heading"]))
         frame = eye.render_from(
-            pose, arrays, Weather() if world is None else world.weather,
-            time=int(plain(arrays.clock)["frame"][0]) / FRAME_RATE, head_lights=bool(plan["lights"]),
+            pose,
+            arrays,
+            Weather() if world is None else world.weather,
+            time=int(plain(arrays.clock)["frame"][0]) / FRAME_RATE,
+            head_lights=bool(plan["lights"]),
             faults=() if world is None else world.faults,
-        )  # fmt: skip
+        )
         assert frame.rgb is not None  # see `NavigationConfig`
         picture = self.pictures[number]
         picture[:] = frame.rgb

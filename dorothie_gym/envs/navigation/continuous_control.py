@@ -208,7 +208,7 @@ def _encode_objects(world: WorldArrays, vector: Vector, k: int) -> int:
     ego, size = world.vehicles[0], 4 + len(_KINDS)
     count = see(
         world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], ego.x, ego.y, world.clock[0].frame, 0
-    )  # fmt: skip
+    )
     for row in range(min(count, OBSERVED_OBJECTS)):
         body, at = world.seen[row], k + row * size
         dx, dy = body.x - ego.x, body.y - ego.y

@@ -265,14 +265,19 @@ def _icon(text: str) -> NDArray[np.bool_]:
 _ARROWS = {0: _icon(_UP), 45: _icon(_UP_LEFT)}
 _LEFTWARD: Final = _icon(_SWITCH_LEFT)
 _SHAPES = {
-    ActionValue.U_TURN: _icon(_U_TURN), ActionValue.STOP: _icon(_STOP), ActionValue.START: _icon(_START),
+    ActionValue.U_TURN: _icon(_U_TURN),
+    ActionValue.STOP: _icon(_STOP),
+    ActionValue.START: _icon(_START),
     ActionValue.LANE_FOLLOW: _icon(_FOLLOW),
-}  # fmt: skip
+}
 _UNKNOWN = _icon(_OTHER)
 _COLOURS = {
-    ActionValue.J_TURN: (255, 255, 255), ActionValue.LANE_SWITCH: (0, 200, 255), ActionValue.U_TURN: (255, 140, 0),
-    ActionValue.STOP: (255, 40, 40), ActionValue.START: (60, 220, 60),
-}  # fmt: skip
+    ActionValue.J_TURN: (255, 255, 255),
+    ActionValue.LANE_SWITCH: (0, 200, 255),
+    ActionValue.U_TURN: (255, 140, 0),
+    ActionValue.STOP: (255, 40, 40),
+    ActionValue.START: (60, 220, 60),
+}
 
 
 def icon_of(action: ActionValue, sector: int | None) -> NDArray[np.bool_]:

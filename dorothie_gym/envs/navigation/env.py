@@ -116,9 +116,12 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         self._show()
         truncated = ending is Ending.OUT_OF_TIME
         return (
-            batch.observations[0].copy(), float(outcome["reward"]), ending > 0 and not truncated, truncated,
+            batch.observations[0].copy(),
+            float(outcome["reward"]),
+            ending > 0 and not truncated,
+            truncated,
             self._info(),
-        )  # fmt: skip
+        )
 
     def _info(self) -> StepInfo:
         """Returns the info of the last decision, as a new dictionary; what belongs to the end is "" or 0 before."""
@@ -133,9 +136,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         }
         over = bool(self._ending)
         info["is_success"], info["reason"] = over and bool(batch.successes[0]), self._ending.label
-        info["subgoals"] = {
-            "live": int(batch.live_subgoals[0]) * over, "reached": int(outcome["reached"]) * over
-        }  # fmt: skip
+        info["subgoals"] = {"live": int(batch.live_subgoals[0]) * over, "reached": int(outcome["reached"]) * over}
         return info
 
     # --- Pictures -----------------------------------------------------------------------------------------------------

@@ -48,9 +48,12 @@ class Ending(enum.IntEnum):
 
 
 _LABELS = {
-    Ending.NONE: "", Ending.ARRIVED: "arrived", Ending.LEFT_ROAD: "left the road", Ending.GAVE_UP: "gave up",
+    Ending.NONE: "",
+    Ending.ARRIVED: "arrived",
+    Ending.LEFT_ROAD: "left the road",
+    Ending.GAVE_UP: "gave up",
     Ending.OUT_OF_TIME: "out of time",
-}  # fmt: skip
+}
 _NONE, _ARRIVED, _LEFT_ROAD, _GAVE_UP, _OUT_OF_TIME = (int(ending) for ending in Ending)
 
 

@@ -116,9 +116,15 @@ class DrivingRows(CachedViews):
     CACHED_VIEWS: ClassVar[tuple[str, ...]] = ("_rows", "_blanks", "_decisions", "_plans", "outcomes", "infractions")
 
     def __init__(
-        self, town: Town, template: StoryboardTemplate | None, config: NavigationConfig, count: int, threads: int,
-        *, pedals: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        town: Town,
+        template: StoryboardTemplate | None,
+        config: NavigationConfig,
+        count: int,
+        threads: int,
+        *,
+        pedals: bool = False,
+    ) -> None:
         """Prepares for sessions.
 
         Args:
@@ -138,9 +144,11 @@ class DrivingRows(CachedViews):
         self._cost_rows: dict[tuple[Place, tuple[Place, ...]], int] = {}
         first = town.sites[0]
         self._common = DrivingTown(
-            exit_sectors(town), np.zeros((1, len(cost_table(town, (first.lane, first.station)).costs))),
-            float(config.max_seconds), pedals,
-        )  # fmt: skip
+            exit_sectors(town),
+            np.zeros((1, len(cost_table(town, (first.lane, first.station)).costs))),
+            float(config.max_seconds),
+            pedals,
+        )
         self._session_config = config.session_config
         self.frames, self.pedals = self._session_config.frames, pedals
         self.faces: list[DrivingFace | None] = [None] * count

@@ -44,9 +44,12 @@ def blank_world(network: TownNetwork, config: NavigationConfig, *, pedals: bool)
     if config.exceptions > 0.0:
         crowd = AdWizardConfig().crowd_sizes[1]
         world = grown(
-            town_arrays(network), world, vehicles=len(world.vehicles) + crowd,
-            pedestrians=len(world.pedestrians) + crowd, props=1,
-        )  # fmt: skip
+            town_arrays(network),
+            world,
+            vehicles=len(world.vehicles) + crowd,
+            pedestrians=len(world.pedestrians) + crowd,
+            props=1,
+        )
     view = weather.visibility(lights=False)
     plain(world.eye)[0] = (
         0, view.sight, view.fog, view.fog_start, view.rain, view.light, view.lamps, view.clarity, view.is_clear,
@@ -63,14 +66,15 @@ def blank_parts(
     driver = driver_arrays(size, actions, [0] * len(town.streets))
     plain(driver.inputs)["weather"][0] = tuple(Weather().values.values())
     guidance = instructor_arrays(
-        subgoals=limits.subgoals, landmarks=limits.landmarks, streets=limits.streets,
-        things=limits.objects,
-    )  # fmt: skip
+        subgoals=limits.subgoals, landmarks=limits.landmarks, streets=limits.streets, things=limits.objects
+    )
     guidance.now["by_name"] = config.guidance is Guidance.GOALS
     drive = DriveArrays(
-        empty_records(DriveRecord, 1), np.zeros(limits.landmarks, dtype=np.int32),
-        np.full((limits.landmarks, 2), math.inf), empty_records(PlansRecord, 1),
-    )  # fmt: skip
+        empty_records(DriveRecord, 1),
+        np.zeros(limits.landmarks, dtype=np.int32),
+        np.full((limits.landmarks, 2), math.inf),
+        empty_records(PlansRecord, 1),
+    )
     drive.plans["due"] = math.inf
     drive.state["landmark"] = drive.state["goal_lane"] = drive.state["told_lane"] = -1
     drive.state["stage"], drive.state["begins"] = Stage.GUIDING, True
@@ -78,9 +82,13 @@ def blank_parts(
 
 
 def write_scenario(
-    scenario: Scenario, costs: Sequence[int], number: int, drivers: DriverArrays, guidances: InstructorArrays,
+    scenario: Scenario,
+    costs: Sequence[int],
+    number: int,
+    drivers: DriverArrays,
+    guidances: InstructorArrays,
     drives: DriveArrays,
-) -> None:  # fmt: skip
+) -> None:
     """Writes a scenario into the row of a session that has not begun.
 
     Args:

@@ -75,9 +75,14 @@ _WAITS, _NEAR, _IS_LOST, _TOLD = map(int, Event)
 
 @compiled
 def act(
-    town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: DriverArrays, drive: DriveArrays, frames: int,
+    town: TownArrays,
+    exits: ExitArrays,
+    world: WorldArrays,
+    driver: DriverArrays,
+    drive: DriveArrays,
+    frames: int,
     pedals: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Carries out the action of a decision and steps the physics, or lays a new path, as far as Python is not needed.
 
     Args:
@@ -214,9 +219,13 @@ def note_seen(world: WorldArrays) -> None:
 
 @compiled
 def finish(
-    graph: RoutingGraph, common: DrivingTown, world: WorldArrays, guidance: InstructorArrays, episode: EpisodeArrays,
+    graph: RoutingGraph,
+    common: DrivingTown,
+    world: WorldArrays,
+    guidance: InstructorArrays,
+    episode: EpisodeArrays,
     drive: DriveArrays,
-) -> None:  # fmt: skip
+) -> None:
     """Measures progress, and judges the episode unless it begins; see `guide`."""
     state, route, outcome, plan = drive.state[0], guidance.route[0], episode.state[0], world.plan[0]
     last, lane, station = outcome.left, int(plan.lane), plan.station
@@ -332,9 +341,14 @@ def guide_share(
 
 @compiled
 def look_out(
-    town: TownArrays, exits: ExitArrays, graph: RoutingGraph, common: DrivingTown, world: WorldArrays,
-    driver: DriverArrays, state: DriveRecord,
-) -> None:  # fmt: skip
+    town: TownArrays,
+    exits: ExitArrays,
+    graph: RoutingGraph,
+    common: DrivingTown,
+    world: WorldArrays,
+    driver: DriverArrays,
+    state: DriveRecord,
+) -> None:
     """Writes the observation of a driver, which ends the decision."""
     if common.pedals:
         observe_path(world, driver, common.max_seconds)

@@ -80,16 +80,14 @@ _CAUTION: Final[frozenset[SlotValue]] = frozenset({ActionValue.SPEED_CHANGE, Act
 
 _REFERENCES: Final[Mapping[ExceptionKind, frozenset[SlotValue]]] = MappingProxyType(
     {
-        ExceptionKind.WEATHER: frozenset(
-            {ObjectClass.SKY, ObjectClass.GROUND, ObjectClass.WATER, ObjectClass.TERRAIN}
-        ),
+        ExceptionKind.WEATHER: frozenset({ObjectClass.SKY, ObjectClass.GROUND, ObjectClass.WATER, ObjectClass.TERRAIN}),
         ExceptionKind.SPAWN_VEHICLES: frozenset({ObjectClass.VEHICLES}),
         ExceptionKind.SPAWN_PEDESTRIANS: frozenset({ObjectClass.PEDESTRIAN}),
         ExceptionKind.PLACE_PROP: frozenset(OBSTACLES),
         ExceptionKind.MOVE_PROP: frozenset(OBSTACLES),
         ExceptionKind.DELETE_PROP: frozenset(OBSTACLES),
     }
-)  # fmt: skip
+)
 
 _BLOCKED: Final = re.compile(
     r"\b(?:road ?)?block(?:s|ed|ing|ade)?\b|\bobstacles?\b|\bbarriers?\b|\bcones?\b|\bdetour\b|\bdead end\b"

@@ -87,8 +87,9 @@ class Estimate:
 
     def minus(self, other: Estimate) -> Estimate:
         """Returns the paired difference over the seeds that both estimates have."""
-        return Estimate(values={seed: value - other.values[seed] for seed, value in self.values.items()
-                                if seed in other.values})  # fmt: skip
+        return Estimate(
+            values={seed: value - other.values[seed] for seed, value in self.values.items() if seed in other.values}
+        )
 
     def to_json(self) -> dict[str, object]:
         """Returns `mean`, `half_width`, `seeds` (their number) and `values` by seed."""

@@ -19,9 +19,13 @@ REPAIRED_WITHIN: Final = 30.0
 
 ASKS: Final = frozenset(
     {
-        DialogueMove.CONFUSE, DialogueMove.CHECK, DialogueMove.ALIGN, DialogueMove.QUERY_W, DialogueMove.QUERY_YN,
+        DialogueMove.CONFUSE,
+        DialogueMove.CHECK,
+        DialogueMove.ALIGN,
+        DialogueMove.QUERY_W,
+        DialogueMove.QUERY_YN,
     }
-)  # fmt: skip
+)
 """Moves by which a listener asks about what was said."""
 
 _EMPTY: Final = frozenset({"Unknown", "Queried"})

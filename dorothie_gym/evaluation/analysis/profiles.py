@@ -161,9 +161,15 @@ def _per_exchange(moves: Axes, slots: Axes, profiles: Profiles) -> None:
         axes.set_title(axes.get_title(loc="left"), loc="left", fontsize=11, color=INK, pad=_LEGEND_ROOM)
     # between title and axes, where it covers neither bars nor ticks
     moves.legend(
-        frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.01), borderaxespad=0.0,
-        borderpad=0.0, columnspacing=1.2,
-    )  # fmt: skip
+        frameon=False,
+        fontsize=8,
+        ncols=3,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.01),
+        borderaxespad=0.0,
+        borderpad=0.0,
+        columnspacing=1.2,
+    )
 
 
 _LEGEND_ROOM: Final = 36

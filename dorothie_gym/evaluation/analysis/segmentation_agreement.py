@@ -63,7 +63,7 @@ class SegmentationAgreement:
 
 def segmentation_agreement(
     first: Sequence[SegmentedSession], second: Sequence[SegmentedSession]
-) -> SegmentationAgreement:  # fmt: skip
+) -> SegmentationAgreement:
     """Returns the agreement of two annotators of the same sessions.
 
     Args:

@@ -130,10 +130,8 @@ def _borders(utterance: LabelledUtterance) -> dict[tuple[int, int], DialogueAct]
     ends = list(itertools.accumulate(span.words for span in utterance))
     starts = [0, *ends[:-1]]
     return {
-        (start, end): span.act
-        for start, end, span in zip(starts, ends, utterance, strict=True)
-        if span.act is not None
-    }  # fmt: skip
+        (start, end): span.act for start, end, span in zip(starts, ends, utterance, strict=True) if span.act is not None
+    }
 
 
 def _slot_label(act: DialogueAct, slot: Slot) -> str:

@@ -103,9 +103,7 @@ class CrossPlayResult:
         ]
         settings = dict(next(iter(self.cells.values())).settings)
         shared = {name: settings[name] for name in ("ad_wizard", "towns", "sessions_planned", "seed", "config")}
-        return {
-            "co_wizards": list(self.co_wizards), "participants": list(self.participants), **shared, "cells": cells
-        }  # fmt: skip
+        return {"co_wizards": list(self.co_wizards), "participants": list(self.participants), **shared, "cells": cells}
 
     def matrix(self, key: str) -> list[list[str]]:
         """Returns the figures of a metric as text, with intervals; a row for each Co-Wizard."""
@@ -188,5 +186,6 @@ def cross_play(
     }
     return CrossPlayResult(
         co_wizards=tuple(player.name for player in settings.co_wizards),
-        participants=tuple(player.name for player in settings.participants), cells=cells,
-    )  # fmt: skip
+        participants=tuple(player.name for player in settings.participants),
+        cells=cells,
+    )

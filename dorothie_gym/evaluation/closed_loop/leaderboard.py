@@ -38,8 +38,11 @@ OTHER: Final = "other"
 """Part of the leaderboard for rollouts in towns of several parts, or of none."""
 
 PART_TITLES: Final[Mapping[str, str]] = {
-    "seen": "Seen towns", "unseen": "Unseen towns", IMPORTED: "Imported towns", OTHER: "Other towns",
-}  # fmt: skip
+    "seen": "Seen towns",
+    "unseen": "Unseen towns",
+    IMPORTED: "Imported towns",
+    OTHER: "Other towns",
+}
 """Parts of the page and their titles."""
 
 ENOUGH: Final = 100
@@ -313,9 +316,10 @@ def _by_exception(entries: Sequence[LeaderboardEntry], labels: Mapping[str, str]
         for policy, found in tables.items():
             cells = [
                 f"{figure_text(success, found[kind].figures['success'])} of {found[kind].sessions}"
-                if kind in found else "-"
+                if kind in found
+                else "-"
                 for kind in kinds
-            ]  # fmt: skip
+            ]
             rows.append([_name(labels[policy]), *cells])
         lines += ["", f"### {title}, by exception", "", *_table(rows)]
     return lines if len(lines) > 5 else []

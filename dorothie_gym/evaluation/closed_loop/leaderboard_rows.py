@@ -62,9 +62,12 @@ class LeaderboardPlan:
         parts = (*self.parts, *((IMPORTED,) if self.imported else ()))
         return {
             f"{part}-{folder_name(player, Role.CO_WIZARD)}": RolloutSettings(
-                cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, towns=towns[part], sessions=self.sessions,
-                seed=self.seed, config=self.config,
+                cast={**ALL_SCRIPTED, Role.CO_WIZARD: player},
+                towns=towns[part],
+                sessions=self.sessions,
+                seed=self.seed,
+                config=self.config,
             )
             for part in parts
             for player in self.co_wizards
-        }  # fmt: skip
+        }

@@ -31,8 +31,10 @@ _ROLLOUTS: Final = 7
 """Branch of the seed; corpora draw from another, so that no policy is tested on a session that it was trained on."""
 
 _GROUPS: Final[Mapping[str, tuple[str, ...]]] = {
-    "seen": SEEN_TOWNS, "unseen": UNSEEN_TOWNS, "all": (*SEEN_TOWNS, *UNSEEN_TOWNS),
-}  # fmt: skip
+    "seen": SEEN_TOWNS,
+    "unseen": UNSEEN_TOWNS,
+    "all": (*SEEN_TOWNS, *UNSEEN_TOWNS),
+}
 
 
 @dataclass(frozen=True, kw_only=True)

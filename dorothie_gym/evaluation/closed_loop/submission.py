@@ -180,14 +180,23 @@ def check_submission(
         faults += _differences_of_result(root, result)
     played = Role.CO_WIZARD in cast
     claims = claims_of(
-        settings, checked=True, played=played, persona=check.has_persona, usage=bool(result.usage()),
+        settings,
+        checked=True,
+        played=played,
+        persona=check.has_persona,
+        usage=bool(result.usage()),
         run_time=(root / COST_FILE).exists(),
-    )  # fmt: skip
+    )
     drawn = tuple(sorted(check.simulated))
     found = SubmissionCheck(
-        faults=tuple(faults), submission=None, resimulated=drawn, sessions=len(plans), seed=drawn_by, played=played,
+        faults=tuple(faults),
+        submission=None,
+        resimulated=drawn,
+        sessions=len(plans),
+        seed=drawn_by,
+        played=played,
         claims=claims,
-    )  # fmt: skip
+    )
     return found if faults else replace(found, submission=_page(result, check.digests, found))
 
 

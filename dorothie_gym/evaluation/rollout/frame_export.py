@@ -87,11 +87,16 @@ class FrameExport:
         """Returns the settings in JSON types."""
         camera = self.camera
         return {
-            "rate": self.rate, "width": camera.width, "height": camera.height, "field_of_view": camera.field_of_view,
-            "outputs": sorted(output.value for output in camera.outputs), "antialiasing": camera.antialiasing,
-            "shadows": camera.shadows, "layout": self.layout.value,
+            "rate": self.rate,
+            "width": camera.width,
+            "height": camera.height,
+            "field_of_view": camera.field_of_view,
+            "outputs": sorted(output.value for output in camera.outputs),
+            "antialiasing": camera.antialiasing,
+            "shadows": camera.shadows,
+            "layout": self.layout.value,
             "mount": {"forward": camera.mount.forward, "up": camera.mount.up, "pitch": camera.mount.pitch},
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,9 +183,12 @@ def _finished(folder: Path, export: FrameExport) -> ExportedSession | None:
         info = page["info"]
         if info["export"] == export.to_json():
             return ExportedSession(
-                session=info["session"], folder=folder, pictures=len(page["images"]),
-                annotations=len(page["annotations"]), new=False,
-            )  # fmt: skip
+                session=info["session"],
+                folder=folder,
+                pictures=len(page["images"]),
+                annotations=len(page["annotations"]),
+                new=False,
+            )
         reason = "holds frames with other settings"
     except (OSError, ValueError, KeyError, TypeError):
         reason = "exists and holds something else"
@@ -223,9 +231,12 @@ class _Job:
             self.folder.rmdir()  # an empty one, which was checked
         self.part.rename(self.folder)
         return ExportedSession(
-            session=page["info"]["session"], folder=self.folder, pictures=len(images), annotations=len(annotations),
+            session=page["info"]["session"],
+            folder=self.folder,
+            pictures=len(images),
+            annotations=len(annotations),
             new=True,
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ _PARQUET: Final = "data/train-00000-of-00001.parquet"
 
 def export_hugging_face(
     episodes: Iterable[RoleEpisode], role: Role, folder: Path | str, on_session: Callable[[], None] | None = None
-) -> Path:  # fmt: skip
+) -> Path:
     """Writes a folder that `datasets.load_dataset` reads: a row for each decision, and a dataset card.
 
     Columns are `session` (an opaque id), `town`, `decision`, `reward`, `terminated`, `truncated`, and the fields of
@@ -129,7 +129,7 @@ def _hub_card(role: Role, sessions: int, decisions: int, towns: Sequence[str], l
 
 def dataset_card(
     role: Role, sessions: int, decisions: int, towns: Sequence[str], limits: SpaceLimits, observed: str, acted: str
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     """Returns the lines of a card: what the dataset is, and its fields with shapes, units and meanings.
 
     Args:
@@ -142,13 +142,16 @@ def dataset_card(
         acted: prefix of the fields of the action.
     """
     lines = [
-        f"# Sessions of dorothie_gym as the {role} lived through them", "",
+        f"# Sessions of dorothie_gym as the {role} lived through them",
+        "",
         f"{sessions} sessions with {decisions} decisions in {', '.join(towns)}, recorded with dorothie_gym "
         f"{__version__} and simulated again from their seeds and actions. The dataset contains what this role "
         "observed, and nothing that only the other roles know. Rewards are those of the recorded settings. Ids of "
-        "sessions, and their order, follow from what the role observed and did.", "",
-        "| field | shape | unit | meaning |", "|---|---|---|---|",
-    ]  # fmt: skip
+        "sessions, and their order, follow from what the role observed and did.",
+        "",
+        "| field | shape | unit | meaning |",
+        "|---|---|---|---|",
+    ]
     for prefix, fields in ((observed, observation_fields(role, limits)), (acted, action_fields(role, limits))):
         for field in fields:
             shape = "x".join(map(str, field.shape)) or "1"

@@ -42,8 +42,10 @@ STORAGES: Final = ("hdf5", "arrow")
 """Minari's formats of files: TorchRL reads HDF5 only."""
 
 _IDS: Final[Mapping[Role, str]] = {
-    Role.PARTICIPANT: "Participant-v0", Role.CO_WIZARD: "CoWizard-v0", Role.AD_WIZARD: "AdWizard-v0",
-}  # fmt: skip
+    Role.PARTICIPANT: "Participant-v0",
+    Role.CO_WIZARD: "CoWizard-v0",
+    Role.AD_WIZARD: "AdWizard-v0",
+}
 
 
 def export_minari(
@@ -262,9 +264,10 @@ def _description(role: Role, found: Sequence[RoleEpisode], form: _Dicts | _Vecto
     if isinstance(form, _Vectors):
         entries = ", ".join(f"`{name}` {count}" for name, count in form.entries.items())
         lines += [
-            "", "Observations are vectors of the numbers of all fields, in alphabetical order of their names. Actions "
+            "",
+            "Observations are vectors of the numbers of all fields, in alphabetical order of their names. Actions "
             f"are vectors with these fields, and so many entries each: {entries}.",
-        ]  # fmt: skip
+        ]
     return "\n".join(lines)
 
 

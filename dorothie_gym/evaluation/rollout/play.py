@@ -115,7 +115,7 @@ def usage_of(policies: Mapping[Role, AnyPolicy], states: Mapping[Role, Any]) -> 
 
 def with_personas(
     header: SessionHeader, policies: Mapping[Role, AnyPolicy], states: Mapping[Role, object]
-) -> SessionHeader:  # fmt: skip
+) -> SessionHeader:
     """Returns a header that records the personas of policies, by role; the same one where there are none."""
     personas = personas_of(policies, states)
     return replace(header, extra={**header.extra, PERSONAS: personas}) if personas else header
@@ -123,7 +123,7 @@ def with_personas(
 
 def personas_of(
     policies: Mapping[Role, AnyPolicy], states: Mapping[Role, object]
-) -> dict[str, Mapping[str, float | str]]:  # fmt: skip
+) -> dict[str, Mapping[str, float | str]]:
     """Returns the personas of policies, by role; those that have none are left out."""
     found = {str(role): policy.persona_of(states[role]) for role, policy in policies.items()}
     return {role: persona for role, persona in found.items() if persona is not None}

@@ -67,7 +67,7 @@ class RoleEpisode:
 
 def role_episodes(
     entries: Iterable[CorpusEntry], role: Role, sources: ReplaySources | None = None
-) -> Iterator[RoleEpisode]:  # fmt: skip
+) -> Iterator[RoleEpisode]:
     """Yields the sessions of a corpus as a role lived through them.
 
     Args:
@@ -88,7 +88,7 @@ def role_episodes(
 
 def lived_through(
     engine: SessionEngine, role: Role, decisions: Iterable[Mapping[str, ActionDict]], *, source: str
-) -> RoleEpisode:  # fmt: skip
+) -> RoleEpisode:
     """Returns the session of an engine as a role lives through it.
 
     Args:

@@ -250,8 +250,13 @@ ACTION_METRICS: Final[Mapping[str, ActionMetric]] = MappingProxyType(
 """Metrics of NfD. The paper's protocol for actions is the same."""
 
 COLUMNS: Final = (
-    "ufn_move_accuracy", "ufn_slot_f1", "rfn_move_accuracy", "rfn_slot_f1", "nfd_action_accuracy", "nfd_joint_accuracy",
-)  # fmt: skip
+    "ufn_move_accuracy",
+    "ufn_slot_f1",
+    "rfn_move_accuracy",
+    "rfn_slot_f1",
+    "nfd_action_accuracy",
+    "nfd_joint_accuracy",
+)
 """The six columns of the paper's table, in its order."""
 
 SHOWN: Final = (

@@ -20,9 +20,7 @@ NO_HISTORY: Final = "TOTO (- Action History)"
 NO_UTTERANCE: Final = "TOTO (- Current Utterance)"
 NO_MAP: Final = "TOTO (- Map Knowledge)"
 TUNED: Final = "Text Only (Trained Encoder)"
-OTHER_ABLATIONS: Final = (
-    "TOTO (- GT Transcript)", "TOTO (- Objects)", "TOTO (- Object History)", NO_UTTERANCE, NO_MAP,
-)  # fmt: skip
+OTHER_ABLATIONS: Final = ("TOTO (- GT Transcript)", "TOTO (- Objects)", "TOTO (- Object History)", NO_UTTERANCE, NO_MAP)
 """The other ablations of TOTO."""
 
 COUNTERPARTS: Final[Mapping[str, str]] = MappingProxyType(

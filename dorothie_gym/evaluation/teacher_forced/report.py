@@ -369,9 +369,12 @@ def draw_confusions(table: ResultsTable, model: str, path: Path | str) -> Path:
         over = f", mean over {seeds} seeds" if seeds > 1 else ""
         figure.text(0.012, 1 - 0.45 / height, model, fontsize=15, weight="bold")
         figure.text(
-            0.012, 1 - 0.75 / height, f"Per cent of the points of each label (their number){over}", fontsize=10,
+            0.012,
+            1 - 0.75 / height,
+            f"Per cent of the points of each label (their number){over}",
+            fontsize=10,
             color=SOFT,
-        )  # fmt: skip
+        )
         for row, part in enumerate(parts):
             for column, task in enumerate(tasks):
                 matrix = table.confusion(model, part, task)
@@ -408,9 +411,15 @@ def _dot(
     mean, half = 100 * figure.mean, 100 * (figure.half_width or 0.0)
     axes.plot([mean - half, mean + half], [at, at], color=colour, linewidth=1.3, zorder=2)
     axes.plot(
-        [mean], [at], "s" if square else "o", markersize=3.6 if square else 5.2, color=colour,
-        markerfacecolor=colour if filled else SHEET, markeredgewidth=1.2, zorder=3,
-    )  # fmt: skip
+        [mean],
+        [at],
+        "s" if square else "o",
+        markersize=3.6 if square else 5.2,
+        color=colour,
+        markerfacecolor=colour if filled else SHEET,
+        markeredgewidth=1.2,
+        zorder=3,
+    )
 
 
 def _legend(figure: Figure, table: ResultsTable, height: float) -> None:
@@ -450,9 +459,14 @@ def _matrix(axes: Axes, counts: NDArray[np.int64], task: Task, part: str, seeds:
     for row, column in zip(*np.nonzero(shown), strict=True):
         share = shares[row, column]
         axes.text(
-            column, row, f"{100 * share:.0f}", ha="center", va="center", fontsize=7.5,
+            column,
+            row,
+            f"{100 * share:.0f}",
+            ha="center",
+            va="center",
+            fontsize=7.5,
             color="white" if share > 0.55 else INK,
-        )  # fmt: skip
+        )
     labels = [f"{names[k]} ({round(total / seeds)})" for k, total in zip(used, totals[:, 0], strict=True)]
     _dress_matrix(axes, labels, [names[k] for k in used])
     right = float(np.trace(shown)) / max(int(shown.sum()), 1)

@@ -99,7 +99,7 @@ def disagreements(text: SourceText, annotations: Mapping[str, Annotation]) -> tu
     for line in text.lines:
         marks = [
             _layers(line, annotation, start) for annotation, start in zip(annotations.values(), starts, strict=True)
-        ]  # fmt: skip
+        ]
         layers = [layer for layer in Layer if len({each[layer] for each in marks}) > 1]
         spans = [span for annotation in annotations.values() for span in annotation.utterances[line.id]]
         if any(span.act is None for span in spans):
@@ -126,7 +126,7 @@ def _layers(line: SourceLine, annotation: Annotation, starts: UnitStarts) -> dic
     exchanges = [annotation.exchanges.get(number) for number, start in starts.exchanges.items() if start in begin]
     transactions = [
         annotation.transactions.get(number) for number, start in starts.transactions.items() if start in begin
-    ]  # fmt: skip
+    ]
     return {
         Layer.SPANS: tuple(span.words for span in spans),
         Layer.MOVES: tuple(span.move for span in spans for _ in range(span.words)),

@@ -106,9 +106,7 @@ def read_jsonl(path: Path, text: SourceText) -> Annotation:
 
 def _utterance(line: UtteranceLine, text: SourceText) -> UtteranceRow:
     """Returns the row of an utterance, whose words must be those of the session."""
-    spans = [
-        SpanRow(**{name: getattr(span, name) for name in SpanRow.__struct_fields__}) for span in line.spans
-    ]  # fmt: skip
+    spans = [SpanRow(**{name: getattr(span, name) for name in SpanRow.__struct_fields__}) for span in line.spans]
     row = UtteranceRow(line.speaker, line.utterance, spans)
     words = {(known.id.speaker.value, known.id.number): " ".join(known.words) for known in text.lines}
     if words.get((line.speaker, line.utterance)) != line.text:

@@ -262,7 +262,7 @@ class AnnotationLog:
     def _append(self, action: Action, change: Change, label: str, by: str = "", source: str = "") -> None:
         line = LogLine(
             edit=self.edits + 1, action=action, change=rows_of(change), label=label[:80], by=by, source=source
-        )  # fmt: skip
+        )
         self._write(line)
         self._take(line, change)
 

@@ -176,9 +176,7 @@ class Annotation:
 
     def labels(self, text: SourceText) -> list[tuple[LabelledSpan, ...]]:
         """Returns the labelled spans of every utterance, in order; see `span_agreement`."""
-        return [
-            tuple(LabelledSpan(span.words, span.act) for span in self.utterances[line.id]) for line in text.lines
-        ]  # fmt: skip
+        return [tuple(LabelledSpan(span.words, span.act) for span in self.utterances[line.id]) for line in text.lines]
 
     def exchange_spans(self, text: SourceText) -> SegmentedSession:
         """Returns the spans of the session with their exchanges; see `segmentation_agreement`."""

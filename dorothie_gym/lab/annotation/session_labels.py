@@ -153,9 +153,7 @@ def with_labels(
             replaced.setdefault(place, []).append(event)
         for move in record.moves:
             replaced.setdefault(move.index, [])
-    events = [
-        kept for index, event in enumerate(session.events) for kept in replaced.get(index, [event])
-    ]  # fmt: skip
+    events = [kept for index, event in enumerate(session.events) for kept in replaced.get(index, [event])]
     audio = {str(event.data["audio"]) for event in events if "audio" in event.data}
     return replace(
         session,

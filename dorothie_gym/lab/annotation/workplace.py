@@ -239,7 +239,7 @@ class Workplace:
 
     def adopt(
         self, seat: Seat, number: int, base: int, id: UtteranceId, annotator: str, *, again: bool = False
-    ) -> dict[str, Any]:  # fmt: skip
+    ) -> dict[str, Any]:
         """Takes the marks of an annotator for an utterance over into the final version. Errors as `edit`."""
         with self._lock:
             session = self.open(number)

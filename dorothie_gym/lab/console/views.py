@@ -35,9 +35,7 @@ _PROPS, _SENSORS, _WEATHER = tuple(PropKind), tuple(Sensor), tuple(WeatherParame
 _DRIVING: Final = frozenset({ObjectClass.VEHICLES})
 
 
-def role_view(
-    role: Role, observation: ObservationMapping, mask: Mapping[str, Any], places: LaneLookup
-) -> RoleView:  # fmt: skip
+def role_view(role: Role, observation: ObservationMapping, mask: Mapping[str, Any], places: LaneLookup) -> RoleView:
     """Returns the view of a role.
 
     Args:

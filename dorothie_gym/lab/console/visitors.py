@@ -94,9 +94,7 @@ class Visitor:
         """Returns whether its time is over; `now` is the clock [s]."""
         if self.known and (self.socket or self.served):
             return False
-        return now - self.since > (
-            KNOWN_SECONDS if self.known else ANSWER_SECONDS if self.served else STRANGER_SECONDS
-        )  # fmt: skip
+        return now - self.since > (KNOWN_SECONDS if self.known else ANSWER_SECONDS if self.served else STRANGER_SECONDS)
 
     def rank(self) -> tuple[bool, float]:
         """Returns a key by which connections give way, smallest first."""
@@ -112,9 +110,7 @@ class Visitors:
         known: most connections with one.
     """
 
-    def __init__(
-        self, clock: Callable[[], float], *, strangers: int = MOST_STRANGERS, known: int = MOST_KNOWN
-    ) -> None:  # fmt: skip
+    def __init__(self, clock: Callable[[], float], *, strangers: int = MOST_STRANGERS, known: int = MOST_KNOWN) -> None:
         self._clock = clock
         self._most_strangers, self._most_known = strangers, known
         self._strangers: dict[Visitor, None] = {}
@@ -128,7 +124,7 @@ class Visitors:
         now = self._clock()
         visitor = Visitor(
             address=network_of(peer[0] if isinstance(peer, tuple) else None), transport=transport, since=now
-        )  # fmt: skip
+        )
         if self._closed:
             transport.abort()
             return visitor

@@ -29,9 +29,7 @@ class Windscreen:
 
     def prepare(self, session: LiveSession) -> None:
         """Builds the scene of a session, which takes seconds where it is not in the cache."""
-        camera = windscreen_camera(
-            session.world.town, session.scenario, session.config, self._config.picture_size
-        )  # fmt: skip
+        camera = windscreen_camera(session.world.town, session.scenario, session.config, self._config.picture_size)
         self._session, self._camera = session, camera
 
     def is_ready(self, session: LiveSession) -> bool:

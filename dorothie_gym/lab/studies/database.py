@@ -25,8 +25,12 @@ LOCK_FILE: Final = "run.lock"
 
 
 _PRAGMAS: Final = (
-    "journal_mode=DELETE", "synchronous=FULL", "secure_delete=ON", "foreign_keys=ON", "temp_store=MEMORY",
-)  # fmt: skip
+    "journal_mode=DELETE",
+    "synchronous=FULL",
+    "secure_delete=ON",
+    "foreign_keys=ON",
+    "temp_store=MEMORY",
+)
 """Settings of each connection; temporary tables in memory, so that no copies lie in other folders."""
 
 

@@ -88,8 +88,12 @@ class StudyRecords:
             number = 1 + (self.data.value("SELECT max(number) FROM participants") or 0)
             self.data.run(
                 "INSERT INTO participants (id, secret, stage, seen, number) VALUES (?, ?, ?, ?, ?)",
-                name, digest(secret), Stage.CONSENT.value, time.time(), number,
-            )  # fmt: skip
+                name,
+                digest(secret),
+                Stage.CONSENT.value,
+                time.time(),
+                number,
+            )
             used, tab = (None if text is None else digest(text) for text in (invitation, visit))
             self.data.run("UPDATE invitations SET used = 1 WHERE token = ?", used)
             self.data.run("INSERT INTO visits VALUES (?, ?, ?)", name, used, tab)
@@ -131,16 +135,15 @@ class StudyRecords:
         """Returns the id of the participant at the consent whom a tab has brought; None if there is none."""
         name: str | None = self.data.value(
             "SELECT id FROM visits JOIN participants ON id = participant WHERE visit = ? AND stage = ?",
-            digest(visit), Stage.CONSENT.value,
-        )  # fmt: skip
+            digest(visit),
+            Stage.CONSENT.value,
+        )
         return name
 
     def renew_secret(self, name: str) -> str:
         """Returns a new secret for the browser of a participant; the old one is void."""
         secret = secrets.token_urlsafe(32)
-        self.data.run(
-            "UPDATE participants SET secret = ?, seen = ? WHERE id = ?", digest(secret), time.time(), name
-        )  # fmt: skip
+        self.data.run("UPDATE participants SET secret = ?, seen = ? WHERE id = ?", digest(secret), time.time(), name)
         return secret
 
     def platform_ids(self, name: str, key: str) -> list[str]:
@@ -201,8 +204,12 @@ class StudyRecords:
             for item, value in answers.items():
                 self.data.run(
                     "INSERT OR REPLACE INTO answers VALUES (?, ?, ?, ?, ?)",
-                    name, questionnaire, position, item, json.dumps(value, ensure_ascii=False),
-                )  # fmt: skip
+                    name,
+                    questionnaire,
+                    position,
+                    item,
+                    json.dumps(value, ensure_ascii=False),
+                )
 
     # --- invitations ------------------------------------------------------------------------------------------------
 
@@ -246,8 +253,9 @@ class StudyRecords:
         with self.data.transaction():
             name: str | None = self.data.value(
                 "SELECT participant FROM readmissions WHERE token = ? AND (visit IS NULL OR visit = ?)",
-                digest(token), tab,
-            )  # fmt: skip
+                digest(token),
+                tab,
+            )
             if name is not None:
                 self.data.run("UPDATE readmissions SET visit = ? WHERE participant = ?", tab, name)
         return name
@@ -270,9 +278,14 @@ class StudyRecords:
                 self.data.run(
                     "INSERT INTO sessions (id, group_id, position, condition, town, storyboard, seed) "
                     "VALUES (?, ?, ?, ?, ?, ?, ?)",
-                    f"S{number:05d}-{position + 1:02d}", number, position, condition, scenario.town,
-                    scenario.storyboard, seed,
-                )  # fmt: skip
+                    f"S{number:05d}-{position + 1:02d}",
+                    number,
+                    position,
+                    condition,
+                    scenario.town,
+                    scenario.storyboard,
+                    seed,
+                )
         return Group(id=number, slot=slot.number, members=dict(members))
 
     def group_of(self, name: str) -> Group | None:
@@ -305,26 +318,39 @@ class StudyRecords:
         rows = self.data.rows("SELECT * FROM sessions WHERE ? IS NULL OR group_id = ? ORDER BY id", group, group)
         return [
             SessionRow(
-                id=row["id"], group=row["group_id"], position=row["position"], condition=row["condition"],
-                town=row["town"], storyboard=row["storyboard"], seed=row["seed"], folder=row["folder"],
+                id=row["id"],
+                group=row["group_id"],
+                position=row["position"],
+                condition=row["condition"],
+                town=row["town"],
+                storyboard=row["storyboard"],
+                seed=row["seed"],
+                folder=row["folder"],
                 reason=row["reason"],
             )
             for row in rows
-        ]  # fmt: skip
+        ]
 
     def set_folder(self, session: str, folder: str | None) -> None:
         """Notes the folder in which a session is recorded; one that is withdrawn keeps none."""
         self.data.run(
             "UPDATE sessions SET folder = ? WHERE id = ? AND (? IS NULL OR reason IS NOT ?)",
-            folder, session, folder, WITHDRAWN,
-        )  # fmt: skip
+            folder,
+            session,
+            folder,
+            WITHDRAWN,
+        )
 
     def finish_session(self, session: str, reason: str, *, success: bool | None, seconds: float | None) -> None:
         """Notes the end of a session; one that is withdrawn stays so."""
         self.data.run(
             "UPDATE sessions SET reason = ?, success = ?, seconds = ? WHERE id = ? AND reason IS NOT ?",
-            reason, None if success is None else int(success), seconds, session, WITHDRAWN,
-        )  # fmt: skip
+            reason,
+            None if success is None else int(success),
+            seconds,
+            session,
+            WITHDRAWN,
+        )
 
     # --- erasure ----------------------------------------------------------------------------------------------------
 

@@ -79,7 +79,7 @@ class RoomBuilder:
             town_page(engine.town)
         return Room(
             engine, plans, config, seed=row.seed, folder=self._folder, name=row.id, extra=extra, resumed=resumed
-        )  # fmt: skip
+        )
 
     def state(self, row: SessionRow) -> SessionState:
         """Returns the state of the record of a session."""

@@ -128,9 +128,14 @@ class StudyServer:
                     self._presence.tell()
 
         actions: dict[str, Callable[[Request], Awaitable[Response]]] = {
-            "join": self._join, "news": self._news, "consent": self._consent, "answers": self._answers,
-            "proceed": self._proceed, "wait": self._wait, "withdraw": self._withdraw,
-        }  # fmt: skip
+            "join": self._join,
+            "news": self._news,
+            "consent": self._consent,
+            "answers": self._answers,
+            "proceed": self._proceed,
+            "wait": self._wait,
+            "withdraw": self._withdraw,
+        }
         routes = [
             files.page("/", "study.html"),
             *(Route(f"/study/{name}", self._guarded(run), methods=["POST"]) for name, run in actions.items()),

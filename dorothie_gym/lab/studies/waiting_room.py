@@ -121,12 +121,10 @@ class WaitingRoom:
         now, order = time.monotonic(), list(CERTAINTY)
         found.sort(key=lambda each: (order.index(each.stage), self._waiting_since.get(each.id, now)))
         return [
-            Candidate(
-                name=each.id, role=each.role, certainty=CERTAINTY[each.stage], movable=each.stage in MOVABLE
-            )
+            Candidate(name=each.id, role=each.role, certainty=CERTAINTY[each.stage], movable=each.stage in MOVABLE)
             for each in found
             if each.role is not None
-        ]  # fmt: skip
+        ]
 
     # --- sessions ---------------------------------------------------------------------------------------------------
 

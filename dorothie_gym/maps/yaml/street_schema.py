@@ -9,9 +9,7 @@ from dataclasses import dataclass
 from dorothie_gym.maps.yaml.entries import YamlEntry
 from dorothie_gym.maps.yaml.plan import Bend, CourseStep, JunctionPlan, StreetPlan
 
-STREET_KEYS = (
-    "through", "lanes", "one_way", "ramp", "median", "turn_lanes", "speed", "width", "radius", "sidewalk",
-)  # fmt: skip
+STREET_KEYS = ("through", "lanes", "one_way", "ramp", "median", "turn_lanes", "speed", "width", "radius", "sidewalk")
 SPEED_RANGE = (5.0, 130.0)
 """Range of speed limits [km/h]."""
 WIDTH_RANGE = (2.5, 6.0)

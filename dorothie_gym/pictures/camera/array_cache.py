@@ -29,9 +29,14 @@ Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])
 
 
 def through_cache(
-    folder: str, key: bytes, most: int, *, build: Callable[[], Kept], pack: Callable[[Kept], Arrays],
+    folder: str,
+    key: bytes,
+    most: int,
+    *,
+    build: Callable[[], Kept],
+    pack: Callable[[Kept], Arrays],
     unpack: Callable[[Arrays], Kept],
-) -> Kept:  # fmt: skip
+) -> Kept:
     """Returns what the user's cache holds under a key, or builds it and adds it to the cache.
 
     A damaged entry is replaced (`user_cache.read_signed`). A cache that cannot be written is logged at level DEBUG and

@@ -48,9 +48,12 @@ def _build() -> CameraAssets:
 def _pack(assets: CameraAssets) -> Arrays:
     bank = assets.bank
     return {
-        **columns("atlas", assets.atlas), **columns("mesh", bank.mesh), "ranges": bank.ranges, "boxes": bank.boxes,
+        **columns("atlas", assets.atlas),
+        **columns("mesh", bank.mesh),
+        "ranges": bank.ranges,
+        "boxes": bank.boxes,
         "noise": assets.noise,
-    }  # fmt: skip
+    }
 
 
 def _unpack(arrays: Arrays) -> CameraAssets:

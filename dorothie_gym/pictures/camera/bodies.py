@@ -21,9 +21,15 @@ _ROUNDED = 0.01  # [m] more than rounding moves the plane of a triangle
 
 @concurrent
 def copy_bodies(
-    view: View, tiles: NDArray[np.float32], bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32],
-    bodies: RecordArray[PlacementRecord], box: Array, target: Mesh,
-) -> int:  # fmt: skip
+    view: View,
+    tiles: NDArray[np.float32],
+    bank: Mesh,
+    ranges: NDArray[np.int32],
+    boxes: NDArray[np.float32],
+    bodies: RecordArray[PlacementRecord],
+    box: Array,
+    target: Mesh,
+) -> int:
     """Writes the triangles of bodies that may be seen; returns their number, or one larger than the room if need be.
 
     Triangles that are seen from behind are left out.

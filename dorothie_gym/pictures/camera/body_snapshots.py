@@ -26,9 +26,10 @@ class BodySnapshot(NamedTuple):
 def snapshot_of(bodies: Bodies) -> BodySnapshot:
     """Returns a copy of the bodies of a world."""
     return BodySnapshot(
-        _copy(VehicleRecord, bodies.vehicles), _copy(PedestrianRecord, bodies.pedestrians),
+        _copy(VehicleRecord, bodies.vehicles),
+        _copy(PedestrianRecord, bodies.pedestrians),
         _copy(PropRecord, bodies.props),
-    )  # fmt: skip
+    )
 
 
 def bodies_between(before: BodySnapshot, after: BodySnapshot, share: float) -> BodySnapshot:

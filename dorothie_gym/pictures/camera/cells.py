@@ -82,9 +82,12 @@ def new_order(cells: CellTable, width: int, height: int) -> CellOrder:
     """Returns scratch space for some cells and a picture."""
     count, rows, columns = len(cells.ranges), -(-height // TILE), -(-width // TILE)
     return CellOrder(
-        np.zeros(_RINGS + 1, np.int32), np.zeros(count, np.int32), np.zeros(count, np.int32),
-        np.zeros((rows, columns), np.float32), np.full(columns * TILE, np.inf, np.float32),
-    )  # fmt: skip
+        np.zeros(_RINGS + 1, np.int32),
+        np.zeros(count, np.int32),
+        np.zeros(count, np.int32),
+        np.zeros((rows, columns), np.float32),
+        np.full(columns * TILE, np.inf, np.float32),
+    )
 
 
 @concurrent
@@ -116,9 +119,14 @@ def draw_cells(
 
 @concurrent
 def draw_more_cells(
-    view: View, buffer: VisibilityBuffer, mesh: Mesh, cells: CellTable, scratch: CellOrder,
-    tiles: NDArray[np.float32], number: int,
-) -> int:  # fmt: skip
+    view: View,
+    buffer: VisibilityBuffer,
+    mesh: Mesh,
+    cells: CellTable,
+    scratch: CellOrder,
+    tiles: NDArray[np.float32],
+    number: int,
+) -> int:
     """Draws the cells of a smaller mesh to a buffer whose tiles are known; otherwise as `draw_cells`."""
     _sort_cells(view, cells, scratch)
     drawn = 0
@@ -129,9 +137,15 @@ def draw_more_cells(
 
 @compiled
 def _draw_ring(
-    view: View, buffer: VisibilityBuffer, mesh: Mesh, cells: CellTable, scratch: CellOrder,
-    tiles: NDArray[np.float32], ring: int, number: int,
-) -> int:  # fmt: skip
+    view: View,
+    buffer: VisibilityBuffer,
+    mesh: Mesh,
+    cells: CellTable,
+    scratch: CellOrder,
+    tiles: NDArray[np.float32],
+    ring: int,
+    number: int,
+) -> int:
     """Draws the cells of one distance."""
     drawn, found = 0, 0
     for k in range(scratch.rings[ring], scratch.rings[ring + 1]):
@@ -205,10 +219,16 @@ def find_tiles(view: View, buffer: VisibilityBuffer, scratch: CellOrder) -> None
 
 @inlined
 def _find_line(
-    line: NDArray[np.float32], a: NDArray[np.float32], b: NDArray[np.float32], c: NDArray[np.float32],
-    d: NDArray[np.float32], e: NDArray[np.float32], f: NDArray[np.float32], g: NDArray[np.float32],
+    line: NDArray[np.float32],
+    a: NDArray[np.float32],
+    b: NDArray[np.float32],
+    c: NDArray[np.float32],
+    d: NDArray[np.float32],
+    e: NDArray[np.float32],
+    f: NDArray[np.float32],
+    g: NDArray[np.float32],
     h: NDArray[np.float32],
-) -> None:  # fmt: skip
+) -> None:
     """Writes the smallest value in each column of `TILE` rows; written so that the compiler makes vectors of it."""
     for k in range(len(a)):
         line[k] = min(min(min(a[k], b[k]), min(c[k], d[k])), min(min(e[k], f[k]), min(g[k], h[k])))

@@ -35,7 +35,7 @@ from dorothie_gym.pictures.camera.samples import (
     UP,
     Samples,
     whole_vectors,
-)  # fmt: skip
+)
 from dorothie_gym.pictures.camera.shadows import TEXEL
 from dorothie_gym.pictures.camera.texturing import Textures, sample_texture
 from dorothie_gym.support.compilation import compiled, inlined
@@ -75,9 +75,14 @@ class Face(NamedTuple):
 def new_faces() -> Face:
     """Returns scratch space for the triangles that were seen last, each at its number modulo `FACES`."""
     return Face(
-        np.zeros((FACES, 4)), np.zeros((FACES, 3)), np.zeros((FACES, 4)), np.zeros((FACES, 4)), np.zeros((FACES, 4)),
-        np.zeros((FACES, 4)), np.zeros((FACES, 3), np.int64),
-    )  # fmt: skip
+        np.zeros((FACES, 4)),
+        np.zeros((FACES, 3)),
+        np.zeros((FACES, 4)),
+        np.zeros((FACES, 4)),
+        np.zeros((FACES, 4)),
+        np.zeros((FACES, 4)),
+        np.zeros((FACES, 3), np.int64),
+    )
 
 
 @gives_row
@@ -166,8 +171,11 @@ def add_face(optics: Optics, textures: Textures, samples: Samples, face: Face, f
         _place_texture(optics, values, face, count)
         table, number = textures.table, face.kind[1]
         start, width, height, levels = (
-            int(table[number, 0]), int(table[number, 1]), int(table[number, 2]), int(table[number, 3])
-        )  # fmt: skip
+            int(table[number, 0]),
+            int(table[number, 1]),
+            int(table[number, 2]),
+            int(table[number, 3]),
+        )
         for k in range(count):
             r, g, b, own = sample_texture(
                 textures.texels, start, width, height, levels - 1, values[ONE + k], values[TWO + k], values[THREE + k],

@@ -14,7 +14,7 @@ from dorothie_gym.pictures.camera.lighting import (
     head_light,
     lamp_light,
     mirrored_share,
-)  # fmt: skip
+)
 from dorothie_gym.pictures.camera.mesh import Surface
 from dorothie_gym.pictures.camera.optics import Optics, ray
 from dorothie_gym.pictures.camera.samples import (
@@ -42,7 +42,7 @@ from dorothie_gym.pictures.camera.samples import (
     X,
     Y,
     Z,
-)  # fmt: skip
+)
 from dorothie_gym.pictures.camera.shadows import REACH, STEPS, TEXEL, ShadowMaps, sunlit
 from dorothie_gym.support.compilation import compiled, inlined
 
@@ -53,7 +53,7 @@ _GLOW = (0.8, 0.69, 0.5)  # factors of the light of lit windows
 @compiled
 def light_samples(
     optics: Optics, lamps: LampMap, beams: HeadLights, shadows: ShadowMaps, samples: Samples, count: int
-) -> None:  # fmt: skip
+) -> None:
     """Changes the colours of surfaces to those that the camera sees of them, 0..255.
 
     Args:

@@ -38,9 +38,10 @@ class Labels(NamedTuple):
 def new_labels(width: int, height: int) -> Labels:
     """Returns labels of a picture of the sky."""
     return Labels(
-        np.full((height, width), np.inf, np.float32), np.full((height, width), _SKY_CLASS, np.uint8),
+        np.full((height, width), np.inf, np.float32),
+        np.full((height, width), _SKY_CLASS, np.uint8),
         np.zeros((height, width), np.int32),
-    )  # fmt: skip
+    )
 
 
 @concurrent
@@ -139,9 +140,10 @@ def plane_of(view: View, mesh: Mesh, row: int) -> tuple[float, float, float, flo
     origin, axes = view.origin, view.axes
     x, y, z = float(mesh.normals[row, 0]), float(mesh.normals[row, 1]), float(mesh.normals[row, 2])
     offset = (
-        x * (mesh.corners[row, 0, 0] - origin[0]) + y * (mesh.corners[row, 0, 1] - origin[1])
+        x * (mesh.corners[row, 0, 0] - origin[0])
+        + y * (mesh.corners[row, 0, 1] - origin[1])
         + z * (mesh.corners[row, 0, 2] - origin[2])
-    )  # fmt: skip
+    )
     return (
         offset,
         x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2],

@@ -187,9 +187,14 @@ class MeshBuilder:
         faces = [points, points[[3, 2, 1, 0]]] if two_sided else [points]
         for face in faces:
             self.triangles(
-                face[_QUAD], colour=colour, kind=kind, coordinates=places[_QUAD], texture=texture, surface=surface,
+                face[_QUAD],
+                colour=colour,
+                kind=kind,
+                coordinates=places[_QUAD],
+                texture=texture,
+                surface=surface,
                 instance=instance,
-            )  # fmt: skip
+            )
 
     def panel(
         self,
@@ -256,9 +261,14 @@ class MeshBuilder:
             repeats = (1.0, 1.0) if repeat is None else (_whole(width, repeat[0]), _whole(high - low, repeat[1]))
             # seen from outside, the wall runs from the later corner on the left to the earlier one on the right
             self.quad(
-                [lower[after], upper[after], upper[k], lower[k]], colour=colour, kind=kind, repeats=repeats,
-                texture=texture, surface=surface, instance=instance,
-            )  # fmt: skip
+                [lower[after], upper[after], upper[k], lower[k]],
+                colour=colour,
+                kind=kind,
+                repeats=repeats,
+                texture=texture,
+                surface=surface,
+                instance=instance,
+            )
         fan = np.array([[0, k, k + 1] for k in range(1, count - 1)])
         if closed[1]:
             self.triangles(upper[fan], colour=cap, kind=kind, surface=surface, instance=instance)

@@ -20,7 +20,7 @@ from dorothie_gym.pictures.camera.ground.colours import (
     noise_at,
     noise_place,
     patch_weight,
-)  # fmt: skip
+)
 from dorothie_gym.pictures.camera.ground.lookup import (
     PARTS,
     SEVERAL,
@@ -28,7 +28,7 @@ from dorothie_gym.pictures.camera.ground.lookup import (
     material_of_square,
     materials_between,
     part_of,
-)  # fmt: skip
+)
 from dorothie_gym.pictures.camera.mesh import Surface
 from dorothie_gym.pictures.camera.optics import Optics
 from dorothie_gym.pictures.camera.samples import (
@@ -55,7 +55,7 @@ from dorothie_gym.pictures.camera.samples import (
     X,
     Y,
     whole_vectors,
-)  # fmt: skip
+)
 from dorothie_gym.support.compilation import compiled, inlined
 
 _GROUND = int(Surface.GROUND)
@@ -103,7 +103,7 @@ def _noise(noise: NDArray[np.uint8], values: Array, places: NDArray[np.int64], k
 @inlined
 def _add_mixed(
     ground: GroundArrays, sheet: int, inverse: float, values: Array, places: NDArray[np.int64], k: int, step: float
-) -> int:  # fmt: skip
+) -> int:
     """Writes the colour of a sample with several materials around, as `colour_at` does, and returns `_DONE`.
 
     If both samples that count first show one material, it is returned instead.

@@ -97,9 +97,7 @@ def clear(buffer: VisibilityBuffer) -> None:
 
 
 @concurrent
-def draw_triangles(
-    view: View, buffer: VisibilityBuffer, mesh: Mesh, first: int, last: int, number: int
-) -> None:  # fmt: skip
+def draw_triangles(view: View, buffer: VisibilityBuffer, mesh: Mesh, first: int, last: int, number: int) -> None:
     """Draws a range of a mesh's triangles, of which the first has a number."""
     found = collect_triangles(view, buffer, mesh, first, last, 0, number - first)
     draw_collected(view, buffer, mesh, found, number - first)
@@ -108,7 +106,7 @@ def draw_triangles(
 @compiled
 def collect_triangles(
     view: View, buffer: VisibilityBuffer, mesh: Mesh, first: int, last: int, found: int, shift: int
-) -> int:  # fmt: skip
+) -> int:
     """Adds those of a range of triangles that may cover a sample to the collected ones, and draws these if need be.
 
     Args:

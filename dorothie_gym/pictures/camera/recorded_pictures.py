@@ -182,10 +182,13 @@ class RecordedPictures:
             odometers = np.maximum(odometers + moment.seconds * np.abs(actors["speed"]), 0.0)
         columns: dict[str, NDArray[np.generic]] = {
             **{name: actors[name] for name in ("x", "y", "heading", "speed", "length", "width")},
-            "cos": pn.cos(actors["heading"]), "sin": pn.sin(actors["heading"]), "key": self.keys[moment.rows],
-            "height": _between(self._heights, moment), "odometer": odometers,
+            "cos": pn.cos(actors["heading"]),
+            "sin": pn.sin(actors["heading"]),
+            "key": self.keys[moment.rows],
+            "height": _between(self._heights, moment),
+            "odometer": odometers,
             "acceleration": _between(self._accelerations, moment),
-        }  # fmt: skip
+        }
         driving = np.isin(kinds, [int(kind) for kind in _KINDS])
         walking, standing = kinds == int(ActorKind.PEDESTRIAN), kinds == int(ActorKind.PROP)
         vehicles = _records(VehicleRecord, columns, driving)

@@ -98,6 +98,8 @@ def whole_vectors(count: int) -> int:
 def new_samples() -> Samples:
     """Returns room for samples."""
     return Samples(
-        np.zeros(_QUANTITIES * _STRETCH), np.zeros(_INDICES * _STRETCH, np.int64), np.zeros(ROOM, np.uint8),
+        np.zeros(_QUANTITIES * _STRETCH),
+        np.zeros(_INDICES * _STRETCH, np.int64),
         np.zeros(ROOM, np.uint8),
-    )  # fmt: skip
+        np.zeros(ROOM, np.uint8),
+    )

@@ -36,9 +36,13 @@ def town_scene(town: Town) -> TownScene:
         return build_town_scene(town)
 
     return through_cache(
-        "scenes", pack(town, ""), SCENES_KEPT, build=build, pack=scene_arrays,
+        "scenes",
+        pack(town, ""),
+        SCENES_KEPT,
+        build=build,
+        pack=scene_arrays,
         unpack=lambda arrays: scene_of(arrays, town),
-    )  # fmt: skip
+    )
 
 
 def scene_arrays(scene: TownScene) -> Arrays:
@@ -46,10 +50,14 @@ def scene_arrays(scene: TownScene) -> Arrays:
     lots = [(lot.site, *lot.place, lot.heading, *lot.front, lot.length, lot.depth) for lot in scene.lots]
     return {
         "lots": np.array(lots, dtype=np.float64).reshape(-1, 8),
-        **columns("mesh", scene.mesh), **columns("cells", scene.cells), **columns("ground", scene.ground.arrays),
-        **columns("signals", scene.signals), **columns("lenses", scene.lenses), **columns("lamps", scene.lamps),
+        **columns("mesh", scene.mesh),
+        **columns("cells", scene.cells),
+        **columns("ground", scene.ground.arrays),
+        **columns("signals", scene.signals),
+        **columns("lenses", scene.lenses),
+        **columns("lamps", scene.lamps),
         **columns("slopes", scene.slopes),
-    }  # fmt: skip
+    }
 
 
 def scene_of(arrays: Arrays, town: Town) -> TownScene:

@@ -127,9 +127,7 @@ def _sample(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) 
 
 
 @compiled
-def _place_of(
-    upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int
-) -> tuple[float, float, float]:  # fmt: skip
+def _place_of(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) -> tuple[float, float, float]:
     """Returns the middle and the share of the samples of a pixel that see the triangle of sample k.
 
     The share is 0 if an earlier sample sees it, too.

@@ -170,9 +170,7 @@ def _draw_tiles(
 
 
 @inlined
-def _is_tile_in_view(
-    view: View, maps: ShadowMaps, column: int, row: int, lowest: float, highest: float
-) -> bool:  # fmt: skip
+def _is_tile_in_view(view: View, maps: ShadowMaps, column: int, row: int, lowest: float, highest: float) -> bool:
     """Returns whether the picture may show surfaces between two heights [m] whose light crosses a tile."""
     box = maps.corners
     for axis in range(2):
@@ -219,9 +217,14 @@ def _shades(maps: ShadowMaps, low: Array, high: Array, column: int, row: int) ->
 
 @compiled
 def _draw_bodies(
-    view: View, maps: ShadowMaps, bank: Mesh, ranges: NDArray[np.int32], boxes: NDArray[np.float32],
-    bodies: RecordArray[PlacementRecord], lowest: float,
-) -> None:  # fmt: skip
+    view: View,
+    maps: ShadowMaps,
+    bank: Mesh,
+    ranges: NDArray[np.int32],
+    boxes: NDArray[np.float32],
+    bodies: RecordArray[PlacementRecord],
+    lowest: float,
+) -> None:
     """Draws the map of bodies, those near its middle whose shadows may be seen on surfaces from a height on [m]."""
     squares = maps.bodies[0:_BODIES, 0:_BODIES]  # a part, as tiles are: `_cast` is compiled once
     first, reach, box = maps.window, 0.5 * _BODIES * TEXEL, maps.corners
@@ -267,7 +270,7 @@ def _note_part(maps: ShadowMaps, box: Array) -> None:
 @inlined
 def _is_shadow_in_view(
     view: View, maps: ShadowMaps, body: PlacementRecord, model: NDArray[np.float32], lowest: float
-) -> bool:  # fmt: skip
+) -> bool:
     """Returns whether a body, or what lies behind it from the sun down to a height [m], touches the picture."""
     box = maps.corners
     surround(body, model, box)

@@ -32,7 +32,7 @@ from dorothie_gym.pictures.camera.samples import (
     X,
     Y,
     whole_vectors,
-)  # fmt: skip
+)
 from dorothie_gym.support import portable_arrays as pn
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, inlined
@@ -59,7 +59,7 @@ def sky_noise() -> NDArray[np.float32]:
 @compiled
 def add_sky(
     optics: Optics, light: Daylight, noise: NDArray[np.float32], samples: Samples, first: int, count: int
-) -> None:  # fmt: skip
+) -> None:
     """Writes colours of samples from `first` on that see the sky."""
     values = samples.values[first:]
     _place_sky(optics, light, values, count)

@@ -69,9 +69,11 @@ def sample_texture(
         total, scale = _mixed_texel(texels, first, width, height, u * wide, v * high), 1.0
     share = scale * (1.0 / 255.0)
     return (
-        (total & 0xFFFF) * share, ((total >> 32) & 0xFFFF) * share, ((total >> 16) & 0xFFFF) * share,
+        (total & 0xFFFF) * share,
+        ((total >> 32) & 0xFFFF) * share,
+        ((total >> 16) & 0xFFFF) * share,
         ((total >> 48) & 0xFFFF) * scale,
-    )  # fmt: skip
+    )
 
 
 @inlined
@@ -83,9 +85,11 @@ def _mixed_texel(texels: NDArray[np.uint32], first: int, width: int, height: int
     left, below = (right - 1) & (width - 1), first + ((above - 1) & (height - 1)) * width
     above, both = first + above * width, (a * b) >> 8  # the weights sum up to 256
     mixed = (
-        _spread(int(texels[below + left])) * (256 - a - b + both) + _spread(int(texels[below + right])) * (a - both)
-        + _spread(int(texels[above + left])) * (b - both) + _spread(int(texels[above + right])) * both
-    )  # fmt: skip
+        _spread(int(texels[below + left])) * (256 - a - b + both)
+        + _spread(int(texels[below + right])) * (a - both)
+        + _spread(int(texels[above + left])) * (b - both)
+        + _spread(int(texels[above + right])) * both
+    )
     return (mixed >> 8) & _LANES
 
 

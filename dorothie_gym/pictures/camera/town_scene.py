@@ -77,9 +77,14 @@ class SessionScene:
         blades = int(town.mesh.textures.max(initial=0)) + 1 - STREET_NAMES
         names = [*self.street_names, *[""] * (blades - len(self.street_names))]
         return CameraScene(
-            town=town.mesh, cells=town.cells, ground=town.ground.arrays, lamps=town.lamps, bank=assets.bank,
-            atlas=with_street_names(assets.atlas, names), noise=assets.noise,
-        )  # fmt: skip
+            town=town.mesh,
+            cells=town.cells,
+            ground=town.ground.arrays,
+            lamps=town.lamps,
+            bank=assets.bank,
+            atlas=with_street_names(assets.atlas, names),
+            noise=assets.noise,
+        )
 
     @cached_property
     def overlay(self) -> Mesh:

@@ -47,8 +47,12 @@ class Panel:
         import pygame
 
         key = (
-            tuple(scene.subgoals), tuple(scene.notes), tuple(scene.utterances), tuple(scene.exceptions), scene.caption,
-        )  # fmt: skip
+            tuple(scene.subgoals),
+            tuple(scene.notes),
+            tuple(scene.utterances),
+            tuple(scene.exceptions),
+            scene.caption,
+        )
         if self._held is None or self._held[0] != key:
             pen = Pen(self.size)
             top = self._tasks(pen, scene, _HEADER)

@@ -42,8 +42,11 @@ _KINDS: Final[dict[int, FigureKind]] = {
 }
 
 _STATES: Final[dict[str, SubgoalState]] = {
-    "complete": "complete", "abandoned": "abandoned", "ongoing": "ongoing", "pending": "pending",
-}  # fmt: skip
+    "complete": "complete",
+    "abandoned": "abandoned",
+    "ongoing": "ongoing",
+    "pending": "pending",
+}
 
 _TRAIL: Final = 0.5
 """Time between two points of the driven path [s]."""

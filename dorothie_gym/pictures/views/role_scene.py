@@ -133,8 +133,9 @@ class RoleView:
                 continue
             landmark = int(row[SubgoalColumn.LANDMARK])
             name = map_label(LandmarkName(int(seen["landmarks"][landmark][LandmarkColumn.NAME])))
-            found.append((landmark, self._descriptions.get(number, f"Subgoal {number + 1}: {name}"),
-                          SUBGOAL_STATES[status]))  # fmt: skip
+            found.append(
+                (landmark, self._descriptions.get(number, f"Subgoal {number + 1}: {name}"), SUBGOAL_STATES[status])
+            )
         return found
 
     def _objects(self, seen: ObservationMapping) -> Iterator[Actor]:

@@ -72,7 +72,10 @@ def scene_of(session: LiveSession, caption: str = "", heard: Sequence[SpokenLine
         time=world.time,
         town=world.town,
         car=CarView(
-            x=float(car.position[0]), y=float(car.position[1]), heading=float(car.heading), speed=float(car.speed),
+            x=float(car.position[0]),
+            y=float(car.position[1]),
+            heading=float(car.heading),
+            speed=float(car.speed),
             lights=world.ego.lights,
         ),
         street_names=[name.label for name in session.scenario.street_names],
@@ -96,12 +99,11 @@ def scene_of(session: LiveSession, caption: str = "", heard: Sequence[SpokenLine
             if i in task.live or status is GoalStatus.ABANDONED
         ],
         exceptions=[
-            ExceptionMark(time=time, text=exception_words(data), x=x, y=y)
-            for time, (x, y), data in session.exceptions
+            ExceptionMark(time=time, text=exception_words(data), x=x, y=y) for time, (x, y), data in session.exceptions
         ],
         utterances=sorted((*utterances_of(session), *heard), key=lambda line: line.time),
         speaking=[_line(utterance, session) for utterance in session.in_progress],
         notes=notes,
         weather={str(parameter): value for parameter, value in world.weather.values.items()},
         caption=caption or task.storyboard.name,
-    )  # fmt: skip
+    )

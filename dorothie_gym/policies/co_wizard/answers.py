@@ -105,9 +105,7 @@ def _answer_lights(state: CoWizardState, view: CoWizardView) -> None:
         state.say(intend(Function.INFORM, on, wording=Wording(lights=True, topic="own_lights"), joined=True))
 
 
-def _more(
-    state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator
-) -> tuple[Remark, ...]:  # fmt: skip
+def _more(state: CoWizardState, view: CoWizardView, asked: Proposition, rng: np.random.Generator) -> tuple[Remark, ...]:
     """Returns what is added to an answer, by chance: why something is not seen, or the time to the goal."""
     unseen = asked.predicate is Predicate.SEES and not believes(state, view, asked)
     if unseen or (asked.predicate in _ABOUT_THE_VIEW and not sees_far(view)):

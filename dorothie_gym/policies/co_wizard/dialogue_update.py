@@ -175,9 +175,7 @@ def _instruction(
         _senseless(state, view, act, words, asks=state.beliefs.goal is None or is_garbled(words))
 
 
-def _senseless(
-    state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, *, asks: bool
-) -> bool:  # fmt: skip
+def _senseless(state: CoWizardState, view: CoWizardView, act: DialogueAct, words: ParsedText, *, asks: bool) -> bool:
     """Stops after words without sense where that is expected, or asks again; returns whether it did."""
     if is_garbled(words) and expects_stop(state, view, words):
         do_stop(state, view, act, words)

@@ -214,9 +214,12 @@ def approach_stop(state: CoWizardState, view: CoWizardView, name: LandmarkName |
 
 
 def hear_description(
-    state: CoWizardState, view: CoWizardView, streets: Sequence[StreetName], landmarks: Sequence[LandmarkName],
+    state: CoWizardState,
+    view: CoWizardView,
+    streets: Sequence[StreetName],
+    landmarks: Sequence[LandmarkName],
     rng: np.random.Generator,
-) -> None:  # fmt: skip
+) -> None:
     """Takes up a description of where the goal is: guesses the place if possible, and acknowledges."""
     goal = state.beliefs.goal
     if goal is not None and not state.beliefs.exact:

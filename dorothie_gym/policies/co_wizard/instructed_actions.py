@@ -113,14 +113,16 @@ def _do_lights(state: CoWizardState, view: CoWizardView, act: DialogueAct, words
     state.intentions = state.intentions.with_lights(words.lights is not False)
 
 
-OBEYED: Final[Mapping[ActionValue, Obey]] = MappingProxyType({
-    ActionValue.J_TURN: do_turn,
-    ActionValue.LANE_FOLLOW: _do_follow,
-    ActionValue.U_TURN: _do_u_turn,
-    ActionValue.LANE_SWITCH: _do_switch,
-    ActionValue.STOP: do_stop,
-    ActionValue.START: _do_start,
-    ActionValue.SPEED_CHANGE: _do_speed,
-    ActionValue.LIGHT_CHANGE: _do_lights,
-})  # fmt: skip
+OBEYED: Final[Mapping[ActionValue, Obey]] = MappingProxyType(
+    {
+        ActionValue.J_TURN: do_turn,
+        ActionValue.LANE_FOLLOW: _do_follow,
+        ActionValue.U_TURN: _do_u_turn,
+        ActionValue.LANE_SWITCH: _do_switch,
+        ActionValue.STOP: do_stop,
+        ActionValue.START: _do_start,
+        ActionValue.SPEED_CHANGE: _do_speed,
+        ActionValue.LIGHT_CHANGE: _do_lights,
+    }
+)
 """What is done on an instruction, by the action that it names."""

@@ -26,10 +26,15 @@ _REPEATABLE = act_builders.QUESTIONS | {DialogueMove.EXPLAIN, DialogueMove.INSTR
 
 _WITHOUT_CONTENT = frozenset(
     {
-        DialogueMove.ACKNOWLEDGE, DialogueMove.CONFIRM, DialogueMove.IRRELEVANT, DialogueMove.REPLY_Y,
-        DialogueMove.REPLY_N, DialogueMove.REPLY_U, DialogueMove.CONFUSE,
+        DialogueMove.ACKNOWLEDGE,
+        DialogueMove.CONFIRM,
+        DialogueMove.IRRELEVANT,
+        DialogueMove.REPLY_Y,
+        DialogueMove.REPLY_N,
+        DialogueMove.REPLY_U,
+        DialogueMove.CONFUSE,
     }
-)  # fmt: skip
+)
 """Moves that may be said without any content."""
 
 _CORRECTED = frozenset({Predicate.GOAL, Predicate.WILL, Predicate.ARRIVED, Predicate.KNOWS})

@@ -94,7 +94,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
 
     def attend(
         self, observation: ObservationMapping, memory: AdWizardMemory, delay: float
-    ) -> tuple[AdWizardMemory, tuple[str, ...]]:  # fmt: skip
+    ) -> tuple[AdWizardMemory, tuple[str, ...]]:
         """Listens to both speakers; a change of the tasks is worth a call."""
         memory = replace(memory, clock=memory.clock.ticked(scalar(observation, "time")))
         memory, _ = with_heard(memory, observation, Role.PARTICIPANT, "participant")
@@ -105,7 +105,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
 
     def prompt(
         self, observation: ObservationMapping, memory: AdWizardMemory, events: Sequence[str]
-    ) -> tuple[str, AnswerSchema]:  # fmt: skip
+    ) -> tuple[str, AnswerSchema]:
         """Returns the prompt of a call and the schema of its answer."""
         town = memory.town
         options = exception_options(observation, town)
@@ -127,7 +127,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
 
     def accept(
         self, observation: ObservationMapping, memory: AdWizardMemory, answer: Mapping[str, str]
-    ) -> tuple[AdWizardMemory, int]:  # fmt: skip
+    ) -> tuple[AdWizardMemory, int]:
         """Takes in the change, with its message."""
         now = scalar(observation, "time")
         memory = replace(memory, note=answer["note"], again_at=now + float(answer["again"]))
@@ -140,9 +140,7 @@ class AdWizardInterface(RoleInterface[AdWizardMemory]):
             return memory, 0
         return replace(memory, order=order), 0
 
-    def act(
-        self, observation: ObservationMapping, memory: AdWizardMemory
-    ) -> tuple[ActionDict, AdWizardMemory, int]:  # fmt: skip
+    def act(self, observation: ObservationMapping, memory: AdWizardMemory) -> tuple[ActionDict, AdWizardMemory, int]:
         """Makes the change."""
         action = AdWizardAction() if memory.order is None else memory.order
         return action.encode(self.limits), replace(memory, order=None), 0
@@ -182,8 +180,9 @@ def _road_options(observation: ObservationMapping, town: Town) -> dict[str, AdWi
                 exception=ExceptionKind.PLACE_PROP, prop=kind, place=where
             )
         for exception, what in (
-            (ExceptionKind.SPAWN_VEHICLES, "vehicles"), (ExceptionKind.SPAWN_PEDESTRIANS, "pedestrians"),
-        ):  # fmt: skip
+            (ExceptionKind.SPAWN_VEHICLES, "vehicles"),
+            (ExceptionKind.SPAWN_PEDESTRIANS, "pedestrians"),
+        ):
             options[f"let {what} appear {ahead} m ahead"] = AdWizardAction(
                 exception=exception, place=where, count=SPAWNED, extent=EXTENT
             )
@@ -212,12 +211,15 @@ def _schema(options: tuple[str, ...]) -> AnswerSchema:
         name="ad_wizard",
         fields=(
             ChoiceField(name="change", labels=options, meaning="what you change now; none for nothing"),
-            WordsField(name="message", length=MESSAGE_LENGTH, meaning="message to the participant, with a message or a "
-                       "change of the task; empty for the usual one"),
+            WordsField(
+                name="message",
+                length=MESSAGE_LENGTH,
+                meaning="message to the participant, with a message or a change of the task; empty for the usual one",
+            ),
             WordsField(name="note", length=NOTE_LENGTH, meaning="note to yourself, shown next time"),
             ChoiceField(name="again", labels=AGAIN, meaning="ask me again after so many seconds if nothing happens"),
         ),
-    )  # fmt: skip
+    )
 
 
 def _task_lines(observation: ObservationMapping) -> list[str]:

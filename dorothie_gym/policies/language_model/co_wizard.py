@@ -98,7 +98,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
 
     def attend(
         self, observation: ObservationMapping, memory: CoWizardMemory, delay: float
-    ) -> tuple[CoWizardMemory, tuple[str, ...]]:  # fmt: skip
+    ) -> tuple[CoWizardMemory, tuple[str, ...]]:
         """Follows the route, and notices what is worth a call."""
         view = CoWizardView.read(observation, memory.town)
         memory = replace(memory, clock=memory.clock.ticked(view.time))
@@ -120,7 +120,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
 
     def prompt(
         self, observation: ObservationMapping, memory: CoWizardMemory, events: Sequence[str]
-    ) -> tuple[str, AnswerSchema]:  # fmt: skip
+    ) -> tuple[str, AnswerSchema]:
         """Returns the prompt of a call and the schema of its answer."""
         view = CoWizardView.read(observation, memory.town)
         text = prompt_text(
@@ -131,7 +131,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
 
     def accept(
         self, observation: ObservationMapping, memory: CoWizardMemory, answer: Mapping[str, str]
-    ) -> tuple[CoWizardMemory, int]:  # fmt: skip
+    ) -> tuple[CoWizardMemory, int]:
         """Takes in goal, mark, status, words, and the action to carry out."""
         view = CoWizardView.read(observation, memory.town)
         memory = with_talk(memory, answer, view.time)
@@ -144,9 +144,7 @@ class CoWizardInterface(RoleInterface[CoWizardMemory]):
             memory = replace(memory, drive=(chosen, view.time + ORDER_LIFETIME))
         return memory, int(expired)
 
-    def act(
-        self, observation: ObservationMapping, memory: CoWizardMemory
-    ) -> tuple[ActionDict, CoWizardMemory, int]:  # fmt: skip
+    def act(self, observation: ObservationMapping, memory: CoWizardMemory) -> tuple[ActionDict, CoWizardMemory, int]:
         """Speaks the next span, sends the next belief update, and carries out the action."""
         speech, memory = next_speech(observation, memory)
         mental, physical, expired = None, None, 0

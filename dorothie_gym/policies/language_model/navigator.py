@@ -157,7 +157,7 @@ class Navigator:
         if crossing is None:
             return RouteStep(
                 action=PhysicalAction.STOP, distance=progress.left(view.station), due=False, place=view.lane
-            )  # fmt: skip
+            )
         return self._turn(town, view, crossing)
 
     def _stop(self, town: Town, view: CoWizardView, interval: float, delay: float) -> RouteStep | None:
@@ -204,7 +204,7 @@ class Navigator:
         due = here and not prepared and not view.manoeuvring and (crossing.distance <= TURN_LEAD or waiting)
         return RouteStep(
             action=PhysicalAction.J_TURN, angle=angle, distance=crossing.distance, due=due, place=crossing.lane
-        )  # fmt: skip
+        )
 
 
 def _switch(view: CoWizardView, side: int, distance: float, *, due: bool) -> RouteStep:

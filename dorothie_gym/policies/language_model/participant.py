@@ -82,7 +82,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
 
     def attend(
         self, observation: ObservationMapping, memory: ParticipantMemory, delay: float
-    ) -> tuple[ParticipantMemory, tuple[str, ...]]:  # fmt: skip
+    ) -> tuple[ParticipantMemory, tuple[str, ...]]:
         """Follows the route, and notices what is worth a call."""
         view = ParticipantView.read(observation, memory.town)
         memory = replace(memory, clock=memory.clock.ticked(view.time))
@@ -102,7 +102,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
 
     def prompt(
         self, observation: ObservationMapping, memory: ParticipantMemory, events: Sequence[str]
-    ) -> tuple[str, AnswerSchema]:  # fmt: skip
+    ) -> tuple[str, AnswerSchema]:
         """Returns the prompt of a call and the schema of its answer."""
         view, town = ParticipantView.read(observation, memory.town), memory.town
         lines = [
@@ -125,7 +125,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
 
     def accept(
         self, observation: ObservationMapping, memory: ParticipantMemory, answer: Mapping[str, str]
-    ) -> tuple[ParticipantMemory, int]:  # fmt: skip
+    ) -> tuple[ParticipantMemory, int]:
         """Takes in words, and the place to guide to."""
         view = ParticipantView.read(observation, memory.town)
         memory = with_talk(memory, answer, view.time)
@@ -140,7 +140,7 @@ class ParticipantInterface(RoleInterface[ParticipantMemory]):
 
     def act(
         self, observation: ObservationMapping, memory: ParticipantMemory
-    ) -> tuple[ActionDict, ParticipantMemory, int]:  # fmt: skip
+    ) -> tuple[ActionDict, ParticipantMemory, int]:
         """Speaks the next span."""
         speech, memory = next_speech(observation, memory)
         return ParticipantAction(speech=speech).encode(self.limits), memory, 0

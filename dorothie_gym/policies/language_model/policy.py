@@ -108,15 +108,13 @@ class LanguageModelPolicy(Policy[LanguageModelState]):
         """Returns the state before the first call."""
         return LanguageModelState(
             seed=seed, memory=self._interface.begin(town), usage=ModelUsage(model=self._config.model)
-        )  # fmt: skip
+        )
 
     def usage_of(self, state: LanguageModelState) -> Mapping[str, object]:
         """Returns the usage of the model in a session."""
         return dict(state.usage.to_json())
 
-    def step(
-        self, observation: ObservationMapping, state: LanguageModelState
-    ) -> tuple[ActionDict, LanguageModelState]:  # fmt: skip
+    def step(self, observation: ObservationMapping, state: LanguageModelState) -> tuple[ActionDict, LanguageModelState]:
         """Takes in the observation, asks the model if something has happened, and acts on its last answer."""
         now = scalar(observation, "time")
         memory, events = self._interface.attend(observation, state.memory, state.delay)
@@ -166,7 +164,7 @@ class LanguageModelPolicy(Policy[LanguageModelState]):
 
     def _accept(
         self, observation: ObservationMapping, state: LanguageModelState, answer: Mapping[str, str]
-    ) -> LanguageModelState:  # fmt: skip
+    ) -> LanguageModelState:
         memory, expired = self._interface.accept(observation, state.memory, answer)
         return _with_expired(replace(state, memory=memory), expired)
 

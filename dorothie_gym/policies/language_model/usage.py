@@ -61,9 +61,14 @@ class ModelUsage:
     silences: Mapping[str, int] = field(default_factory=dict)
 
     def with_call(
-        self, *, fault: Fault | None, retried: bool, tokens: tuple[int, int], latency: float,
+        self,
+        *,
+        fault: Fault | None,
+        retried: bool,
+        tokens: tuple[int, int],
+        latency: float,
         prices: tuple[float, float] | None,
-    ) -> ModelUsage:  # fmt: skip
+    ) -> ModelUsage:
         """Adds a call.
 
         Args:

@@ -136,9 +136,13 @@ def driver_arrays(size: int = 0, actions: int = 0, streets: Sequence[int] = ()) 
         streets: names of the town's streets: ids of `StreetName`.
     """
     arrays = DriverArrays(
-        empty_records(DriverView, 1), empty_records(HeardRecord, 1), empty_records(CostRecord, 1),
-        np.array(streets, dtype=np.int64), np.zeros(size, dtype=np.float32), np.zeros(actions, dtype=np.int8),
-    )  # fmt: skip
+        empty_records(DriverView, 1),
+        empty_records(HeardRecord, 1),
+        empty_records(CostRecord, 1),
+        np.array(streets, dtype=np.int64),
+        np.zeros(size, dtype=np.float32),
+        np.zeros(actions, dtype=np.int8),
+    )
     for name in ("goal_lane", "move", "action", "sector", "landmark", "street"):
         arrays.heard[name] = -1
     return arrays
@@ -276,6 +280,7 @@ def driver_of(observation: ObservationMapping, exits: JunctionExits) -> DriverAr
 
 
 _OBJECT_COLUMNS = (
-    ("object_kind", ObjectColumn.KIND), ("object_distance", ObjectColumn.DISTANCE),
+    ("object_kind", ObjectColumn.KIND),
+    ("object_distance", ObjectColumn.DISTANCE),
     ("object_bearing", ObjectColumn.BEARING),
-)  # fmt: skip
+)

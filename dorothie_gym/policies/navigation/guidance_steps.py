@@ -54,9 +54,13 @@ _U_TURN_SPEED_SQUARED = U_TURN_SPEED * U_TURN_SPEED
 _J_TURN, _SWITCH, _TURN_ROUND, _STOP, _START = (
     int(value.value)
     for value in (
-        ActionValue.J_TURN, ActionValue.LANE_SWITCH, ActionValue.U_TURN, ActionValue.STOP, ActionValue.START,
+        ActionValue.J_TURN,
+        ActionValue.LANE_SWITCH,
+        ActionValue.U_TURN,
+        ActionValue.STOP,
+        ActionValue.START,
     )
-)  # fmt: skip
+)
 _u_turn_braking = inlined(u_turn_braking)
 _LEFT, _RIGHT = nearest_sector(90.0), nearest_sector(-90.0)
 

@@ -370,9 +370,14 @@ def measure_costs(town: TownArrays, lanes: RecordArray[RoutingLane], costs: Arra
 
 @compiled
 def observe(
-    town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: DriverArrays,
-    lanes: RecordArray[RoutingLane], costs: Array, max_seconds: float,
-) -> None:  # fmt: skip
+    town: TownArrays,
+    exits: ExitArrays,
+    world: WorldArrays,
+    driver: DriverArrays,
+    lanes: RecordArray[RoutingLane],
+    costs: Array,
+    max_seconds: float,
+) -> None:
     """Writes view, observation vector and mask of a driver at a decision.
 
     Args:

@@ -104,9 +104,7 @@ def repeat_stop(state: ParticipantState, view: ParticipantView) -> None:
         state.say(order(DialogueMove.CLARIFY, ActionValue.STOP, urgent=True))
 
 
-def prepare_stop(
-    state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator
-) -> None:  # fmt: skip
+def prepare_stop(state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator) -> None:
     """Chooses the words to stop the car with ahead, because their duration decides when they have to be said."""
     if not state.guidance.stop_text:
         _choose_stop_words(state, rng)
@@ -144,9 +142,7 @@ def _stop_repeat(state: ParticipantState, view: ParticipantView) -> float:
     return STOP_REPEAT if heeded else state.speech.delivery.seconds(state.guidance.stop_said) + REACTION
 
 
-def _announce_place(
-    state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator
-) -> None:  # fmt: skip
+def _announce_place(state: ParticipantState, view: ParticipantView, left: float, rng: np.random.Generator) -> None:
     """Announces the place with its distance [m], or asks the car to slow down where the time is too short for that."""
     goal, speed = state.task.goal, max(view.speed, state.config.soon_speed)
     if goal is None:

@@ -136,9 +136,12 @@ def route_length(state: ParticipantState, view: ParticipantView, landmark: SeenL
 
 
 def _go_first(
-    state: ParticipantState, view: ParticipantView, subgoal: SeenSubgoal, landmark: SeenLandmark,
+    state: ParticipantState,
+    view: ParticipantView,
+    subgoal: SeenSubgoal,
+    landmark: SeenLandmark,
     rng: np.random.Generator,
-) -> None:  # fmt: skip
+) -> None:
     """Interrupts the target for a subgoal that was just added."""
     former = state.task.goal
     assert former is not None
@@ -247,18 +250,24 @@ def _report_more(
     if landmark is None or purpose is None or purpose.action is None or rng.random() >= state.config.announces_ahead:
         return
     more = Proposition.of(
-        Predicate.PURPOSE, place=landmark.name, person=purpose.person, purpose=purpose.action,
+        Predicate.PURPOSE,
+        place=landmark.name,
+        person=purpose.person,
+        purpose=purpose.action,
         item=purpose.items[0] if purpose.items else None,
-    )  # fmt: skip
+    )
     state.task = state.task.after_telling(more)
     later = intend(Function.REQUEST, act_builders.errand(landmark.name, GoalStatus.PENDING))
     state.say(later, intend(Function.INFORM, more, elided=("place",), wording=Wording(topic="purpose"), joined=True))
 
 
 def _report_same_place(
-    state: ParticipantState, view: ParticipantView, former: SeenLandmark, landmark: SeenLandmark,
+    state: ParticipantState,
+    view: ParticipantView,
+    former: SeenLandmark,
+    landmark: SeenLandmark,
     rng: np.random.Generator,
-) -> None:  # fmt: skip
+) -> None:
     """Tells what else is to be done at the target, or which place of its name is meant now."""
     reason = story_remark(state, view, rng) if former.place == landmark.place else ()
     state.say(*(reason or (intend(Function.REQUEST, act_builders.destination(landmark.name, landmark.street)),)))
@@ -339,7 +348,7 @@ def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.
         purpose, reason = (options[topic] if topic == name else None for name in ("purpose", "reason"))
         said = Proposition.of(
             Predicate.PURPOSE, place=goal.name, person=told.person, item=item, purpose=purpose, reason=reason
-        )  # fmt: skip
+        )
         if said not in state.task.told:
             break
     else:

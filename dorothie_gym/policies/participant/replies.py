@@ -272,9 +272,14 @@ def _thank(state: ParticipantState, view: ParticipantView, rng: np.random.Genera
 
 
 def _nod(
-    state: ParticipantState, view: ParticipantView, rng: np.random.Generator, nod: Remark, told: Proposition | None,
-    *, alone: bool,
-) -> None:  # fmt: skip
+    state: ParticipantState,
+    view: ParticipantView,
+    rng: np.random.Generator,
+    nod: Remark,
+    told: Proposition | None,
+    *,
+    alone: bool,
+) -> None:
     """Acknowledges an explanation: before the next remark, or, where `alone` allows it, by itself."""
     waiting = state.speech.queue
     if waiting and not waiting[0].urgent and not waiting[0].text:

@@ -168,9 +168,7 @@ def answer_yes_no(
         state.say_first(*unsure, yes, *(() if unsure else addition(state, view, rng)))
 
 
-def _asks_about_finished(
-    state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText
-) -> bool:  # fmt: skip
+def _asks_about_finished(state: ParticipantState, view: ParticipantView, act: DialogueAct, words: ParsedText) -> bool:
     """Returns whether the car, which stands, asks if it has arrived where an errand was just done."""
     place = state.task.finished[0]
     if not view.standing or not has_just_finished(state, view, (place,)):

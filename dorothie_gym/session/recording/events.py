@@ -93,9 +93,7 @@ class EndReason(enum.StrEnum):
         return self not in (EndReason.ARRIVED, EndReason.OUT_OF_TIME)
 
 
-INFRACTIONS = (
-    EventType.COLLISION, EventType.RED_LIGHT, EventType.STOP_SIGN, EventType.OFF_ROAD, EventType.WRONG_WAY,
-)  # fmt: skip
+INFRACTIONS = (EventType.COLLISION, EventType.RED_LIGHT, EventType.STOP_SIGN, EventType.OFF_ROAD, EventType.WRONG_WAY)
 """Events that report an infraction of the traffic rules."""
 
 

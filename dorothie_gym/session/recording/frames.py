@@ -60,8 +60,13 @@ _FALLBACK: Final = {"kind": int(ActorKind.OTHER)}
 """Numbers of unknown words."""
 
 _SMOOTH: Final = (
-    "x", "y", "heading", "speed", "steer", *(f"actors.list.element.{n}" for n in ("x", "y", "heading", "speed")),
-)  # fmt: skip
+    "x",
+    "y",
+    "heading",
+    "speed",
+    "steer",
+    *(f"actors.list.element.{n}" for n in ("x", "y", "heading", "speed")),
+)
 """Columns that change little from row to row: splitting their bytes compresses better."""
 
 

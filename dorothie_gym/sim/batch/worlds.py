@@ -189,9 +189,13 @@ class VectorWorld(CachedViews):
         return True
 
     def step(
-        self, substeps: int, dt: float, acceleration: Array | float = 0.0, steering: Array | float = 0.0,
+        self,
+        substeps: int,
+        dt: float,
+        acceleration: Array | float = 0.0,
+        steering: Array | float = 0.0,
         playing: NDArray[np.bool_] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Steps worlds, as `sim.step.step` does with one; where a path needs more room, all worlds get it.
 
         Args:

@@ -138,9 +138,7 @@ def place_on_path(world: WorldArrays, lane: int, station: float) -> float:
 def note_props(world: WorldArrays, frame: int) -> None:
     """Notes the props that the ego sees, for the feasibility of manoeuvres."""
     car, plan, seen_props = world.vehicles[0], world.plan[0], world.seen_props
-    count = see(
-        world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], car.x, car.y, frame, 0
-    )  # fmt: skip
+    count = see(world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], car.x, car.y, frame, 0)
     plan.props = 0
     for k in range(count):
         body = world.seen[k]

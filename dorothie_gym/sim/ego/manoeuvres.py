@@ -213,10 +213,15 @@ def find_oncoming(town: TownArrays, number: int, station: float) -> tuple[int, f
         there, _, segment = project(town, other, x, y)
         there = min(max(there, 0.0), beside.length)
         gap = opposite_gap(
-            x, y, heading, height,
-            value_near(points, beside, segment, X, there), value_near(points, beside, segment, Y, there),
-            value_near(points, beside, segment, HEADING, there), value_near(points, beside, segment, HEIGHT, there),
-        )  # fmt: skip
+            x,
+            y,
+            heading,
+            height,
+            value_near(points, beside, segment, X, there),
+            value_near(points, beside, segment, Y, there),
+            value_near(points, beside, segment, HEADING, there),
+            value_near(points, beside, segment, HEIGHT, there),
+        )
         if gap < least:
             found, at, least = other, there, gap
     return found, at

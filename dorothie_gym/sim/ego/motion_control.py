@@ -93,9 +93,8 @@ def guide(town: TownArrays, world: WorldArrays, dt: float) -> None:
     take_lanes(town, world, vehicle)
     note(town, vehicle, clock.time)
     seen = see(
-        world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0],
-        vehicle.x, vehicle.y, clock.frame, 0,
-    )  # fmt: skip
+        world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], vehicle.x, vehicle.y, clock.frame, 0
+    )
     look(town, world, seen)
     advance(town, world, vehicle)
     if car.s >= car.action_end:

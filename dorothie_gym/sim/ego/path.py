@@ -156,9 +156,13 @@ def advance(town: TownArrays, world: WorldArrays, vehicle: VehicleRecord) -> Non
 
 @compiled
 def find_sweeps(
-    course: RecordArray[CoursePointRecord], sweeps: RecordArray[SweepRecord], first: int, end: int, length: float,
+    course: RecordArray[CoursePointRecord],
+    sweeps: RecordArray[SweepRecord],
+    first: int,
+    end: int,
+    length: float,
     width: float,
-) -> None:  # fmt: skip
+) -> None:
     """Computes directions, and the reach of a car's corners to the left and to the right of the path of its middle.
 
     highway-env's bicycle moves along its heading plus a slip angle, and turns by the sine of that over half its length:

@@ -85,9 +85,14 @@ def follow(town: TownArrays, world: WorldArrays, number: int, start: float, end:
         while segment < lane.last and points[segment + 1, STATION] <= station:
             segment += 1
         append(
-            world, interpolated(points, lane, segment, X, station), interpolated(points, lane, segment, Y, station),
-            station, lane.limit, number, False,
-        )  # fmt: skip
+            world,
+            interpolated(points, lane, segment, X, station),
+            interpolated(points, lane, segment, Y, station),
+            station,
+            lane.limit,
+            number,
+            False,
+        )
 
 
 @compiled
@@ -129,8 +134,11 @@ def switch(
                 + weight * interpolated(points, target, other, X, there),
                 (1.0 - weight) * interpolated(points, source, one, Y, here)
                 + weight * interpolated(points, target, other, Y, there),
-                there, limit, beside, True,
-            )  # fmt: skip
+                there,
+                limit,
+                beside,
+                True,
+            )
     return begin + 1.0 * (end - begin)
 
 

@@ -65,7 +65,7 @@ def request_path(
     while True:
         answer = _request(
             town, holder.arrays, action, int(angle), float(speed), int(lane), float(station), float(offset)
-        )  # fmt: skip
+        )
         if answer != NO_SPACE:
             return answer
         holder.arrays = lengthened(holder.arrays)
@@ -109,8 +109,11 @@ class LocalPlanner(CachedViews):
         plan = self._look_up()
         props = self._holder.arrays.seen_props[: int(plan["props"])].tobytes()
         return (
-            *(plan[name].item() for name in ("version", "held", "action", "connector")), self.s, self.roadblock, props
-        )  # fmt: skip
+            *(plan[name].item() for name in ("version", "held", "action", "connector")),
+            self.s,
+            self.roadblock,
+            props,
+        )
 
     # --- Place on the path ------------------------------------------------------------------------------------------
 

@@ -188,7 +188,7 @@ def street_walks(points: Array, lanes: RecordArray[LaneRecord], town: Town, edge
     return [
         StreetWalk(walk.lane, _finished(walk.points, way * lands))
         for walk, way, lands in zip(found, across, landing, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def _beside(points: Array, lane: LaneRecord) -> Array | None:

@@ -119,9 +119,7 @@ def look_around(world: WorldArrays, frame: int, table: Array) -> int:
         Number of rows written.
     """
     car = world.vehicles[0]
-    count = see(
-        world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], car.x, car.y, frame, 0
-    )  # fmt: skip
+    count = see(world.vehicles, world.pedestrians, world.props, world.seen, world.eye[0], car.x, car.y, frame, 0)
     for k in range(count):
         body = world.seen[k]
         table[k, 0], table[k, 1], table[k, 2], table[k, 3] = body.key, body.kind, body.x, body.y

@@ -18,10 +18,14 @@ VEHICLES, PEDESTRIAN_CLASS, STATIC = (
 LANE_FOLLOW, LANE_SWITCH, U_TURN, J_TURN, STOP, START = (
     int(action.value)
     for action in (
-        PhysicalAction.LANE_FOLLOW, PhysicalAction.LANE_SWITCH, PhysicalAction.U_TURN,
-        PhysicalAction.J_TURN, PhysicalAction.STOP, PhysicalAction.START,
+        PhysicalAction.LANE_FOLLOW,
+        PhysicalAction.LANE_SWITCH,
+        PhysicalAction.U_TURN,
+        PhysicalAction.J_TURN,
+        PhysicalAction.STOP,
+        PhysicalAction.START,
     )
-)  # fmt: skip
+)
 """Navigation actions, as plain numbers."""
 
 NOBODY = cast(int, np.int64(-1))

@@ -55,9 +55,11 @@ WIDE_LANE = 2.0 * (CELL_REACH - 2.0 * OFF_ROAD_MARGIN - SLACK)
 """Width up to which cells list all lanes that a place is within `OFF_ROAD_MARGIN` of [m]."""
 
 _CONTROLS = {
-    None: TrafficControl.NONE, SignalKind.TRAFFIC_LIGHT: TrafficControl.LIGHT,
-    SignalKind.STOP: TrafficControl.STOP, SignalKind.YIELD: TrafficControl.YIELD,
-}  # fmt: skip
+    None: TrafficControl.NONE,
+    SignalKind.TRAFFIC_LIGHT: TrafficControl.LIGHT,
+    SignalKind.STOP: TrafficControl.STOP,
+    SignalKind.YIELD: TrafficControl.YIELD,
+}
 
 
 @by_reference

@@ -167,12 +167,17 @@ ALIGNMENT = 16
 """Alignment of the arrays in the bytes of a pickled world [bytes]."""
 
 _DTYPES = [
-    *map(record_dtype, (VehicleRecord, PedestrianRecord, PropRecord, NodeRecord)), *map(np.dtype, "iid"),
-    record_dtype(LampRecord), *map(np.dtype, "iid"),
+    *map(record_dtype, (VehicleRecord, PedestrianRecord, PropRecord, NodeRecord)),
+    *map(np.dtype, "iid"),
+    record_dtype(LampRecord),
+    *map(np.dtype, "iid"),
     *map(record_dtype, (ClockRecord, EgoRecord, SweepRecord, PlanRecord, CoursePointRecord, LaneStepRecord)),
-    record_dtype(GoalRecord), np.dtype("d"), *map(record_dtype, (EyeRecord, SeenRecord)), *map(np.dtype, "dd"),
+    record_dtype(GoalRecord),
+    np.dtype("d"),
+    *map(record_dtype, (EyeRecord, SeenRecord)),
+    *map(np.dtype, "dd"),
     *map(record_dtype, (EventRecord, LocalizerRecord, WatchRecord, LineMarkRecord, BreachRecord)),
-]  # fmt: skip
+]
 """Types of the arrays of a world, in order."""
 
 

@@ -193,9 +193,7 @@ def is_clear_of_people(world: WorldArrays, x: float, y: float, body: int, distan
 
 
 @compiled
-def is_free(
-    town: TownArrays, world: WorldArrays, number: int, station: float, body: int, distance: float
-) -> bool:  # fmt: skip
+def is_free(town: TownArrays, world: WorldArrays, number: int, station: float, body: int, distance: float) -> bool:
     """Returns whether there is room on a lane: no vehicle and no prop close before, behind or beside.
 
     Args:

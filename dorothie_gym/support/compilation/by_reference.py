@@ -127,9 +127,12 @@ def _read(context: BaseContext, builder: IRBuilder, kind: Reference, table: Valu
     pointer = model.get_type("data")
     data = _load(builder, table, offset, context.data_model_manager[pointer].get_value_type())
     fields = {
-        "nitems": count, "itemsize": itemsize, "data": data,
-        "shape": cgutils.pack_array(builder, shape), "strides": cgutils.pack_array(builder, strides),
-    }  # fmt: skip
+        "nitems": count,
+        "itemsize": itemsize,
+        "data": data,
+        "shape": cgutils.pack_array(builder, shape),
+        "strides": cgutils.pack_array(builder, strides),
+    }
     for field, value in fields.items():
         array = builder.insert_value(array, value, model.get_field_position(field))
     return array

@@ -236,8 +236,14 @@ def test_the_sample_layout_is_read_with_all_its_traps(sample: Path) -> None:
     assert "kibitzer" in "\n".join(session.report.lines())
 
 
-@pytest.mark.parametrize("wrap", [lambda rows: rows, lambda rows: {"log": rows, "version": 3},
-                                  lambda rows: {str(k): row for k, row in enumerate(rows)}])  # fmt: skip
+@pytest.mark.parametrize(
+    "wrap",
+    [
+        lambda rows: rows,
+        lambda rows: {"log": rows, "version": 3},
+        lambda rows: {str(k): row for k, row in enumerate(rows)},
+    ],
+)
 def test_hub_layout_is_read_with_any_fields_around_its_rows(hub: Path, wrap: Any) -> None:
     (hub / "dialog_log.json").write_text(json.dumps(wrap(json.loads(RELEASE_LOG))), encoding="utf-8")
     session = read_session(hub)

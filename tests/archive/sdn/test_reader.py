@@ -29,7 +29,7 @@ from tests.archive.sdn.builders import (
     release,
     sample,
     speech,
-)  # fmt: skip
+)
 
 MAPS = Path(__file__).parents[3] / "../shared/maps"
 
@@ -79,9 +79,14 @@ def test_speech_gives_an_utterance_its_times_and_no_events(tmp_path: Path) -> No
 def test_actions_have_our_arguments(tmp_path: Path) -> None:
     session = read_sdn(release(tmp_path / "log_1"))
     assert [(a.action.label, a.angle, a.up) for a in session.physical_actions] == [
-        ("Start", None, None), ("JTurn", 90.0, None), ("LaneSwitch", -90.0, None), ("LaneSwitch", 90.0, None),
-        ("SpeedChange", None, False), ("LightChange", None, True), ("Stop", None, None),
-    ]  # fmt: skip
+        ("Start", None, None),
+        ("JTurn", 90.0, None),
+        ("LaneSwitch", -90.0, None),
+        ("LaneSwitch", 90.0, None),
+        ("SpeedChange", None, False),
+        ("LightChange", None, True),
+        ("Stop", None, None),
+    ]
     assert session.physical_actions[-1].source is Role.AGENT
     assert session.report.facts["lane_switch_values"] == {"2": 1, "3": 1}
     assert len(list(nfd_points(session))) == 4
@@ -125,8 +130,9 @@ def test_header_has_the_town_its_streets_and_landmarks(tmp_path: Path) -> None:
     assert (header.town, header.source, header.seed) == ("Town97", "sdn-release", None)
     assert header.street_names == ("Baits", "Fuller")
     assert [(row["name"], row["hidden"], row["x"]) for row in header.landmarks] == [
-        ("KFC", False, 5.0), ("SevenEleven", True, 0.0),
-    ]  # fmt: skip
+        ("KFC", False, 5.0),
+        ("SevenEleven", True, 0.0),
+    ]
     assert header.config["sdn"]["first_frame"] == FIRST
 
 
@@ -209,8 +215,10 @@ def test_sample_layout_is_read(tmp_path: Path) -> None:
     assert header.landmarks[0]["station"] == 12.5
     moves = session.moves()
     assert [(m.act.move.label, m.exchange, m.transaction) for m in moves] == [
-        ("Instruct", 0, 0), ("Acknowledge", 0, 0), ("Irrelevant", None, 0),
-    ]  # fmt: skip
+        ("Instruct", 0, 0),
+        ("Acknowledge", 0, 0),
+        ("Irrelevant", None, 0),
+    ]
     assert moves[0].act.slots == {StreetName.FULLER}
     assert all(m.flagged for m in moves) and session.check() == ()
     (goal,) = session.of_type(EventType.BELIEF_UPDATE)
@@ -306,10 +314,16 @@ def test_missing_files_and_fields_are_named(tmp_path: Path) -> None:
     session = read_sdn(release(tmp_path / "log_1", annotated_log__json=rows, config__json={"npc_count": 1}, **nothing))
     missing = "\n".join(session.report.missing)
     for part in (
-        "plan.json", "detailed_plan.json", "ad_wizardlog.csv", "trajectory.csv", "config.json: environment.map",
-        "config.json: environment.landmarks", "utterance (the recogniser's transcript)", "annotated_log.json: flag",
+        "plan.json",
+        "detailed_plan.json",
+        "ad_wizardlog.csv",
+        "trajectory.csv",
+        "config.json: environment.map",
+        "config.json: environment.landmarks",
+        "utterance (the recogniser's transcript)",
+        "annotated_log.json: flag",
         "map of",
-    ):  # fmt: skip
+    ):
         assert part in missing
     assert len(list(ufn_points(session))) == 3, "the flag is taken from the kind of event"
     assert all(move.recognised is None for move in session.moves())

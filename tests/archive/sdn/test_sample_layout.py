@@ -78,7 +78,7 @@ TASK = {
         {"type": "arrive", "destination": "$P2", "description": "Home", "after": [0, 1, 2]},
     ],
     "hidden_from_wizard": ["P2"],
-}  # fmt: skip
+}
 
 
 def session_folder(

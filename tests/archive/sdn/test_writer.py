@@ -53,7 +53,7 @@ def everything() -> list[Event]:
         Event(frame=286, type=EventType.OTHER, source=Role.AGENT, data={"a": 1}, extra={"type": "Yawn", "loud": 2}),
         replace(physical(287, PhysicalAction.START), extra={"hint": [1]}),
         talk()[-1],
-    ]  # fmt: skip
+    ]
 
 
 def in_tenths(events: Any) -> list[Event]:

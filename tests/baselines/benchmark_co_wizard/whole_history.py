@@ -71,9 +71,13 @@ class WholeHistory:
     def session(self) -> Session:
         """Returns the history as a session that was cut off."""
         return Session(
-            header=self.header, events=self.events, trajectory=_trajectory(self.frames), complete=False, name="live",
+            header=self.header,
+            events=self.events,
+            trajectory=_trajectory(self.frames),
+            complete=False,
+            name="live",
             scene=_scene(self.frames),
-        )  # fmt: skip
+        )
 
     def columns(self, town: Town) -> Columns:
         """Returns the features of the whole session; the speed is that of the speedometer."""
@@ -86,10 +90,15 @@ class WholeHistory:
 
 def _move(speaker: Role, utterance: int, text: str, span: Span, frame: int) -> Event:
     data = {
-        "utterance": utterance, "text": text, "span": span.text, "move": span.act.move.label,
-        "slots": {label: list(values) for label, values in span.act.slot_labels().items()}, "exchange": None,
-        "start": frame / FRAME_RATE, "end": frame / FRAME_RATE,
-    }  # fmt: skip
+        "utterance": utterance,
+        "text": text,
+        "span": span.text,
+        "move": span.act.move.label,
+        "slots": {label: list(values) for label, values in span.act.slot_labels().items()},
+        "exchange": None,
+        "start": frame / FRAME_RATE,
+        "end": frame / FRAME_RATE,
+    }
     return Event(frame=frame, type=EventType.DIALOGUE_MOVE, source=speaker, flagged=True, data=data)
 
 

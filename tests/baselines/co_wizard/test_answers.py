@@ -29,8 +29,9 @@ def scene():
     engine = SessionEngine("midtown")
     engine.reset(seed=4)
     observation = {
-        **engine.observations.of([Role.CO_WIZARD])[str(Role.CO_WIZARD)], "action_mask": engine.mask(Role.CO_WIZARD)
-    }  # fmt: skip
+        **engine.observations.of([Role.CO_WIZARD])[str(Role.CO_WIZARD)],
+        "action_mask": engine.mask(Role.CO_WIZARD),
+    }
     view = CoWizardView.read(observation, engine.town)
     return view, Memory(town=engine.town)
 
@@ -229,9 +230,10 @@ def test_open_question_rules_out_answers_about_something_else(scene, text, value
     here = street_of(view.raw, memory.town, view.lane)
     answers = (STANDS, act_builders.action(ActionValue.LANE_FOLLOW), Proposition.of(Predicate.ON_STREET, street=here))
     sayable = [
-        said.predicate for said in answers
+        said.predicate
+        for said in answers
         if is_sayable(intend(Function.ANSWER, said), str(said.predicate), memory, view, asked)
-    ]  # fmt: skip
+    ]
     assert sayable == [about.predicate]
 
 

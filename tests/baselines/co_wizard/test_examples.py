@@ -29,9 +29,13 @@ def goal_to_learn(
     led = replace(scene.memory, goal=right, goal_mark=rows[right] if on_map else -1)
     now = replace(scene, memory=player, utterances=(heard(text),), heard=True)
     lesson = Lesson(
-        update=Update(values=player.values, fresh=(False, False, False)), physical=None, remarks=(), queued=False,
-        ready=True, action=CoWizardAction(),
-    )  # fmt: skip
+        update=Update(values=player.values, fresh=(False, False, False)),
+        physical=None,
+        remarks=(),
+        queued=False,
+        ready=True,
+        action=CoWizardAction(),
+    )
     found = correcting_example(now, listening_inputs(now, queued=False), blank_inputs(), led, lesson)
     return None if found is None else found.goal
 

@@ -16,11 +16,15 @@ def inputs(moves, actions, now=10.0, room=4):
     """A point after moves (who, which, when, slot) and actions (which, when)."""
     given = {
         "time": torch.tensor([now]),
-        "move": torch.zeros(1, room, dtype=torch.long), "move_speaker": torch.zeros(1, room, dtype=torch.long),
-        "move_time": torch.zeros(1, room), "move_slots": torch.zeros(1, room, len(LABELS), dtype=torch.bool),
-        "move_mask": torch.zeros(1, room, dtype=torch.bool), "action": torch.zeros(1, room, dtype=torch.long),
-        "action_time": torch.zeros(1, room), "action_mask": torch.zeros(1, room, dtype=torch.bool),
-    }  # fmt: skip
+        "move": torch.zeros(1, room, dtype=torch.long),
+        "move_speaker": torch.zeros(1, room, dtype=torch.long),
+        "move_time": torch.zeros(1, room),
+        "move_slots": torch.zeros(1, room, len(LABELS), dtype=torch.bool),
+        "move_mask": torch.zeros(1, room, dtype=torch.bool),
+        "action": torch.zeros(1, room, dtype=torch.long),
+        "action_time": torch.zeros(1, room),
+        "action_mask": torch.zeros(1, room, dtype=torch.bool),
+    }
     for i, (who, which, when, slot) in enumerate(moves):
         given["move_speaker"][0, i], given["move"][0, i], given["move_time"][0, i] = who, which, when
         given["move_slots"][0, i, slot] = given["move_mask"][0, i] = True

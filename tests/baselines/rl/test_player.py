@@ -33,12 +33,18 @@ from dorothie_gym.session.spaces.flat import FlatActions
 def train(folder: Path, algorithm: str = "ppo", **changes: Any) -> None:
     settings = TrainingSettings(
         **{
-            "algorithm": algorithm, "env": "dorothie_gym/Navigation-v0", "steps": 64, "environments": 2,
-            "evaluate_every": 64, "episodes": 1, "network": (8,),
+            "algorithm": algorithm,
+            "env": "dorothie_gym/Navigation-v0",
+            "steps": 64,
+            "environments": 2,
+            "evaluate_every": 64,
+            "episodes": 1,
+            "network": (8,),
             "env_settings": {"max_seconds": 10.0, "traffic": "none"},
-            "parameters": {"n_steps": 16, "batch_size": 32, "n_epochs": 1}, **changes,
+            "parameters": {"n_steps": 16, "batch_size": 32, "n_epochs": 1},
+            **changes,
         }
-    )  # fmt: skip
+    )
     Training(settings, folder).run()
 
 
@@ -48,9 +54,12 @@ def test_trained_model_plays_the_co_wizard(algorithm: str, tmp_path: Path) -> No
     player = find_player(str(tmp_path / "run" / "best"), Role.CO_WIZARD)
     assert player.training["steps"] == 64 and player.training["seconds"] > 0.0
     settings = RolloutSettings(
-        cast={**ALL_SCRIPTED, Role.CO_WIZARD: player}, towns=parse_towns("brookside"), sessions=1, seed=2,
+        cast={**ALL_SCRIPTED, Role.CO_WIZARD: player},
+        towns=parse_towns("brookside"),
+        sessions=1,
+        seed=2,
         config=EnvConfig(max_seconds=30.0),
-    )  # fmt: skip
+    )
     first, second = (roll_out(settings, tmp_path / name, workers=1) for name in ("one", "two"))
     assert first.errored == 0 and first.rows[0].record == second.rows[0].record
     session = Session.load(next((tmp_path / "one").rglob("session.json")).parent)

@@ -28,8 +28,8 @@ def test_cluster_that_loses_a_machine_learns_the_weights_of_a_local_run(cluster:
             cluster.second = None
 
     settings = tuned_settings(
-        "maskable_ppo", "dorothie_gym/Navigation-v0", steps=1024, environments=4, evaluate_every=1024, episodes=2,
-    )  # fmt: skip
+        "maskable_ppo", "dorothie_gym/Navigation-v0", steps=1024, environments=4, evaluate_every=1024, episodes=2
+    )
     far = Training(settings, tmp_path / "far", lose_one, cluster.address).run()
     near = Training(settings, tmp_path / "near").run()
     assert cluster.second is None and far.steps == near.steps

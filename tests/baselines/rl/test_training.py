@@ -218,10 +218,13 @@ def test_worker_processes_do_not_change_results() -> None:
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
-        ({"algorithm": "trpo"}, "algorithm"), ({"steps": 0}, "steps"), ({"workers": 9}, "workers"),
-        ({"seed": -1}, "seed"), ({"episodes": 0}, "episodes"),
+        ({"algorithm": "trpo"}, "algorithm"),
+        ({"steps": 0}, "steps"),
+        ({"workers": 9}, "workers"),
+        ({"seed": -1}, "seed"),
+        ({"episodes": 0}, "episodes"),
     ],
-)  # fmt: skip
+)
 def test_invalid_settings_are_named(changes: dict[str, Any], named: str) -> None:
     with pytest.raises(SettingsError, match=named):
         replace(settings_for("ppo"), **changes)
@@ -284,7 +287,11 @@ def test_model_of_a_stranger_imports_nothing_and_is_refused(
 @pytest.mark.parametrize("name", ["CoWizard", "Participant"])
 def test_other_roles_can_be_trained(name: str, tmp_path: Path) -> None:
     settings = settings_for(
-        "ppo", env=f"dorothie_gym/{name}-v0", env_settings={"max_cycles": 20}, environments=1, steps=16,
+        "ppo",
+        env=f"dorothie_gym/{name}-v0",
+        env_settings={"max_cycles": 20},
+        environments=1,
+        steps=16,
         parameters={"n_steps": 16, "batch_size": 16, "n_epochs": 1},
-    )  # fmt: skip
+    )
     assert Training(settings, tmp_path).run().finished

@@ -42,9 +42,11 @@ def trained(folder: Path, *, threshold: float = ANY, inputs: str = "predicted", 
     reader, detector = (folder / name / "small" / "seed-0" for name in ("segformer", "detr"))
     checkpoints.save(reader / BEST_FILE, SegFormer(TINY_READER), {"config": TINY_READER.to_json()})
     about = {
-        "config": TINY.to_json(), "inputs": inputs, "segformer": checkpoints.sha256_of(reader / BEST_FILE),
+        "config": TINY.to_json(),
+        "inputs": inputs,
+        "segformer": checkpoints.sha256_of(reader / BEST_FILE),
         "figures": {"threshold": threshold},
-    }  # fmt: skip
+    }
     checkpoints.save(detector / BEST_FILE, Detector(TINY), about)
     return detector
 

@@ -137,9 +137,11 @@ def test_enlarged_part_moves_boxes_with_the_pixels():
     box = session.boxes_of(0)
     window = (0.1, 0.2, 0.7)
     _, depth, semantic = object_learner._part(
-        torch.zeros(3, 64, 128), torch.from_numpy(session.depth[0].astype(np.float32)),
-        torch.from_numpy(session.semantic[0].astype(np.int64)), window,
-    )  # fmt: skip
+        torch.zeros(3, 64, 128),
+        torch.from_numpy(session.depth[0].astype(np.float32)),
+        torch.from_numpy(session.semantic[0].astype(np.int64)),
+        window,
+    )
     moved = object_learner._in_part(targets(box, TINY), window)
     rows, columns = np.nonzero(semantic.numpy() == box["kind"][0])
     drawn = [(columns.min() + columns.max() + 1) / 256, (rows.min() + rows.max() + 1) / 128]

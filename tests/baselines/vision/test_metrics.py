@@ -111,9 +111,11 @@ def test_places_up_to_two_metres_away_are_right_whatever_the_boxes_in_the_pictur
 
 def test_errors_of_boxes_in_space_are_of_the_detections_that_are_right_in_the_picture():
     picture = boxes(
-        [BOX, FAR], [BOX, (80.0, 80.0, 90.0, 90.0)], [0.9, 0.8],
+        [BOX, FAR],
+        [BOX, (80.0, 80.0, 90.0, 90.0)],
+        [0.9, 0.8],
         detected_spaces=[moved(x=3.0, z=4.0, heading=2.0 * math.pi + 0.5, longer=2.0), moved(x=50.0)],
-    )  # fmt: skip
+    )
     found = space_errors([picture], turned=(0,))
     assert found["place_error"] == pytest.approx(5.0) and found["range_error"] == pytest.approx(4.0 / 20.0)
     assert found["size_error"] == pytest.approx(0.5)  # the box is twice as long

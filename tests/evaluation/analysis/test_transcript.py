@@ -21,10 +21,14 @@ from tests.session.recording.builders import session
 def test_lines_show_words_acts_units_and_handled_exceptions() -> None:
     played = drive(
         exception(1.0, "task_delete", subgoal=0, landmark="KFC", status="Abandoned"),
-        said(2.0, Role.PARTICIPANT, ("No KFC,", act(M.INSTRUCT, LandmarkName.KFC, GoalStatus.ABANDONED)),
-             ("left here", act(M.INSTRUCT, ActionValue.J_TURN))),
+        said(
+            2.0,
+            Role.PARTICIPANT,
+            ("No KFC,", act(M.INSTRUCT, LandmarkName.KFC, GoalStatus.ABANDONED)),
+            ("left here", act(M.INSTRUCT, ActionValue.J_TURN)),
+        ),
         car(5.0, "left it is", M.CONFIRM, ActionValue.J_TURN),
-    )  # fmt: skip
+    )
     changed, first, answer = transcript_lines(played)
     assert (changed.speaker, changed.said) == (Role.AD_WIZARD, False) and changed.text.startswith("task delete: ")
     assert first.text == "No KFC, [Instruct(Status=Abandoned, Landmark=KFC)] left here [Instruct(Action=JTurn)]"

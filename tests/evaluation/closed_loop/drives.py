@@ -79,7 +79,12 @@ def record(
 ) -> SessionRecord:
     """What was measured of a session of two subgoals."""
     fields: dict[str, Any] = {
-        "live": 2, "reached": 2 if success else 1, "shortest": 300.0, "driven": 400.0, "seconds": 100.0,
-        "decisions": 200, "talk": TalkRecord(utterances=12, exchanges=8, abandoned=2, clarifications=4),
-    }  # fmt: skip
+        "live": 2,
+        "reached": 2 if success else 1,
+        "shortest": 300.0,
+        "driven": 400.0,
+        "seconds": 100.0,
+        "decisions": 200,
+        "talk": TalkRecord(utterances=12, exchanges=8, abandoned=2, clarifications=4),
+    }
     return SessionRecord(success=success, completion=completion, infractions=infractions or {}, **{**fields, **more})

@@ -182,8 +182,12 @@ def first_move(session: Session) -> int:
 def arrival(session: Session) -> Session:
     """The session with the arrival at its first subgoal."""
     row = session.header.subgoals[0]
-    data = {"subgoal": 0, "landmark": session.header.landmarks[row["landmark"]]["name"], "status": "Complete",
-            "cause": "arrival"}  # fmt: skip
+    data = {
+        "subgoal": 0,
+        "landmark": session.header.landmarks[row["landmark"]]["name"],
+        "status": "Complete",
+        "cause": "arrival",
+    }
     event = Event(frame=session.events[-1].frame - 15, type=EventType.SUBGOAL, source=Role.AGENT, data=data)
     return replace(session, events=(*session.events[:-1], event, session.events[-1]))
 

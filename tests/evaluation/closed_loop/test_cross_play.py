@@ -23,9 +23,12 @@ def settings(**changes: Any) -> CrossPlaySettings:
     drivers = [find_player(name, Role.CO_WIZARD) for name in ("scripted", "lane-follow")]
     guides = [find_player(name, Role.PARTICIPANT) for name in ("scripted", "silent")]
     usual: dict[str, Any] = {
-        "co_wizards": drivers, "participants": guides, "towns": ("brookside",), "sessions": 2,
+        "co_wizards": drivers,
+        "participants": guides,
+        "towns": ("brookside",),
+        "sessions": 2,
         "config": EnvConfig(max_seconds=5.0),
-    }  # fmt: skip
+    }
     return CrossPlaySettings(**{**usual, **changes})
 
 
@@ -33,8 +36,11 @@ def test_all_pairs_play_the_same_sessions(tmp_path: Path) -> None:
     seen: list[tuple[int, int]] = []
     result = cross_play(settings(), tmp_path, on_session=lambda done, total: seen.append((done, total)))
     assert list(result.cells) == [
-        ("scripted", "scripted"), ("scripted", "silent"), ("lane-follow", "scripted"), ("lane-follow", "silent"),
-    ]  # fmt: skip
+        ("scripted", "scripted"),
+        ("scripted", "silent"),
+        ("lane-follow", "scripted"),
+        ("lane-follow", "silent"),
+    ]
     seeds = {tuple(row.seed for row in cell.rows) for cell in result.cells.values()}
     assert len(seeds) == 1
     assert seen[-1] == (8, 8) and seen == sorted(seen)
@@ -82,8 +88,9 @@ def test_command_writes_json_result_and_page(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     assert [(cell["co_wizard"], cell["participant"]) for cell in found["cells"]] == [
-        ("lane-follow", "silent"), ("lane-follow", "random"),
-    ]  # fmt: skip
+        ("lane-follow", "silent"),
+        ("lane-follow", "random"),
+    ]
     assert set(found["cells"][0]["success"]) == {"mean", "low", "high"}
     assert json.loads((out / "cross_play.json").read_text()) == found
     text = page.read_text()

@@ -149,9 +149,7 @@ def test_claims_are_marked_in_page_output_and_json(tmp_path: Path) -> None:
     assert row["claims"] == ["figures", "name", "training cost", "run time"]
 
 
-def test_checked_rollout_claims_only_what_nobody_can_check(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+def test_checked_rollout_claims_only_what_nobody_can_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(submission, "PROTOCOL", PROTOCOL)
     monkeypatch.setenv("COLUMNS", "200")
     roll_out(settings(), tmp_path / "lane-follow")

@@ -57,9 +57,13 @@ def test_command_plays_the_same_again() -> None:
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
-    [({"sessions": 0}, "sessions is 0"), ({"seed": -1}, "seed is -1"), ({"towns": ()}, "towns is empty"),
-     ({"cast": {Role.CO_WIZARD: Player(name="silent")}}, "no player for participant, ad_wizard")],
-)  # fmt: skip
+    [
+        ({"sessions": 0}, "sessions is 0"),
+        ({"seed": -1}, "seed is -1"),
+        ({"towns": ()}, "towns is empty"),
+        ({"cast": {Role.CO_WIZARD: Player(name="silent")}}, "no player for participant, ad_wizard"),
+    ],
+)
 def test_invalid_settings_are_rejected(wrong: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         RolloutSettings(**wrong)  # type: ignore[arg-type]  # a wrong type on purpose

@@ -65,8 +65,13 @@ def own_policy(folder: Path) -> Player:
     """A Co-Wizard from a file, which the package does not have."""
     file = folder / "player.forgetful"
     file.write_text("forgetful")
-    return Player(name="own/player.forgetful", path=file, loader=load_forgetful, sha256="a" * 64,
-                  training={"steps": 1000, "seconds": 5.0})  # fmt: skip
+    return Player(
+        name="own/player.forgetful",
+        path=file,
+        loader=load_forgetful,
+        sha256="a" * 64,
+        training={"steps": 1000, "seconds": 5.0},
+    )
 
 
 def cast_with(co_wizard: Player) -> dict[Role, Player]:
@@ -89,9 +94,12 @@ def test_honest_rollout_has_no_fault(honest: Path) -> None:
     assert page["part"] == "unseen" and page["results"]["sessions"] == 3
     assert found.seed is not None
     assert page["check"] == {
-        "resimulated": list(found.resimulated), "share": 2 / 3, "seed": found.seed, "co_wizard_played": True,
+        "resimulated": list(found.resimulated),
+        "share": 2 / 3,
+        "seed": found.seed,
+        "co_wizard_played": True,
         "claims": ["run time"],
-    }  # fmt: skip
+    }
     assert check_submission(honest, sample=2, seed=found.seed, protocol=PROTOCOL) == found
     others = {check_submission(honest, sample=1, seed=seed, protocol=PROTOCOL).resimulated for seed in range(8)}
     assert len(others) > 1
@@ -142,9 +150,7 @@ def test_submission_file_is_compared_with_the_folder(honest: Path, tmp_path: Pat
         differences_from(tmp_path / "other.json", made)
 
 
-def test_command_writes_and_checks_a_submission(
-    honest: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+def test_command_writes_and_checks_a_submission(honest: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(submission, "PROTOCOL", PROTOCOL)
     monkeypatch.setenv("COLUMNS", "200")
     file = tmp_path / "submission.json"
@@ -188,9 +194,12 @@ def test_policy_of_a_file_with_state_and_persona_is_accepted_with_claims(tmp_pat
 def test_what_nobody_can_check_may_be_edited_and_is_claimed(tmp_path: Path) -> None:
     folder = tmp_path / "own"
     roll_out(settings(cast=cast_with(own_policy(tmp_path))), folder)
-    edit_settings(folder, lambda page: page.update(
-        co_wizard="best/model", sha256={"co_wizard": "b" * 64}, training={"co_wizard": {"steps": 1}}
-    ))  # fmt: skip
+    edit_settings(
+        folder,
+        lambda page: page.update(
+            co_wizard="best/model", sha256={"co_wizard": "b" * 64}, training={"co_wizard": {"steps": 1}}
+        ),
+    )
     (folder / "rollout.json").write_text(json.dumps(read_result(folder).to_json()))
     edit(folder / "cost.json", lambda page: page.update(cpu_seconds=0.1))
     for path in sessions_of(folder):
@@ -235,16 +244,17 @@ def test_shipped_models_are_played_again(name: str, tmp_path: Path) -> None:
     assert check_submission(tmp_path / "out", protocol=PROTOCOL).faults
 
 
-def test_name_of_a_model_that_cannot_be_played_here_is_a_claim(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+def test_name_of_a_model_that_cannot_be_played_here_is_a_claim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from dorothie_gym.policies import policy_loader
 
     player = find_player("pretrained:ppo", Role.CO_WIZARD)
     roll_out(settings(cast=cast_with(own_policy(tmp_path))), tmp_path / "out")
-    edit_settings(tmp_path / "out", lambda page: page.update(
-        co_wizard=player.name, sha256={"co_wizard": player.sha256}, training={"co_wizard": dict(player.training)}
-    ))  # fmt: skip
+    edit_settings(
+        tmp_path / "out",
+        lambda page: page.update(
+            co_wizard=player.name, sha256={"co_wizard": player.sha256}, training={"co_wizard": dict(player.training)}
+        ),
+    )
     (tmp_path / "out" / "rollout.json").write_text(json.dumps(read_result(tmp_path / "out").to_json()))
 
     def missing(path: Path, role: Role, limits: SpaceLimits) -> Any:
@@ -286,9 +296,11 @@ def test_rollout_that_was_killed_and_resumed_is_accepted(tmp_path: Path) -> None
     arguments = ["rollout", "--co-wizard", "lane-follow", "--towns", "brookside", "--sessions", "3", "--workers", "1"]
     process = subprocess.Popen(
         [sys.executable, "-m", "dorothie_gym.cli", *arguments, "--max-seconds", "600", "--out", str(folder)],
-        env={**os.environ, "PYTHONPATH": str(ROOT)}, start_new_session=True,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     while process.poll() is None and not any(folder.glob(".parts/*/*.journal")):
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGKILL)

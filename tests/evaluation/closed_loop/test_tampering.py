@@ -28,7 +28,7 @@ def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
 )
 def test_tampering_is_found(
     tampering: Tampering, honest: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+) -> None:
     folder = tmp_path / "rollout"
     if tampering.edits is not None:
         shutil.copytree(honest, folder)

@@ -42,9 +42,12 @@ def begin(
     arguments = [str(part) for name, value in settings.items() for part in (f"--{name}", value)]
     return subprocess.Popen(
         [sys.executable, "-m", "dorothie_gym.cli", "generate", *arguments],
-        env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        text=True,
+        start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
 
 
 def _wait_for_work(process: subprocess.Popen[str], root: Path) -> None:

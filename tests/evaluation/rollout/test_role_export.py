@@ -48,7 +48,7 @@ def same(one: Any, other: Any) -> bool:
 @pytest.mark.parametrize("role", AGENT_ROLES)
 def test_hugging_face_loads_equal_values(
     corpus: Path, tmp_path: Path, role: Role, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+) -> None:
     monkeypatch.setenv("HF_HOME", str(tmp_path / "home"))
     datasets = pytest.importorskip("datasets", reason="needs the extra 'hf'")
     found = episodes_of(corpus, role)
@@ -131,7 +131,7 @@ def test_minari_has_the_masks(corpus: Path, tmp_path: Path, monkeypatch: pytest.
 @pytest.mark.parametrize("storage", STORAGES)
 def test_vectors_are_those_of_flatten(
     corpus: Path, tmp_path: Path, storage: str, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+) -> None:
     needs_minari(storage)
     found, fields = episodes_of(corpus, Role.CO_WIZARD), ["physical", "angle"]
     name = export_minari(found, Role.CO_WIZARD, tmp_path, storage=storage, fields=fields)

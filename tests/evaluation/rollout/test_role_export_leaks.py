@@ -46,9 +46,10 @@ def variants() -> Iterator[Scenario]:
     """Yields scenarios that the Co-Wizard cannot tell apart: other storyboards, stories, errands and hidden places."""
     town = load_town("brookside")
     seed = next(
-        seed for seed in range(50, 500)
+        seed
+        for seed in range(50, 500)
         if any(mark.hidden for mark in draw_scenario(town, None, seed).storyboard.landmarks)
-    )  # fmt: skip
+    )
     first = draw_scenario(town, None, seed)
     yield first
     yield with_hidden_landmarks_moved(first, town, np.random.default_rng(1))

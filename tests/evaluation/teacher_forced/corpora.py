@@ -30,10 +30,14 @@ def oracle(labels: CorpusLabels, model: str = "oracle", seed: int = 0, shift: in
         rows = np.roll(np.arange(len(truth)), shift)
         found.append(
             TaskPredictions(
-                model=model, seed=seed, task=task, sessions=truth.sessions, events=truth.events,
+                model=model,
+                seed=seed,
+                task=task,
+                sessions=truth.sessions,
+                events=truth.events,
                 predicted=truth.labels.take(rows),
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -44,9 +48,13 @@ def wrong_moves(labels: CorpusLabels, model: str, seed: int, share: float) -> Ta
     right = np.arange(len(truth)) < share * len(truth)
     moves = np.where(right, truth.labels.moves, int(DialogueMove.IRRELEVANT))
     return TaskPredictions(
-        model=model, seed=seed, task=Task.UFN, sessions=truth.sessions, events=truth.events,
+        model=model,
+        seed=seed,
+        task=Task.UFN,
+        sessions=truth.sessions,
+        events=truth.events,
         predicted=ActPredictions(moves=moves, slots=truth.labels.slots & right[:, None]),
-    )  # fmt: skip
+    )
 
 
 def no_acts(count: int) -> ActPredictions:

@@ -39,9 +39,12 @@ def test_flagged_events_that_are_no_points_are_named_with_the_reason(tmp_path: P
     said = [event for event in talk() if event.type is EventType.DIALOGUE_MOVE][:1]
     aside = Event(frame=20, type=EventType.DIALOGUE_MOVE, source=Role.AD_WIZARD, flagged=True, data=said[0].data)
     braking = Event(
-        frame=25, type=EventType.PHYSICAL_ACTION, source=Role.AGENT, flagged=True,
+        frame=25,
+        type=EventType.PHYSICAL_ACTION,
+        source=Role.AGENT,
+        flagged=True,
         data={"action": "Stop", "angle": None, "up": None},
-    )  # fmt: skip
+    )
     write(tmp_path / "a", [aside, braking, physical(30, PhysicalAction.SPEED_CHANGE, up=True), physical(40, JTURN)])
     labels = labels_of(tmp_path, "all")
     count = labels.counts[""]

@@ -40,7 +40,7 @@ class Served(ServedApplication):
             headers["Authorization"] = f"Bearer {self.seats[name].token}"
         request = urllib.request.Request(
             f"http://127.0.0.1:{self.port}{path}", data=body, headers=headers, method=method
-        )  # fmt: skip
+        )
         try:
             with urllib.request.urlopen(request, timeout=30) as answer:
                 return answer.status, answer.headers, answer.read()

@@ -118,7 +118,7 @@ def test_a_torn_last_line_is_the_edit_that_was_not_acknowledged(tmp_path: Path) 
         (1, HEAD, "another text"),
         (2, "\udc80", "line 2"),
     ],
-)  # fmt: skip
+)
 def test_damage_is_one_error_that_names_the_line(line: int, text: str, wanted: str, tmp_path: Path) -> None:
     log = marked(tmp_path / "s")
     lines = log.path.read_text().splitlines()

@@ -129,9 +129,7 @@ def test_a_log_is_never_written_past_what_is_read(spare: Extent, words: int, lim
     else:
         rich = LABELS if spare.size else ()
         changes = [Change(utterances={FIRST: (span(words, move, *rich),)}) for move in list(DialogueMove)[:2]]
-    most = Extent(
-        size=MAX_SESSION_TEXT - spare.size, lines=MAX_LINES - spare.lines, values=MAX_VALUES - spare.values
-    )  # fmt: skip
+    most = Extent(size=MAX_SESSION_TEXT - spare.size, lines=MAX_LINES - spare.lines, values=MAX_VALUES - spare.values)
     fill(AnnotationLog(text, tmp_path / "s", "anna"), changes, most)
     log = AnnotationLog(text, tmp_path / "s", "anna")
     before = log.edits

@@ -134,9 +134,12 @@ def test_logs_that_are_links_are_refused_and_not_written(served: Served) -> None
         {"base": 0, "change": {"utterances": [{"speaker": "participant", "utterance": 0, "spans": [INSTRUCT]}]}}
     )
     for name, path, content in (
-        ("anna", "marks", None), ("anna", "mark", body), ("anna", "undo", '{"base":0}'), ("carol", "mark", body),
+        ("anna", "marks", None),
+        ("anna", "mark", body),
+        ("anna", "undo", '{"base":0}'),
+        ("carol", "mark", body),
         ("carol", "versions", None),
-    ):  # fmt: skip
+    ):
         status, _, answer = served.raw(f"/api/sessions/0/{path}", content and content.encode(), name)
         assert status == 400 and "is a link" in json.loads(answer)["reason"], (name, path, answer)
     assert outside.read_bytes() == b"a secret" and not (outside.parent / "missing").exists()

@@ -33,9 +33,11 @@ STRICT: dict[str, Any] = {
     **{name: [*_NUMBERS, -1, 1.5, 2**40] for name in ("n", "utterance", "item", "count", "rate")},
     **{name: [*_NUMBERS, 1e300, -1e300] for name in ("x", "y", "share")},
     **{name: [*_TEXTS, "", "nonsense", "\x00", "../..", "\ud800"] for name in _LABELS},
-    "text": _TEXTS, "junctions": [None, {}, "1", [1.5], ["x"], [-1], [10**40]], "on": [None, {}, 1, "yes"],
+    "text": _TEXTS,
+    "junctions": [None, {}, "1", [1.5], ["x"], [-1], [10**40]],
+    "on": [None, {}, 1, "yes"],
     "landmarks": [None, {}, "KFC", [1], [None]],
-}  # fmt: skip
+}
 """Fields of messages, and values of which none is allowed."""
 
 

@@ -91,8 +91,9 @@ class Keyboard:
         self.page.wait_for_selector(".over >> text=Next session", timeout=90_000)
         assert table.room.state is RoomState.OVER
         assert self.page.evaluate("document.activeElement.textContent") in (
-            "The session is over", "All errands are done",
-        )  # fmt: skip
+            "The session is over",
+            "All errands are done",
+        )
         self.to("Next session")
         self.press("Enter")
         self.until(lambda: table.room.state is RoomState.RUNNING)

@@ -53,9 +53,11 @@ def test_malformed_messages_are_refused_one_by_one(
             before = memory()
     assert memory() - before < GROWTH
     assert not caplog.records, "no error of the program"
-    with served.connect(served.room.seats["co_wizard"].token) as socket, served.connect(
-        served.room.seats["participant"].token
-    ), served.connect(served.room.seats["ad_wizard"].token):  # fmt: skip
+    with (
+        served.connect(served.room.seats["co_wizard"].token) as socket,
+        served.connect(served.room.seats["participant"].token),
+        served.connect(served.room.seats["ad_wizard"].token),
+    ):
         assert json.loads(socket.recv(timeout=10))["k"] == "hello"
         socket.send(json.dumps({"k": "drive", "n": 1, "action": "SpeedChange", "up": True}))
         while json.loads(socket.recv(timeout=10)).get("done") != 1:

@@ -91,9 +91,11 @@ def test_ten_thousand_mutated_messages_are_read_or_refused() -> None:
     rng = np.random.default_rng(0)
     sound = [
         b'{"k":"say","n":1,"text":"Left.","spans":[{"text":"Left.","move":"Instruct","slots":{"Action":["JTurn"]}}]}',
-        b'{"k":"drive","n":2,"action":"JTurn","angle":-84,"up":true}', b'{"k":"join","token":"abc"}',
-        b'{"k":"task","n":3,"change":"trigger","item":1,"message":"Hurry."}', b'{"k":"view","rate":10}',
-    ]  # fmt: skip
+        b'{"k":"drive","n":2,"action":"JTurn","angle":-84,"up":true}',
+        b'{"k":"join","token":"abc"}',
+        b'{"k":"task","n":3,"change":"trigger","item":1,"message":"Hurry."}',
+        b'{"k":"view","rate":10}',
+    ]
     refused = 0
     for k in range(10_000):
         content = bytearray(sound[k % len(sound)])

@@ -22,9 +22,9 @@ STREETS = [StreetName(k) for k in range(1, 9)]
 
 def rows(role: Role, table: Table) -> list[list[Any]]:
     engine = table.room.engine
-    found: list[list[Any]] = role_view(
-        role, engine.observations[role.value], engine.mask(role), table.room._places
-    )["landmarks"]  # fmt: skip
+    found: list[list[Any]] = role_view(role, engine.observations[role.value], engine.mask(role), table.room._places)[
+        "landmarks"
+    ]
     return found
 
 

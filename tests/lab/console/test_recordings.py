@@ -61,8 +61,11 @@ def test_recordings_are_the_audio_of_utterances_and_typed_ones_have_none(tmp_pat
     assert table.room.record is not None
     session = Session.load(table.room.record.folder)
     assert lengths(session) == [
-        ("Hello. Turn left at the corner.", [1.5]), ("Okay.", []), ("Okay.", [0.5]), ("Go on. Stop there.", [1.0]),
-    ]  # fmt: skip
+        ("Hello. Turn left at the corner.", [1.5]),
+        ("Okay.", []),
+        ("Okay.", [0.5]),
+        ("Go on. Stop there.", [1.0]),
+    ]
     last = session.utterances(Role.PARTICIPANT)[-1]
     assert len(audio_files(session, last)[0].spans) == 1, "the second span was spoken, the first one typed"
     track = sound_track(session, 0.0, 30.0)

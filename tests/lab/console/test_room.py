@@ -231,9 +231,7 @@ def test_the_session_goes_on_without_a_person_where_the_rules_say_so() -> None:
 @pytest.mark.long
 def test_a_script_takes_over_and_finishes_the_errands(tmp_path: Path) -> None:
     rules = AbsenceRules(seconds=2.0, then=AfterAbsence.SCRIPT)
-    table = Table(
-        "co_wizard=human,ad_wizard=silent", folder=tmp_path, absence=rules, max_seconds=600.0
-    )  # fmt: skip
+    table = Table("co_wizard=human,ad_wizard=silent", folder=tmp_path, absence=rules, max_seconds=600.0)
     co_wizard = table.seat("co_wizard")
     table.run(20.0)
     co_wizard.leave()

@@ -12,8 +12,10 @@ from dorothie_gym.ontology import Role
 def test_roles_that_are_not_named_are_open() -> None:
     plans = parse_roles("co-wizard=human, participant=scripted")
     assert {role: plan.label for role, plan in plans.items()} == {
-        Role.PARTICIPANT: "scripted", Role.CO_WIZARD: "human", Role.AD_WIZARD: "open",
-    }  # fmt: skip
+        Role.PARTICIPANT: "scripted",
+        Role.CO_WIZARD: "human",
+        Role.AD_WIZARD: "open",
+    }
     assert {plan.occupancy for plan in parse_roles("").values()} == {Occupancy.OPEN}
 
 

@@ -35,7 +35,7 @@ STUDY: dict[str, Any] = {
         "completion": {"code": "FINISHED", "url": "https://recruiting.example.org/done"},
         "no_partner": {"code": "WAITED"},
     },
-}  # fmt: skip
+}
 """Study with two people in short sessions."""
 
 SOLO = {

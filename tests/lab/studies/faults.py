@@ -106,9 +106,12 @@ def prepare(folder: Path) -> str:
         one, _ = records.add_participant({"PROLIFIC_PID": TRACES[2]})
         two, _ = records.add_participant({"PROLIFIC_PID": KEPT[1]})
         slot = Slot(
-            number=0, people=(Role.PARTICIPANT, Role.CO_WIZARD), conditions=("exact",),
-            scenarios=(Scenario(town="brookside"),), seeds=(1,),
-        )  # fmt: skip
+            number=0,
+            people=(Role.PARTICIPANT, Role.CO_WIZARD),
+            conditions=("exact",),
+            scenarios=(Scenario(town="brookside"),),
+            seeds=(1,),
+        )
         records.add_group(slot, {Role.PARTICIPANT: one, Role.CO_WIZARD: two})
         records.set_folder("S00001-01", "S00001-01")
         records.finish_session("S00001-01", "arrived", success=True, seconds=5.0)

@@ -203,9 +203,13 @@ def kill_again_and_again(folder: Path, *, times: int, seed: int, longest: float 
         elif person.answered:
             assert person.word in answers, person.word
     return {
-        "kills": times, "full_disks": full, "people": len(people), "withdrawn": sum(person.gone for person in people),
-        "answers": sum(person.answered for person in people), "said": sum(person.said for person in people),
-    }  # fmt: skip
+        "kills": times,
+        "full_disks": full,
+        "people": len(people),
+        "withdrawn": sum(person.gone for person in people),
+        "answers": sum(person.answered for person in people),
+        "said": sum(person.said for person in people),
+    }
 
 
 def _check_files(data: Path, people: list[Person]) -> None:

@@ -63,8 +63,11 @@ def test_an_erasure_is_finished_by_the_next_start_after_the_disk_has_died(tmp_pa
 def test_an_erasure_that_is_killed_at_any_write_is_finished_by_the_next_start(tmp_path: Path) -> None:
     found = subprocess.run(
         [sys.executable, "-m", "tests.lab.studies.faults", str(tmp_path)],
-        capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
+    )
     assert found.returncode == 0, found.stderr
     result = json.loads(found.stdout)
     assert result["left"] == [] and result["kills"] > 25

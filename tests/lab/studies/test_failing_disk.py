@@ -120,5 +120,9 @@ def test_a_server_that_died_at_its_first_start_starts_again(tmp_path: Path) -> N
     with running_study(file, data) as (_, records):
         assert records.participants() == []
     assert sorted(path.name for path in data.iterdir()) == [
-        "recruitment.sqlite", "run.lock", "sessions", "study.sqlite", "study.yaml",
-    ]  # fmt: skip
+        "recruitment.sqlite",
+        "run.lock",
+        "sessions",
+        "study.sqlite",
+        "study.yaml",
+    ]

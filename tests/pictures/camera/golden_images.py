@@ -73,9 +73,11 @@ def _bodies(town: Town, image: GoldenImage) -> _Bodies:
     lane = town.lanes[image.lane]
     bodies = _Bodies(empty_records(VehicleRecord, 3), empty_records(PedestrianRecord, 1), empty_records(PropRecord, 0))
     places = (
-        (bodies.vehicles[0], 11.0, 0.0, 0.0), (bodies.vehicles[1], 6.5, 1.3, 0.0),
-        (bodies.vehicles[2], 9.0, -3.5, math.pi), (bodies.pedestrians[0], 8.0, 3.4, 0.4),
-    )  # fmt: skip
+        (bodies.vehicles[0], 11.0, 0.0, 0.0),
+        (bodies.vehicles[1], 6.5, 1.3, 0.0),
+        (bodies.vehicles[2], 9.0, -3.5, math.pi),
+        (bodies.pedestrians[0], 8.0, 3.4, 0.4),
+    )
     for key, (body, ahead, aside, turn) in enumerate(places):
         station = min(image.station + ahead, lane.length)
         body.x, body.y = lane.position(station, aside).tolist()

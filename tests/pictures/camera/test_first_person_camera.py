@@ -63,9 +63,14 @@ def scene(builder: MeshBuilder, *, ground: bool = True, lamps: Array | None = No
     places = np.zeros((0, 3)) if lamps is None else lamps
     atlas = TextureAtlas([halves]).arrays()
     return CameraScene(
-        town=town, cells=cells, ground=ground_arrays([sheet]), atlas=atlas, lamps=lamp_map(places), bank=bank(),
+        town=town,
+        cells=cells,
+        ground=ground_arrays([sheet]),
+        atlas=atlas,
+        lamps=lamp_map(places),
+        bank=bank(),
         noise=sky_noise(),
-    )  # fmt: skip
+    )
 
 
 def weather(**values: float) -> Weather:
@@ -109,9 +114,14 @@ def test_contrast_falls_off_as_the_perception_of_the_simulator(distance: float, 
     builder = MeshBuilder()
     for side, colour in ((-1, WHITE), (1, (0, 0, 0))):
         builder.panel(
-            (distance, side * distance / 4, 1.5), 0.0, distance / 4, distance / 4, colour=colour,
-            kind=ObjectClass.TRAFFIC_SIGN, surface=Surface.EMISSIVE,
-        )  # fmt: skip
+            (distance, side * distance / 4, 1.5),
+            0.0,
+            distance / 4,
+            distance / 4,
+            colour=colour,
+            kind=ObjectClass.TRAFFIC_SIGN,
+            surface=Surface.EMISSIVE,
+        )
     camera = FirstPersonCamera(scene(builder, ground=False), CONFIG)
 
     def contrast(sky: Weather) -> float:
@@ -369,9 +379,13 @@ def test_another_process_without_the_compiler_draws_the_same_bytes() -> None:
     script = "from tests.pictures.camera.test_first_person_camera import small_picture; print(small_picture())"
     root = Path(__file__).parents[3]
     run = subprocess.run(
-        [sys.executable, "-W", "error", "-c", script], cwd=root, env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        [sys.executable, "-W", "error", "-c", script],
+        cwd=root,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert run.stdout.strip() == small_picture()
 
 

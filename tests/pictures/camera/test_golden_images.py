@@ -54,11 +54,14 @@ def test_other_processes_and_numbers_of_threads_draw_the_same_bytes() -> None:
     script = f"from tests.pictures.camera.test_golden_images import digest_of; print(digest_of({DRAWN!r}))"
     runs = [
         subprocess.Popen(
-            [sys.executable, "-W", "error", "-c", script], cwd=Path(__file__).parents[3], text=True,
-            env={**os.environ, "NUMBA_NUM_THREADS": count, "PYTHONHASHSEED": count}, stdout=subprocess.PIPE,
+            [sys.executable, "-W", "error", "-c", script],
+            cwd=Path(__file__).parents[3],
+            text=True,
+            env={**os.environ, "NUMBA_NUM_THREADS": count, "PYTHONHASHSEED": count},
+            stdout=subprocess.PIPE,
         )
         for count in ("1", "2")
-    ]  # fmt: skip
+    ]
     answers = {run.communicate()[0].strip() for run in runs}
     assert all(run.returncode == 0 for run in runs)
     assert answers == {digest_of(DRAWN)}

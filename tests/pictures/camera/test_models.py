@@ -136,8 +136,13 @@ def test_number_plates_are_read_from_left_to_right() -> None:
 
 
 def test_classes_are_those_of_the_perception() -> None:
-    kinds = {0: ObjectClass.VEHICLES, FIRST_CYCLIST: ObjectClass.VEHICLES, FIRST_PERSON: ObjectClass.PEDESTRIAN,
-             FIRST_COARSE: ObjectClass.PEDESTRIAN, FIRST_PROP: ObjectClass.STATIC}  # fmt: skip
+    kinds = {
+        0: ObjectClass.VEHICLES,
+        FIRST_CYCLIST: ObjectClass.VEHICLES,
+        FIRST_PERSON: ObjectClass.PEDESTRIAN,
+        FIRST_COARSE: ObjectClass.PEDESTRIAN,
+        FIRST_PROP: ObjectClass.STATIC,
+    }
     for number, kind in kinds.items():
         assert set(model(number).classes.tolist()) == {kind.value}
 
@@ -188,9 +193,7 @@ def test_bodies_near_the_camera_are_placed_once_without_the_own_car() -> None:
     props[1].length, props[1].width = PropKind.DUMPSTER.length, PropKind.DUMPSTER.width
     placed = empty_records(PlacementRecord, 32)
     eye = np.array([0.0, 0.0])
-    count = place_bodies(
-        argument(vehicles), argument(walkers), argument(props), eye, 100.0, 1, False, argument(placed)
-    )  # fmt: skip
+    count = place_bodies(argument(vehicles), argument(walkers), argument(props), eye, 100.0, 1, False, argument(placed))
     assert placed["key"][:count].tolist() == [2, 3, 6, 21, 23, 31]
     assert placed[0].x == 20.0
     assert FIRST_CYCLIST <= placed[2].model < FIRST_PERSON

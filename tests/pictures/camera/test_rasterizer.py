@@ -30,7 +30,7 @@ from dorothie_gym.pictures.camera.rasterizer import (
     draw_collected,
     draw_triangles,
     new_buffer,
-)  # fmt: skip
+)
 from dorothie_gym.pictures.camera.samples import new_samples
 
 GREY = (128, 128, 128)

@@ -49,10 +49,8 @@ class Script(Policy[int]):
         actions = {
             30: AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=Sensor.BLUR, on=True),
             36: AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=Sensor.BLUR, on=False),
-            44: AdWizardAction(
-                exception=ExceptionKind.WEATHER, weather=WeatherParameter.SUN_ALTITUDE_ANGLE, share=0.3
-            ),
-        }  # fmt: skip
+            44: AdWizardAction(exception=ExceptionKind.WEATHER, weather=WeatherParameter.SUN_ALTITUDE_ANGLE, share=0.3),
+        }
         return actions.get(state, AdWizardAction()).encode(self.limits), state + 1
 
 

@@ -254,9 +254,12 @@ def test_stamps_turn_and_scale_a_mesh_with_its_texture() -> None:
     builder.panel((1.0, 0.0, 1.0), 0.0, 2.0, 1.0, colour=(100, 100, 100), kind=ObjectClass.TRAFFIC_SIGN, texture=3)
     template = builder.build()
     mesh = stamped(
-        template, np.array([[5.0, 0.0, 0.0], [0.0, 9.0, 2.0]]), np.array([0.0, math.pi / 2.0]), np.array([1.0, 2.0]),
+        template,
+        np.array([[5.0, 0.0, 0.0], [0.0, 9.0, 2.0]]),
+        np.array([0.0, math.pi / 2.0]),
+        np.array([1.0, 2.0]),
         np.array([[1.0, 1.0, 1.0], [0.5, 1.0, 2.0]]),
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(mesh.corners[:2], template.corners + (5.0, 0.0, 0.0), atol=1e-6)
     np.testing.assert_allclose(mesh.corners[2:].reshape(-1, 3).mean(axis=0)[1], 9.0 + 2.0, atol=1e-5)
     np.testing.assert_allclose(mesh.normals[2:], [[0.0, -1.0, 0.0]] * 2, atol=1e-6)

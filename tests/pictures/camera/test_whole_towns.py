@@ -46,9 +46,10 @@ from tests.maps.opendrive_text import shared_map
 
 WIDTH, HEIGHT = 240, 160
 LABELS = CameraConfig(
-    width=WIDTH, height=HEIGHT,
+    width=WIDTH,
+    height=HEIGHT,
     outputs=(CameraOutput.DEPTH, CameraOutput.SEMANTIC, CameraOutput.INSTANCE, CameraOutput.BOXES),
-)  # fmt: skip
+)
 PLACES = 20
 TOWNS = [
     pytest.param("brookside", 4, id="brookside"),

@@ -42,8 +42,11 @@ def test_playback_shows_what_was_visible(seen: tuple[Session, dict[int, Scene]])
     for frame in (15, 600, 1800):
         then, now = scenes[frame], playback.scene(frame)
         assert (now.car.x, now.car.y, now.car.heading, now.car.speed) == (
-            then.car.x, then.car.y, then.car.heading, then.car.speed,
-        )  # fmt: skip
+            then.car.x,
+            then.car.y,
+            then.car.heading,
+            then.car.speed,
+        )
         assert now.car.lights == then.car.lights and now.weather == then.weather and now.time == then.time
         assert {(a.x, a.y) for a in now.others} == {(a.x, a.y) for a in then.others}
         assert now.subgoals == then.subgoals

@@ -62,9 +62,11 @@ class _Handler(BaseHTTPRequestHandler):
     def _complete(self, text: str | None, ended: str = "stop", **message: str) -> None:
         answer = {"role": "assistant", "content": text, **message}
         page = {
-            "id": "x", "object": "chat.completion", "usage": {"prompt_tokens": 100, "completion_tokens": 7},
+            "id": "x",
+            "object": "chat.completion",
+            "usage": {"prompt_tokens": 100, "completion_tokens": 7},
             "choices": [{"index": 0, "message": answer, "finish_reason": ended}],
-        }  # fmt: skip
+        }
         self._send(json.dumps(page).encode())
 
     def _fine(self, request: Mapping[str, Any]) -> None:

@@ -153,7 +153,7 @@ class CoWizardReader:
 
     def _take(
         self, page: Page, act: DialogueAct, words: ParsedText, note: dict[str, str], answer: dict[str, str]
-    ) -> None:  # fmt: skip
+    ) -> None:
         landmarks = [name for name in act.values(Slot.LANDMARK) if name in NAMES]
         actions = [value for value in act.values(Slot.ACTION) if value is not ActionValue.QUERIED]
         statuses = act.values(Slot.STATUS)
@@ -195,7 +195,7 @@ class CoWizardReader:
 
     def _aim(
         self, page: Page, name: LandmarkName, words: ParsedText, note: dict[str, str], answer: dict[str, str]
-    ) -> None:  # fmt: skip
+    ) -> None:
         if "halt" in note and _name(page.goal) == name.label and words.distance is None:  # this is not the place yet
             note.clear()
             note["go"] = "1"
@@ -226,9 +226,14 @@ class CoWizardReader:
             answer.update(goal=label, say="It is not on my map. Which way should I go?")
 
     def _obey(
-        self, page: Page, action: ActionValue, act: DialogueAct, words: ParsedText, note: dict[str, str],
+        self,
+        page: Page,
+        action: ActionValue,
+        act: DialogueAct,
+        words: ParsedText,
+        note: dict[str, str],
         answer: dict[str, str],
-    ) -> None:  # fmt: skip
+    ) -> None:
         answer["say"] = answer["say"] or "Okay."
         if action is ActionValue.STOP:
             note.clear()

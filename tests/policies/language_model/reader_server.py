@@ -21,8 +21,10 @@ def answer_by_role(request: Mapping[str, Any]) -> Mapping[str, str]:
     """Returns the answer of the program of the role whose fields the request's schema has."""
     fields = request["response_format"]["json_schema"]["schema"]["properties"]
     programs: dict[str, Callable[[str], dict[str, str]]] = {
-        "drive": CoWizardReader(), "guide": guide, "change": Interferer(),
-    }  # fmt: skip
+        "drive": CoWizardReader(),
+        "guide": guide,
+        "change": Interferer(),
+    }
     program = next(program for field, program in programs.items() if field in fields)
     content = request["messages"][1]["content"]
     return program(content if isinstance(content, str) else content[0]["text"])

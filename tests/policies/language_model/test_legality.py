@@ -117,9 +117,14 @@ def test_words_are_the_beginning_of_what_was_said(text: str) -> None:
     assert len(read) == len(spoken) <= 20 or (len(spoken) > 20 and (spoken[len(read)] == " " or len(read) == 20))
 
 
-@given(st.text(max_size=40) | st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=5),
-       lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
-       max_leaves=5).map(json.dumps))  # fmt: skip
+@given(
+    st.text(max_size=40)
+    | st.recursive(
+        st.none() | st.booleans() | st.floats() | st.text(max_size=5),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+        max_leaves=5,
+    ).map(json.dumps)
+)
 def test_any_other_answer_is_refused_with_a_reason(text: str) -> None:
     try:
         read = SCHEMA.read(text)

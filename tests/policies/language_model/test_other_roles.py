@@ -59,8 +59,11 @@ def test_prompt_contains_the_picture_that_the_role_observes() -> None:
     config = EnvConfig(max_seconds=5.0, camera=CameraConfig(width=96, height=64))
     with serving() as server:
         asks = LanguageModelConfig(model="m", url=server.url, pictures=True)
-        play({Role.CO_WIZARD: asks, Role.AD_WIZARD: replace(asks, model="blind")}, config=config,
-             on_step=lambda engine: seen.append(engine.observations["co_wizard"]["camera"].copy()))  # fmt: skip
+        play(
+            {Role.CO_WIZARD: asks, Role.AD_WIZARD: replace(asks, model="blind")},
+            config=config,
+            on_step=lambda engine: seen.append(engine.observations["co_wizard"]["camera"].copy()),
+        )
     first = next(request for request in server.requests if request["model"] == "m")
     text, picture = first["messages"][1]["content"]
     assert text["type"] == "text" and "You can drive" in text["text"]

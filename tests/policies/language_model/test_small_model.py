@@ -30,9 +30,12 @@ def test_small_model_answers_under_the_schema(tmp_path: Path) -> None:
     params.cpuparams.n_threads = params.cpuparams_batch.n_threads = 1  # several wait for each other on a busy machine
     server = xllamacpp.Server(params)
     config = LanguageModelConfig(
-        model="smollm2", url=f"{server.listening_address}/v1", timeout=300.0, max_tokens=300,
+        model="smollm2",
+        url=f"{server.listening_address}/v1",
+        timeout=300.0,
+        max_tokens=300,
         cassette=tmp_path / "tape.jsonl",
-    )  # fmt: skip
+    )
     summary = play({Role.CO_WIZARD: config}, config=EnvConfig(max_seconds=8.0))
     usage = summary["usage"]["co_wizard"]
     print(usage)

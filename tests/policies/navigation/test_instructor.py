@@ -46,9 +46,11 @@ class Talk:
         """The instructor, which knows the landmarks of the session."""
         marks, streets = read_landmarks(self.seen, self.town), self.seen["street_names"].tolist()
         arrays = instructor_arrays(
-            subgoals=len(self.seen["subgoals"]), landmarks=1 + max(m.row for m in marks),
-            streets=len(streets), things=len(self.seen["objects"]),
-        )  # fmt: skip
+            subgoals=len(self.seen["subgoals"]),
+            landmarks=1 + max(m.row for m in marks),
+            streets=len(streets),
+            things=len(self.seen["objects"]),
+        )
         arrays.names[:] = streets
         arrays.now["by_name"] = self.guidance is Guidance.GOALS
         for mark in marks:

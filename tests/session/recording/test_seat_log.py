@@ -40,9 +40,14 @@ def test_a_torn_last_line_is_left_out(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "line",
-    ['{"frame":-1,"kind":"joined","role":null,"data":{}}', '{"frame":0,"kind":"flew","role":null,"data":{}}',
-     '{"frame":0,"kind":"joined","role":"agent","data":{}}', '{"frame":0,"kind":"joined","role":null,"data":[]}', "[]"],
-)  # fmt: skip
+    [
+        '{"frame":-1,"kind":"joined","role":null,"data":{}}',
+        '{"frame":0,"kind":"flew","role":null,"data":{}}',
+        '{"frame":0,"kind":"joined","role":"agent","data":{}}',
+        '{"frame":0,"kind":"joined","role":null,"data":[]}',
+        "[]",
+    ],
+)
 def test_damaged_lines_are_named(line: str, tmp_path: Path) -> None:
     (tmp_path / SEATS_FILE).write_text(line + "\n", encoding="utf-8")
     with pytest.raises(SessionError, match=f"{SEATS_FILE}, line 1"):

@@ -28,8 +28,10 @@ def planners(name: str) -> Iterator[LocalPlanner]:
     for lane in roads.town.lanes:
         planner = on_lane(roads, lane.id, 0.3 * lane.length).ego.planner
         for action, angle in (
-            (PhysicalAction.LANE_SWITCH, 90), (PhysicalAction.U_TURN, 0), (PhysicalAction.J_TURN, -90),
-        ):  # fmt: skip
+            (PhysicalAction.LANE_SWITCH, 90),
+            (PhysicalAction.U_TURN, 0),
+            (PhysicalAction.J_TURN, -90),
+        ):
             planner.command(action, angle, 5.0)
             yield planner
 

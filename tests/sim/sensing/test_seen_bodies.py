@@ -79,10 +79,15 @@ class Street:
         """All within sight of a clear noon, nearest first, as objects."""
         found = [
             PerceivedBody(
-                key=int(thing.key), kind=kind, x=float(thing.x), y=float(thing.y), heading=float(thing.heading),
+                key=int(thing.key),
+                kind=kind,
+                x=float(thing.x),
+                y=float(thing.y),
+                heading=float(thing.heading),
                 length=0.5 if kind is ObjectClass.PEDESTRIAN else float(thing.length),
                 width=0.5 if kind is ObjectClass.PEDESTRIAN else float(thing.width),
-                speed=0.0 if kind is ObjectClass.STATIC else float(thing.speed), height=float(thing.height),
+                speed=0.0 if kind is ObjectClass.STATIC else float(thing.speed),
+                height=float(thing.height),
             )
             for kind, things in (
                 (ObjectClass.VEHICLES, [v for v in self.vehicles[1:] if v.kind != Kind.EMPTY]),
@@ -90,7 +95,7 @@ class Street:
                 (ObjectClass.STATIC, [p for p in self.props if p.present]),
             )
             for thing in things
-        ]  # fmt: skip
+        ]
         near = [body for body in found if self.distance(body) < CLEAR_SIGHT]
         return sorted(near, key=lambda body: (self.distance(body), body.key))
 

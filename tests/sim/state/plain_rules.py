@@ -165,7 +165,10 @@ def lawless_way(network: TownNetwork, rng: np.random.Generator, frames: int) -> 
             station = max(lane.length - LENGTH / 2 - float(rng.uniform(0.0, 5.0)), 0.0)
         heading = lane.heading_at(station)
         poses[k] = (
-            *lane.position(station, lateral), heading + turned + rng.normal(0.0, 0.03), speed, lane.height_at(station),
+            *lane.position(station, lateral),
+            heading + turned + rng.normal(0.0, 0.03),
+            speed,
+            lane.height_at(station),
             turning > 0,
-        )  # fmt: skip
+        )
     return poses

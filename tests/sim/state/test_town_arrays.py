@@ -9,10 +9,11 @@ from dorothie_gym.sim.state.town_arrays import town_arrays
 from tests.sim.network.towns import WEST_EAST, WEST_IN, WEST_SOUTH, find_town, t_junction_town
 
 CONTROLS = {
-    SignalKind.TRAFFIC_LIGHT: TrafficControl.LIGHT, SignalKind.STOP: TrafficControl.STOP,
+    SignalKind.TRAFFIC_LIGHT: TrafficControl.LIGHT,
+    SignalKind.STOP: TrafficControl.STOP,
     SignalKind.YIELD: TrafficControl.YIELD,
     None: TrafficControl.NONE,
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", ["brookside", "millbrook", "Town05.xodr"])

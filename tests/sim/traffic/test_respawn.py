@@ -55,10 +55,7 @@ def test_crashed_vehicle_comes_back_out_of_sight_with_a_new_key():
 def test_vehicle_that_stands_for_long_respawns_unless_its_light_is_red():
     network = TownNetwork(find_town("midtown"))
     town, arrays = network.town, town_arrays(network)
-    lit = next(
-        lane.id for lane in town.lanes
-        if town.light(lane.id, 0.0) is not None and lane.length > 40.0
-    )  # fmt: skip
+    lit = next(lane.id for lane in town.lanes if town.light(lane.id, 0.0) is not None and lane.length > 40.0)
     reds = [t for t in np.arange(0.0, 600.0, 0.5) if town.light(lit, float(t)) is LightColour.RED]
     world = empty_world(arrays, vehicles=1, pedestrians=0)
     add_vehicle(arrays, world, lit, town.lanes[lit].length - 25.0, desired=8.0)  # behind others, as it were
@@ -84,10 +81,12 @@ def test_queue_before_a_red_light_across_another_junction_does_not_respawn():
     lit = arrays.lanes.programme >= 0
     ways = (
         (lane.id, link.target, after.target)
-        for lane in town.lanes if not lane.in_junction and not lit[lane.id] and lane.length > 40.0
-        for link in town.successors(lane.id) if town.lanes[link.target].in_junction
+        for lane in town.lanes
+        if not lane.in_junction and not lit[lane.id] and lane.length > 40.0
+        for link in town.successors(lane.id)
+        if town.lanes[link.target].in_junction
         for after in town.successors(link.target)
-    )  # fmt: skip
+    )
     way = next(way for way in ways if lit[way[2]])
     reds = [t for t in np.arange(0.0, 900.0, 0.5) if town.light(way[2], float(t)) is LightColour.RED]
     greens = [t for t in np.arange(0.0, 900.0, 0.5) if town.light(way[2], float(t)) is LightColour.GREEN]

@@ -36,9 +36,7 @@ _MAX_UTTERANCE_SECONDS = 60.0
 """Longest utterance [s]: turns that began earlier are over."""
 
 _UNKNOWN = (ActionValue.UNKNOWN, StreetName.UNKNOWN, LandmarkName.UNKNOWN, GoalStatus.UNKNOWN)
-_QUERIED = (
-    ActionValue.QUERIED, StreetName.QUERIED, LandmarkName.QUERIED, GoalStatus.QUERIED, ObjectClass.QUERIED,
-)  # fmt: skip
+_QUERIED = (ActionValue.QUERIED, StreetName.QUERIED, LandmarkName.QUERIED, GoalStatus.QUERIED, ObjectClass.QUERIED)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,9 +21,13 @@ from dorothie_gym.ontology.slots import ActionValue, GoalStatus, LandmarkName, S
 M = DialogueMove
 
 STEPS = (
-    ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.U_TURN, ActionValue.J_TURN, ActionValue.STOP,
+    ActionValue.LANE_FOLLOW,
+    ActionValue.LANE_SWITCH,
+    ActionValue.U_TURN,
+    ActionValue.J_TURN,
+    ActionValue.STOP,
     ActionValue.START,
-)  # fmt: skip
+)
 
 _TAKEN_UP = (M.ACKNOWLEDGE, M.CONFIRM, M.REPLY_Y)
 _WAYS = frozenset({ActionValue.LANE_FOLLOW, ActionValue.LANE_SWITCH, ActionValue.U_TURN, ActionValue.J_TURN})

@@ -33,9 +33,13 @@ ANSWERED_WITHIN: Final = 10.0
 
 _FACTUAL: Final = frozenset(
     {
-        DialogueMove.EXPLAIN, DialogueMove.REPLY_W, DialogueMove.REPLY_Y, DialogueMove.REPLY_N, DialogueMove.CONFIRM,
+        DialogueMove.EXPLAIN,
+        DialogueMove.REPLY_W,
+        DialogueMove.REPLY_Y,
+        DialogueMove.REPLY_N,
+        DialogueMove.CONFIRM,
     }
-)  # fmt: skip
+)
 _YES_NO: Final = frozenset({DialogueMove.REPLY_Y, DialogueMove.REPLY_N})
 _ANSWERS: Final = _YES_NO | {DialogueMove.REPLY_W}
 _QUESTIONS: Final = frozenset({DialogueMove.QUERY_YN, DialogueMove.QUERY_W, DialogueMove.CHECK})

@@ -33,10 +33,14 @@ BACK_AND_FORTH: Final = 400.0
 
 _ORDERS: Final = frozenset(
     {
-        ActionValue.U_TURN, ActionValue.J_TURN, ActionValue.LANE_SWITCH, ActionValue.STOP, ActionValue.START,
+        ActionValue.U_TURN,
+        ActionValue.J_TURN,
+        ActionValue.LANE_SWITCH,
+        ActionValue.STOP,
+        ActionValue.START,
         ActionValue.SPEED_CHANGE,
     }
-)  # fmt: skip
+)
 _REMARKS: Final = frozenset({Predicate.PASSED, Predicate.TRIED})
 _AGAIN: Final = re.compile(r"\b(again|twice|third time|(going|go) (back and forth|round in circles))\b", re.IGNORECASE)
 

@@ -188,8 +188,8 @@ class IncrementalColumns:
             **goal_columns((), ()),
         }
         part = SessionColumns(
-            arrays=arrays, texts=tuple(texts.numbers), town=self.window.town.name, seed=-1, unpointed=(), signature="",
-        )  # fmt: skip
+            arrays=arrays, texts=tuple(texts.numbers), town=self.window.town.name, seed=-1, unpointed=(), signature=""
+        )
         return join(part.signature, ["live"], [""], [part], [graph], [])
 
     def _visible_utterances(self, utterances: tuple[UtteranceRecord, ...]) -> tuple[UtteranceRecord, ...]:

@@ -80,9 +80,15 @@ def build_cells(polygons: Sequence[Painted], low: Array, high: Array, outside: M
 
 
 def _trimmed(
-    origin: Array, shape: NDArray[np.int64], outside: Material, base: NDArray[np.int16], entries: NDArray[np.int64],
-    table: NDArray[np.int64], edges: NDArray[np.int32], segments: Array,
-) -> Cells:  # fmt: skip
+    origin: Array,
+    shape: NDArray[np.int64],
+    outside: Material,
+    base: NDArray[np.int16],
+    entries: NDArray[np.int64],
+    table: NDArray[np.int64],
+    edges: NDArray[np.int32],
+    segments: Array,
+) -> Cells:
     """Leaves out candidates that make no difference: the lowest ones of the same material as what is below them."""
     counts = np.diff(entries)
     owner = np.repeat(np.arange(len(counts)), counts)
@@ -149,9 +155,15 @@ def row_span(grid: Array, segments: Array, edge: int, row: int) -> tuple[int, in
 
 @compiled
 def _rasterise(
-    grid: Array, shape: NDArray[np.int64], segments: Array, first: int, last: int, box: tuple[int, int, int, int],
-    toggles: NDArray[np.bool_], touched: NDArray[np.int32],
-) -> None:  # fmt: skip
+    grid: Array,
+    shape: NDArray[np.int64],
+    segments: Array,
+    first: int,
+    last: int,
+    box: tuple[int, int, int, int],
+    toggles: NDArray[np.bool_],
+    touched: NDArray[np.int32],
+) -> None:
     """Marks for one polygon the corners of cells that lie inside, and counts its edges in each cell."""
     left, right, top, bottom = box
     for row in range(top, bottom + 1):

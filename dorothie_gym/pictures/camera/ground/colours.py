@@ -15,7 +15,7 @@ from dorothie_gym.pictures.camera.ground.lookup import (
     material_of_part,
     materials_around,
     part_at,
-)  # fmt: skip
+)
 from dorothie_gym.support.compilation import compiled, inlined
 
 TEXEL = 0.5
@@ -39,9 +39,7 @@ _MASK = NOISE_SIZE - 1
 
 
 @compiled
-def colour_at(
-    ground: GroundArrays, sheet: int, x: float, y: float, footprint: float
-) -> tuple[float, float, float]:  # fmt: skip
+def colour_at(ground: GroundArrays, sheet: int, x: float, y: float, footprint: float) -> tuple[float, float, float]:
     """Returns red, green and blue, 0..255, at a position [m], averaged over a square of a width `footprint` [m]."""
     if footprint >= TEXEL:
         return _averaged(ground, sheet, x, y, footprint)
@@ -50,15 +48,15 @@ def colour_at(
         share = (footprint - BLENDED) / (TEXEL - BLENDED)
         other = _averaged(ground, sheet, x, y, TEXEL)
         red, green, blue = (
-            red + share * (other[0] - red), green + share * (other[1] - green), blue + share * (other[2] - blue)
-        )  # fmt: skip
+            red + share * (other[0] - red),
+            green + share * (other[1] - green),
+            blue + share * (other[2] - blue),
+        )
     return red, green, blue
 
 
 @compiled
-def _sampled(
-    ground: GroundArrays, sheet: int, x: float, y: float, footprint: float
-) -> tuple[float, float, float]:  # fmt: skip
+def _sampled(ground: GroundArrays, sheet: int, x: float, y: float, footprint: float) -> tuple[float, float, float]:
     """Returns the colour of the material, or the mean of four samples where they differ, with noise."""
     middle = part_at(ground, sheet, x, y)
     if footprint <= SHARP or not is_mixed(ground, sheet, middle):
@@ -77,15 +75,17 @@ def _look(ground: GroundArrays, material: int) -> tuple[float, float, float, flo
     """Returns red, green, blue and the strength of the noise of a material."""
     colours = ground.colours
     return (
-        float(colours[material, 0]), float(colours[material, 1]), float(colours[material, 2]),
+        float(colours[material, 0]),
+        float(colours[material, 1]),
+        float(colours[material, 2]),
         float(ground.grains[material]),
-    )  # fmt: skip
+    )
 
 
 @inlined
 def mean_look(
     ground: GroundArrays, first: int, second: int, third: int, fourth: int
-) -> tuple[float, float, float, float]:  # fmt: skip
+) -> tuple[float, float, float, float]:
     """Returns the mean red, green, blue and strength of the noise of `materials_around` a place."""
     red, green, blue, grain = _look(ground, first)
     r, g, b, n = _look(ground, fourth)
@@ -123,9 +123,7 @@ def patch_weight(footprint: float) -> float:
 
 
 @compiled
-def _averaged(
-    ground: GroundArrays, sheet: int, x: float, y: float, footprint: float
-) -> tuple[float, float, float]:  # fmt: skip
+def _averaged(ground: GroundArrays, sheet: int, x: float, y: float, footprint: float) -> tuple[float, float, float]:
     """Returns the colour of the averaged pictures: linear within two levels and between them."""
     level, density, last = 0, 1.0 / TEXEL, ground.levels.shape[1] - 1
     while level < last and footprint * density >= 2.0:
@@ -141,7 +139,7 @@ def _averaged(
 @compiled
 def _level_colour(
     ground: GroundArrays, sheet: int, level: int, density: float, x: float, y: float
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float]:
     """Returns the bilinear colour of one level with a number of texels per metre, a power of two."""
     columns, rows = ground.levels[sheet, level, 0], ground.levels[sheet, level, 1]
     u, v = (x - ground.origins[sheet, 0]) * density - 0.5, (y - ground.origins[sheet, 1]) * density - 0.5

@@ -172,9 +172,14 @@ def material_of_part(ground: GroundArrays, sheet: int, part: int, x: float, y: f
 def part_at(ground: GroundArrays, sheet: int, x: float, y: float) -> int:
     """Returns the number of the square of a sheet at a position [m], see `part_of`."""
     return part_of(
-        ground.origins[sheet, 0], ground.origins[sheet, 1], 1.0 / ground.size[0], ground.shapes[sheet, 0],
-        ground.shapes[sheet, 1], x, y,
-    )  # fmt: skip
+        ground.origins[sheet, 0],
+        ground.origins[sheet, 1],
+        1.0 / ground.size[0],
+        ground.shapes[sheet, 0],
+        ground.shapes[sheet, 1],
+        x,
+        y,
+    )
 
 
 @compiled
@@ -184,9 +189,7 @@ def material_at(ground: GroundArrays, sheet: int, x: float, y: float) -> int:
 
 
 @compiled
-def materials_around(
-    ground: GroundArrays, sheet: int, x: float, y: float, step: float
-) -> tuple[int, int, int, int]:  # fmt: skip
+def materials_around(ground: GroundArrays, sheet: int, x: float, y: float, step: float) -> tuple[int, int, int, int]:
     """Returns the materials at the corners of a square of `2 * step` around a position [m].
 
     They are those at the smallest x and y, at the largest x and smallest y, at the smallest x and largest y, and at the
@@ -200,7 +203,7 @@ def materials_around(
 @compiled
 def materials_between(
     ground: GroundArrays, sheet: int, part: int, other: int, x0: float, y0: float, x1: float, y1: float
-) -> tuple[int, int, int, int]:  # fmt: skip
+) -> tuple[int, int, int, int]:
     """Returns the materials at the corners of a box [m], as `materials_around` does.
 
     Args:
@@ -227,7 +230,7 @@ def materials_between(
 @compiled
 def _materials_in(
     ground: GroundArrays, sheet: int, mixed: int, x0: float, y0: float, x1: float, y1: float
-) -> tuple[int, int, int, int]:  # fmt: skip
+) -> tuple[int, int, int, int]:
     """Returns the materials at the corners of a box in a mixed cell, as `material_in` does for each of them.
 
     A corner is a bit: 1, 2, 4, 8 in the order of `materials_around`.

@@ -121,10 +121,15 @@ MATERIALS: dict[Colour, Material] = {
 
 SYMBOLS: frozenset[Colour] = frozenset(
     {
-        palette.TREE, palette.COUNTRY_TREE, palette.MEDIAN_TREE, palette.ONE_WAY, palette.CUTTING_EDGE,
-        palette.TUNNEL_EDGE, palette.BRIDGE_SHADOW,
+        palette.TREE,
+        palette.COUNTRY_TREE,
+        palette.MEDIAN_TREE,
+        palette.ONE_WAY,
+        palette.CUTTING_EDGE,
+        palette.TUNNEL_EDGE,
+        palette.BRIDGE_SHADOW,
     }
-)  # fmt: skip
+)
 """Colours of the map for things that do not lie on the ground: trees, shadows, and symbols of cartography."""
 
 

@@ -175,7 +175,7 @@ def _headroom(field: HeightField, points: Array) -> Array:
 
 def add_bridge(
     builder: MeshBuilder, sheet: Sheet, number: int, field: HeightField, town: Town, ground: GroundArrays
-) -> None:  # fmt: skip
+) -> None:
     """Adds the decks of one level of bridges, with sides, undersides, parapets and pillars."""
     deck = _at_height(cut_areas([(Area.FLAT, deck_area(town, sheet, _DECK_OVERLAP))], _CELL), field, sheet.level)
     add_sheet(builder, deck.corners, number)
@@ -202,9 +202,7 @@ def _longer(town: Town, part: LevelStretch, more: float) -> LevelStretch:
     return replace(part, start=max(0.0, part.start - more), end=min(length, part.end + more))
 
 
-def _add_pillars(
-    builder: MeshBuilder, sheet: Sheet, field: HeightField, town: Town, ground: GroundArrays
-) -> None:  # fmt: skip
+def _add_pillars(builder: MeshBuilder, sheet: Sheet, field: HeightField, town: Town, ground: GroundArrays) -> None:
     """Adds pillars below the middles of lanes, except on roads."""
     stood: list[Array] = []
     reach = _PILLAR_WIDTH * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
@@ -228,9 +226,7 @@ def _add_pillars(
 # --- Parts ------------------------------------------------------------------------------------------------------------
 
 
-def _at_height(
-    cut: tuple[NDArray[np.int64], NDArray[np.int64]], field: HeightField, level: int
-) -> GroundTriangles:  # fmt: skip
+def _at_height(cut: tuple[NDArray[np.int64], NDArray[np.int64]], field: HeightField, level: int) -> GroundTriangles:
     """Returns triangles of a bridge or tunnel (n, 3, 2) [grid steps] with their areas (n,) and heights."""
     points, areas = cut
     places, index = np.unique(points.reshape(-1, 2), axis=0, return_inverse=True)
@@ -246,9 +242,7 @@ def _inward(lines: Array) -> Array:
     return np.asarray(across / np.maximum(pn.hypot(*across.T), 1e-9)[:, None])
 
 
-def _add_quads(
-    builder: MeshBuilder, low: Array, high: Array, colour: tuple[int, int, int], kind: ObjectClass
-) -> None:  # fmt: skip
+def _add_quads(builder: MeshBuilder, low: Array, high: Array, colour: tuple[int, int, int], kind: ObjectClass) -> None:
     """Adds faces between lines (n, 2, 3) [m], seen from the left of their way, on the map."""
     builder.triangles(np.stack((low[:, 0], low[:, 1], high[:, 1]), axis=1), colour=colour, kind=kind)
     builder.triangles(np.stack((low[:, 0], high[:, 1], high[:, 0]), axis=1), colour=colour, kind=kind)

@@ -47,9 +47,12 @@ class GroundTriangles(NamedTuple):
 
 
 def lifted(
-    points: NDArray[np.int64], areas: NDArray[np.int64], field: HeightField, decks: Sequence[tuple[int, BaseGeometry]],
+    points: NDArray[np.int64],
+    areas: NDArray[np.int64],
+    field: HeightField,
+    decks: Sequence[tuple[int, BaseGeometry]],
     median: BaseGeometry,
-) -> GroundTriangles:  # fmt: skip
+) -> GroundTriangles:
     """Returns triangles of the ground with their heights: kerbs above carriageways, all below the decks of bridges.
 
     Args:

@@ -68,9 +68,13 @@ def cyclist_form(phase: int) -> Mesh:
     bracket, head, seat = np.array([-0.04, 0.0, _BRACKET]), np.array([0.40, 0.0, 0.80]), _SADDLE - (0.0, 0.0, 0.05)
     stays, crown = seat + (0.03, 0.0, -0.14), head + (-0.04, 0.0, 0.16)
     tubes = [
-        (bracket, head), (bracket, seat), (head - (0.0, 0.0, 0.06), stays),
-        (rear, stays), (rear, bracket), (front, crown),
-    ]  # fmt: skip
+        (bracket, head),
+        (bracket, seat),
+        (head - (0.0, 0.0, 0.06), stays),
+        (rear, stays),
+        (rear, bracket),
+        (front, crown),
+    ]
     for start, end in tubes:
         model.limb(start, end, (0.022, 0.022), Slot.PAINT, sides=3)
     grips = np.array([0.36, _GRIP, 0.98])

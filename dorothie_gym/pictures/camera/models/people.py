@@ -54,9 +54,13 @@ class Look:
     def palette(self) -> Palette:
         """Colours of the parts."""
         return {
-            Slot.TOP: self.top, Slot.TROUSERS: self.trousers, Slot.SKIN: self.skin, Slot.HAIR: self.hair,
-            Slot.EXTRA: self.extra, Slot.SHOES: (42, 38, 36),
-        }  # fmt: skip
+            Slot.TOP: self.top,
+            Slot.TROUSERS: self.trousers,
+            Slot.SKIN: self.skin,
+            Slot.HAIR: self.hair,
+            Slot.EXTRA: self.extra,
+            Slot.SHOES: (42, 38, 36),
+        }
 
 
 _SKINS: tuple[Rgb, ...] = ((226, 184, 154), (198, 148, 114), (142, 98, 72), (98, 68, 50))

@@ -46,9 +46,13 @@ def _cone(model: ModelBuilder, kind: PropKind) -> None:
     radii = [0.82 * half * (1.0 - share) + 0.03 for share in rings]
     for k, (low, high) in enumerate(pairwise(rings)):
         model.limb(
-            (0.0, 0.0, max(0.05, low * height)), (0.0, 0.0, high * height), (radii[k], radii[k + 1]),
-            Slot.WHITE if k % 2 else Slot.ORANGE, sides=8, closed=k == len(rings) - 2,
-        )  # fmt: skip
+            (0.0, 0.0, max(0.05, low * height)),
+            (0.0, 0.0, high * height),
+            (radii[k], radii[k + 1]),
+            Slot.WHITE if k % 2 else Slot.ORANGE,
+            sides=8,
+            closed=k == len(rings) - 2,
+        )
 
 
 def _barrier(model: ModelBuilder, kind: PropKind) -> None:

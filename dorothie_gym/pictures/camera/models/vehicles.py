@@ -116,11 +116,15 @@ def painted_vehicle(form: Mesh, paint: Rgb, lamps: Lamps) -> Mesh:
     """Returns a car with a colour, and with some of its lamps on."""
     brakes, lights = Lamps.BRAKES in lamps, Lamps.LIGHTS in lamps
     palette: Palette = {
-        Slot.PAINT: paint, Slot.TRIM: (46, 48, 52), Slot.GLASS: (38, 46, 54), Slot.TYRE: (28, 28, 30),
-        Slot.RIM: (156, 158, 162), Slot.PLATE: (255, 255, 255),
+        Slot.PAINT: paint,
+        Slot.TRIM: (46, 48, 52),
+        Slot.GLASS: (38, 46, 54),
+        Slot.TYRE: (28, 28, 30),
+        Slot.RIM: (156, 158, 162),
+        Slot.PLATE: (255, 255, 255),
         Slot.HEAD_LAMP: (255, 250, 232) if lights else (222, 226, 228),
         Slot.BRAKE_LAMP: (255, 44, 34) if brakes else (176, 22, 22) if lights else (112, 14, 16),
-    }  # fmt: skip
+    }
     on = {Slot.HEAD_LAMP: lights, Slot.BRAKE_LAMP: brakes or lights}
     return dressed(form, palette, frozenset(slot for slot, glows in on.items() if glows))
 

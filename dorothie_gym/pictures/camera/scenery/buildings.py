@@ -88,12 +88,13 @@ _MANNERS = {
 _WALLS = {
     Style.BRICK: (Texture.BRICK_WINDOWS, ((168, 98, 80), (150, 84, 68), (182, 126, 98), (134, 86, 76))),
     Style.PLASTER: (
-        Texture.PLASTER_WINDOWS, ((228, 216, 192), (206, 210, 206), (218, 192, 160), (190, 200, 208), (232, 224, 212)),
+        Texture.PLASTER_WINDOWS,
+        ((228, 216, 192), (206, 210, 206), (218, 192, 160), (190, 200, 208), (232, 224, 212)),
     ),
     Style.OFFICE: (Texture.OFFICE, ((244, 248, 252), (206, 224, 234), (226, 226, 214))),
     Style.PANELS: (Texture.PANELS, ((222, 218, 208), (206, 210, 214), (214, 204, 188))),
     Style.HOUSE: (Texture.HOUSE, ((226, 210, 186), (202, 178, 158), (208, 214, 216), (222, 214, 178), (196, 204, 190))),
-}  # fmt: skip
+}
 _ROOFS = ((152, 78, 60), (104, 98, 98), (128, 90, 72), (86, 90, 98))
 
 
@@ -281,9 +282,14 @@ def add_building(builder: MeshBuilder, building: Building, outline: Array, low: 
         add_gable(builder, building, top, roof)
         front = oriented([(-building.depth / 2.0 - 0.03, 0.25 * building.length)], building.centre, building.heading)[0]
         builder.panel(
-            (*front.tolist(), base + 1.05), building.heading, 1.05, 2.1, colour=(150, 110, 90),
-            kind=ObjectClass.BUILDING, texture=Texture.DOOR,
-        )  # fmt: skip
+            (*front.tolist(), base + 1.05),
+            building.heading,
+            1.05,
+            2.1,
+            colour=(150, 110, 90),
+            kind=ObjectClass.BUILDING,
+            texture=Texture.DOOR,
+        )
         return
     builder.prism(outline, top, top + 0.6, colour=colour * 0.82, top_colour=(128, 126, 122), kind=ObjectClass.BUILDING)
 
@@ -299,9 +305,12 @@ def add_walls(
         after = (k + 1) % len(outline)
         bays = max(1, round(float(pn.hypot(*(outline[after] - outline[k]))) / bay))
         builder.quad(
-            [lower[after], upper[after], upper[k], lower[k]], colour=colour, kind=ObjectClass.BUILDING,
-            repeats=(bays / BAYS, storeys / rows), texture=texture,
-        )  # fmt: skip
+            [lower[after], upper[after], upper[k], lower[k]],
+            colour=colour,
+            kind=ObjectClass.BUILDING,
+            repeats=(bays / BAYS, storeys / rows),
+            texture=texture,
+        )
 
 
 def add_gable(builder: MeshBuilder, building: Building, low: float, colour: tuple[int, int, int]) -> None:

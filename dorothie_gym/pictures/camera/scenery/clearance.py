@@ -30,9 +30,14 @@ _OPEN = (palette.COUNTRY, palette.BLOCK, palette.PARK, palette.BRIDGE_SHADOW, *_
 """Colours of ground on which something may stand."""
 
 _PAINT = (
-    palette.LANE_LINE, palette.EDGE_LINE, palette.CENTRE_LINE, palette.HATCHING, palette.STOP_LINE, palette.ARROW,
+    palette.LANE_LINE,
+    palette.EDGE_LINE,
+    palette.CENTRE_LINE,
+    palette.HATCHING,
+    palette.STOP_LINE,
+    palette.ARROW,
     palette.ONE_WAY,
-)  # fmt: skip
+)
 _SEEN_FROM = (42.0, 26.0)  # [m] before the stop at a site
 _SIGN = (2.4, 3.4)  # [m] extent of signs before and behind the front of a lot
 BESIDE_LOT = 1.2

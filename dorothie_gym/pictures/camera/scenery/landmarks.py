@@ -128,9 +128,12 @@ class _Works:
     def pole(self, deep: float, right: float, high: float, radius: float = 0.16, colour: Rgb = _METAL) -> None:
         """Adds a pole from the ground to a height."""
         self.builder.prism(
-            disc(self.lot.at(deep, right), radius, 6), self.low - 0.2, self.base + high, colour=colour,
+            disc(self.lot.at(deep, right), radius, 6),
+            self.low - 0.2,
+            self.base + high,
+            colour=colour,
             kind=ObjectClass.POLE,
-        )  # fmt: skip
+        )
 
     def sign(
         self, right: float, up: float, size: tuple[float, float], texture: Texture, colour: Rgb, deep: float = 0.6
@@ -139,9 +142,13 @@ class _Works:
         width, height = size
         self.pole(deep, right, up)
         self.box(
-            (deep - width / 2.0 - 0.06, deep + width / 2.0 + 0.06), (right - 0.2, right + 0.2),
-            (up, up + height + 0.12), colour, kind=ObjectClass.STATIC, bottom=True,
-        )  # fmt: skip
+            (deep - width / 2.0 - 0.06, deep + width / 2.0 + 0.06),
+            (right - 0.2, right + 0.2),
+            (up, up + height + 0.12),
+            colour,
+            kind=ObjectClass.STATIC,
+            bottom=True,
+        )
         for side in (1.0, -1.0):
             self.panel(
                 deep, right + side * 0.22, up + 0.06 + height / 2.0, width, height, texture=texture,
@@ -200,18 +207,25 @@ def _walls(works: _Works, deep: tuple[float, float], side: float, colour: Rgb) -
     right = np.array([-pm.sin(works.lot.heading), pm.cos(works.lot.heading)]) * (width / 2.0)
     (a, b), low, high = (np.array([x, y]) - right, np.array([x, y]) + right), works.base + 0.15, works.base + 2.95
     works.builder.quad(
-        [(*a, low), (*a, high), (*b, high), (*b, low)], colour=(255, 255, 255), kind=ObjectClass.BUILDING,
-        texture=Texture.GLASS_FRONT, repeats=(panes / 4.0, 1.0),
-    )  # fmt: skip
+        [(*a, low), (*a, high), (*b, high), (*b, low)],
+        colour=(255, 255, 255),
+        kind=ObjectClass.BUILDING,
+        texture=Texture.GLASS_FRONT,
+        repeats=(panes / 4.0, 1.0),
+    )
 
 
 def _fascia(works: _Works, design: StoreDesign, texture: Texture, length: float, depth: float) -> float:
     """Adds the band with the name above the walls; returns its height above the ground."""
     side, height = length / 2.0, 2.2
     works.box(
-        (-0.25, depth + 0.25), (-side - 0.25, side + 0.25), (_WALL - 0.3, _WALL - 0.3 + height), design.fascia,
-        top=_ROOF, bottom=True,
-    )  # fmt: skip
+        (-0.25, depth + 0.25),
+        (-side - 0.25, side + 0.25),
+        (_WALL - 0.3, _WALL - 0.3 + height),
+        design.fascia,
+        top=_ROOF,
+        bottom=True,
+    )
     middle = _WALL - 0.3 + height / 2.0
     shown = 1.9 if design.top is not Top.STRIPED else 1.5
     offset = -0.36 if design.top is Top.STRIPED else -0.27
@@ -224,8 +238,9 @@ def _gable(works: _Works, deep: tuple[float, float], side: float, low: float, co
     half, rise, base = side + 0.4, 0.42 * side, works.base + low
     feet = oriented(
         [(deep[0] - 0.5, -half), (deep[0] - 0.5, half), (deep[1] + 0.4, half), (deep[1] + 0.4, -half)],
-        works.lot.front, works.lot.heading,
-    )  # fmt: skip
+        works.lot.front,
+        works.lot.heading,
+    )
     ridge = oriented([(deep[0] - 0.5, 0.0), (deep[1] + 0.4, 0.0)], works.lot.front, works.lot.heading)
     a, b, c, d = (np.array([*foot, base]) for foot in feet.tolist())
     front, back = (np.array([*end, base + rise]) for end in ridge.tolist())

@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 from dorothie_gym.sim.state.codes import Colour
 
 LENS_ON: dict[Colour, tuple[int, int, int]] = {
-    Colour.GREEN: (70, 255, 130), Colour.YELLOW: (255, 196, 40), Colour.RED: (255, 52, 40),
-}  # fmt: skip
+    Colour.GREEN: (70, 255, 130),
+    Colour.YELLOW: (255, 196, 40),
+    Colour.RED: (255, 52, 40),
+}
 LENS_OFF: dict[Colour, tuple[int, int, int]] = {
-    Colour.GREEN: (10, 38, 22), Colour.YELLOW: (46, 34, 10), Colour.RED: (48, 10, 8),
-}  # fmt: skip
+    Colour.GREEN: (10, 38, 22),
+    Colour.YELLOW: (46, 34, 10),
+    Colour.RED: (48, 10, 8),
+}
 """Colours of the lenses of traffic lights that are on and off."""
 
 

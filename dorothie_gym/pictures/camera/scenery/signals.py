@@ -254,7 +254,12 @@ def build_blades(layers: MapLayers, blades: list[Blade], ground: Heights) -> Mes
             for turned in (look, look + math.pi):
                 c, s = pm.cos(turned), pm.sin(turned)
                 builder.panel(
-                    (blade.at[0] - 0.06 * c, blade.at[1] - 0.06 * s, z), turned, *_BLADE, colour=(235, 235, 235),
-                    kind=ObjectClass.TRAFFIC_SIGN, texture=STREET_NAMES + street, surface=Surface.EMISSIVE,
-                )  # fmt: skip
+                    (blade.at[0] - 0.06 * c, blade.at[1] - 0.06 * s, z),
+                    turned,
+                    *_BLADE,
+                    colour=(235, 235, 235),
+                    kind=ObjectClass.TRAFFIC_SIGN,
+                    texture=STREET_NAMES + street,
+                    surface=Surface.EMISSIVE,
+                )
     return builder.build()

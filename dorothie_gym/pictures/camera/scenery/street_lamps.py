@@ -66,9 +66,14 @@ def _lamp() -> Mesh:
     builder, kind = MeshBuilder(), ObjectClass.POLE
     top = LIGHT_HEIGHT + 0.16
     builder.prism(
-        disc((0.0, 0.0), 0.09, 5), -0.1, top, top=disc((0.0, 0.0), 0.055, 5), colour=_METAL, kind=kind,
+        disc((0.0, 0.0), 0.09, 5),
+        -0.1,
+        top,
+        top=disc((0.0, 0.0), 0.055, 5),
+        colour=_METAL,
+        kind=kind,
         closed=(False, False),
-    )  # fmt: skip
+    )
     builder.box((_ARM / 2.0, 0.0), 0.0, _ARM, 0.09, top - 0.12, top, colour=_METAL, kind=kind, closed=(True, True))
     builder.box((_ARM, 0.0), 0.0, 0.62, 0.26, LIGHT_HEIGHT, top - 0.04, colour=_METAL, kind=kind)
     x, half = (_ARM - 0.29, _ARM + 0.29), 0.11

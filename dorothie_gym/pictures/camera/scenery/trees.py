@@ -74,9 +74,13 @@ def tree_form(form: int) -> Mesh:
 
 
 def _clump(
-    builder: MeshBuilder, centre: tuple[float, float, float], radii: tuple[float, float], colour: Array,
-    rng: np.random.Generator, sides: int,
-) -> None:  # fmt: skip
+    builder: MeshBuilder,
+    centre: tuple[float, float, float],
+    radii: tuple[float, float],
+    colour: Array,
+    rng: np.random.Generator,
+    sides: int,
+) -> None:
     """Adds an uneven ball of leaves, darker below."""
     wide, high = radii
     levels = (0.0, 0.36, 0.68, 1.0)
@@ -104,6 +108,10 @@ def _clump(
         )
         v = np.concatenate((np.tile((k, k, k + 0.6), (sides, 1)), np.tile((k, k + 0.6, k + 0.6), (sides, 1))))
         builder.triangles(
-            corners, coordinates=np.stack((u, v), axis=-1), colour=shade, kind=ObjectClass.VEGETATION,
-            texture=Texture.LEAVES, surface=Surface.LEAF,
-        )  # fmt: skip
+            corners,
+            coordinates=np.stack((u, v), axis=-1),
+            colour=shade,
+            kind=ObjectClass.VEGETATION,
+            texture=Texture.LEAVES,
+            surface=Surface.LEAF,
+        )
