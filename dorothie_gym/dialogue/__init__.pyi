@@ -5,6 +5,7 @@ from .asr_channel import Recogniser as Recogniser
 from .asr_channel import word_error_rate as word_error_rate
 from .conversation import INAUDIBLE as INAUDIBLE
 from .conversation import SHORTEST_SPAN as SHORTEST_SPAN
+from .conversation import USUAL_WORD_ERROR_RATE as USUAL_WORD_ERROR_RATE
 from .conversation import WORDS_PER_SECOND as WORDS_PER_SECOND
 from .conversation import Conversation as Conversation
 from .conversation import Span as Span
@@ -40,7 +41,6 @@ from .propositions import read_meaning as read_meaning
 from .realization_context import Direction as Direction
 from .realization_context import Wording as Wording
 from .realization_context import WordingContext as WordingContext
-from .recognition_errors import USUAL_WORD_ERROR_RATE as USUAL_WORD_ERROR_RATE
 from .recognition_errors import ErrorProfile as ErrorProfile
 from .recognition_errors import Loudness as Loudness
 from .recognition_errors import WordClass as WordClass

@@ -14,13 +14,12 @@ import numpy as np
 from rapidfuzz import process
 from rapidfuzz.distance import Levenshtein
 
-from dorothie_gym.dialogue.conversation import Span, Utterance
+from dorothie_gym.dialogue.conversation import USUAL_WORD_ERROR_RATE, Span, Utterance
 from dorothie_gym.dialogue.dialogue_act_classifier import guess_act
 from dorothie_gym.dialogue.entity_recognition import sound_of
 from dorothie_gym.dialogue.exchanges import ANSWER_TIMEOUT
 from dorothie_gym.dialogue.lexicon import read_data, split_words, strings
 from dorothie_gym.dialogue.recognition_errors import (
-    USUAL_WORD_ERROR_RATE,
     Loudness,
     measured_errors,
     proper_words,

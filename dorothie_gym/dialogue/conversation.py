@@ -12,6 +12,13 @@ from dorothie_gym.support.copying import shared
 WORDS_PER_SECOND = 2.7
 """Speaking rate [words/s]; ordinary speech has 2 to 3 words per second (design, Time)."""
 
+USUAL_WORD_ERROR_RATE = 0.047
+"""Word error rate of sessions by default: that of spoken sessions (`recognition_errors.measured_errors`).
+
+Systems of the time of the paper, and professional transcribers, have 5.1 % on telephone conversations of strangers
+(Switchboard; Xiong et al., ICASSP 2018; Saon et al., Interspeech 2017).
+"""
+
 SHORTEST_SPAN = 0.6
 """Shortest duration of a span [s]; longer than a decision period (0.5 s), so that a speaker can continue."""
 

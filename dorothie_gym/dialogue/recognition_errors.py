@@ -123,11 +123,3 @@ def _common_words() -> frozenset[str]:
     """Returns the words that stand often in the phrases of the grammar; names are never among them."""
     counts = Counter(re.findall(r"\b[a-z][a-z']+\b", " ".join(read_talk_files().values()).lower()))
     return frozenset(word for word, count in counts.items() if count > RARE) - set(proper_words())
-
-
-USUAL_WORD_ERROR_RATE: Final = round(measured_errors().rate, 3)
-"""Word error rate of sessions by default: that of spoken sessions (`measured_errors`).
-
-Systems of the time of the paper, and professional transcribers, have 5.1 % on telephone conversations of strangers
-(Switchboard; Xiong et al., ICASSP 2018; Saon et al., Interspeech 2017).
-"""

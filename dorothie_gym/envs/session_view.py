@@ -8,9 +8,8 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym import pictures as rendering  # lazy: most sessions are never drawn
+from dorothie_gym import pictures  # lazy: most sessions are never drawn
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.pictures import camera  # lazy: most sessions are never drawn
 from dorothie_gym.session.live_session import LiveSession
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.support.copying import CachedViews
@@ -48,9 +47,9 @@ class SessionView(CachedViews):
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("_renderer", "_camera", "_window")
 
-    _renderer: rendering.SessionRenderer | None = None
-    _camera: tuple[LiveSession, camera.SessionCamera] | None = None
-    _window: rendering.HumanWindow | None = None
+    _renderer: pictures.SessionRenderer | None = None
+    _camera: tuple[LiveSession, pictures.SessionCamera] | None = None
+    _window: pictures.HumanWindow | None = None
 
     def __init__(
         self,
@@ -64,8 +63,8 @@ class SessionView(CachedViews):
             raise ValueError(f"render_mode is {render_mode!r}; it must be None or one of {', '.join(RENDER_MODES)}")
         self._view = checked_view(render_view)
         self._mode, self._rate, self._role = render_mode, frames_per_second, role
-        self._seen: rendering.RoleView | None = None
-        self._heard: list[rendering.SpokenLine] = []
+        self._seen: pictures.RoleView | None = None
+        self._heard: list[pictures.SpokenLine] = []
 
     @classmethod
     def of_role(
@@ -81,10 +80,10 @@ class SessionView(CachedViews):
         """Begins a session; what was noted of the last one is forgotten."""
         self._heard = []
         if self._mode is not None and self._role is not None:
-            self._seen = rendering.RoleView(self._role, session.world.town)
+            self._seen = pictures.RoleView(self._role, session.world.town)
 
     @property
-    def notes(self) -> tuple[rendering.RoleView | None, list[rendering.SpokenLine]]:
+    def notes(self) -> tuple[pictures.RoleView | None, list[pictures.SpokenLine]]:
         """What was noted of the session, for a state of the environment."""
         return self._seen, self._heard
 
@@ -106,34 +105,37 @@ class SessionView(CachedViews):
         """Notes an instruction of the participant that is not an utterance of the session; its time is in seconds."""
         if self._mode is None:
             return
-        self._heard.append(rendering.SpokenLine(time=time, speaker=Role.PARTICIPANT, text=text, acts=acts))
+        self._heard.append(pictures.SpokenLine(time=time, speaker=Role.PARTICIPANT, text=text, acts=acts))
 
     def render(self, session: LiveSession) -> NDArray[np.uint8] | None:
         """Draws the view: an array (800, 1280, 3), with a windscreen (720, 1280, 3); None in human mode."""
         if self._mode is None:
             raise RuntimeError("render() needs render_mode='rgb_array' or 'human' when the environment is made")
         if self._renderer is None:
-            self._renderer = rendering.SessionRenderer(self._view)
+            self._renderer = pictures.SessionRenderer(self._view)
         size = self._renderer.windscreen
         frame = self._renderer.draw(self._scene(session), None if size is None else self._windscreen(session, size))
         if self._mode != "human":
             return frame
         if self._window is None:
             height, width, _ = frame.shape
-            self._window = rendering.HumanWindow((width, height), "dorothie_gym")
+            self._window = pictures.HumanWindow((width, height), "dorothie_gym")
         self._window.show(frame, self._rate)
         return None
 
     def _windscreen(self, session: LiveSession, size: tuple[int, int]) -> NDArray[np.uint8] | None:
         """Returns what a camera of this width and height sees [px], otherwise with the settings of the session's."""
         if self._camera is None or self._camera[0] is not session:
-            self._camera = session, camera.windscreen_camera(session.world.town, session.scenario, session.config, size)
+            self._camera = (
+                session,
+                pictures.windscreen_camera(session.world.town, session.scenario, session.config, size),
+            )
         return self._camera[1].render(session.world).rgb
 
-    def _scene(self, session: LiveSession) -> rendering.Scene:
+    def _scene(self, session: LiveSession) -> pictures.Scene:
         if self._seen is None:
-            return rendering.scene_of(session, heard=self._heard)
-        own = [line for line in rendering.utterances_of(session) if line.speaker is self._role]
+            return pictures.scene_of(session, heard=self._heard)
+        own = [line for line in pictures.utterances_of(session) if line.speaker is self._role]
         return self._seen.scene([*self._heard, *own])
 
     def close(self) -> None:

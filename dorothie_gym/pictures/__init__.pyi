@@ -1,5 +1,7 @@
 """Public names of the package and the modules that define them (read by type checkers and by lazy_loader)."""
 
+from .camera.session_camera import SessionCamera as SessionCamera
+from .camera.session_pictures import windscreen_camera as windscreen_camera
 from .maps.map_sheet import town_picture as town_picture
 from .maps.street_names import Label as Label
 from .maps.town_map import MapPainter as MapPainter

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
 
-from dorothie_gym.dialogue.conversation import WORDS_PER_SECOND
-from dorothie_gym.dialogue.recognition_errors import USUAL_WORD_ERROR_RATE
+from dorothie_gym.dialogue.conversation import USUAL_WORD_ERROR_RATE, WORDS_PER_SECOND
 from dorothie_gym.session.camera_config import CameraConfig
 from dorothie_gym.session.channel_kind import ChannelKind
 from dorothie_gym.session.perception_model import PerceptionModel

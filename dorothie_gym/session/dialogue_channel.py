@@ -11,8 +11,6 @@ import numpy as np
 
 from dorothie_gym import dialogue  # lazy: words and their recognition are made when a session needs them
 from dorothie_gym.dialogue.conversation import Conversation, Span, Utterance
-from dorothie_gym.dialogue.disfluency import fluent
-from dorothie_gym.dialogue.recognition_errors import Loudness
 from dorothie_gym.dialogue.transactions import Annotator
 from dorothie_gym.ontology.dialogue_acts import DialogueAct
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
@@ -193,8 +191,8 @@ class DialogueChannel:
         return DeliveredUtterance(said=utterance, heard=heard, understood=understood, records=records)
 
     @staticmethod
-    def _noise(cabin: Callable[[], CabinState]) -> Loudness:
-        return Loudness.of(signal_to_noise(cabin()))
+    def _noise(cabin: Callable[[], CabinState]) -> dialogue.Loudness:
+        return dialogue.Loudness.of(signal_to_noise(cabin()))
 
     def _understood(self, utterance: Utterance) -> tuple[DialogueAct, ...]:
         """Returns the acts of an utterance, or those classified from its words where acts are not observed."""
@@ -211,7 +209,7 @@ class DialogueChannel:
                 "text": utterance.text,
                 **transcript,
                 "span": span.text,
-                **({"fluent": plain} if (plain := fluent(span.text)) != span.text else {}),
+                **({"fluent": plain} if (plain := dialogue.fluent(span.text)) != span.text else {}),
                 "move": span.act.move.label,
                 "slots": {label: list(values) for label, values in span.act.slot_labels().items()},
                 **({"meaning": [said.to_json() for said in span.meaning]} if span.meaning else {}),

@@ -25,7 +25,7 @@ from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.manoeuvres import find_feasible
 from dorothie_gym.sim.ego.motion_control import motion_of
-from dorothie_gym.sim.ego.path_search import SEARCH, point_before, progress_on_path
+from dorothie_gym.sim.ego.path_search import SEARCH, last_point_before, progress_on_path
 from dorothie_gym.sim.network.lane_lookup import closest_lane, wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import Feasible
@@ -171,7 +171,7 @@ def write_waypoints(
             table[row, 1] = course[0].y + at * pm.sin(course[0].heading)
             continue
         at = min(at, course[end].s)
-        k = min(point_before(course, count, at), end - 1)
+        k = min(last_point_before(course, count, at), end - 1)
         one, two = course[k], course[k + 1]
         t = min(max((at - one.s) / (two.s - one.s), 0.0), 1.0)
         table[row, 0] = one.x + t * (two.x - one.x)
@@ -259,7 +259,7 @@ def observe_as_ad_wizard(world: WorldArrays, views: AdWizardArrays, number: int)
     views.lane[number], views.station[number, 0], views.motion[number] = plan.lane, plan.station, motion_of(world)
     points = int(plan.points)
     write_waypoints(world.course, points, control.s, WAYPOINT_SPACING, views.waypoints[number])
-    write_lanes(world.course, points, point_before(world.course, points, control.s), views.path_lanes[number])
+    write_lanes(world.course, points, last_point_before(world.course, points, control.s), views.path_lanes[number])
 
 
 @compiled

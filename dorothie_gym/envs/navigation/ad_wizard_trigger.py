@@ -36,7 +36,7 @@ from dorothie_gym.session.spaces.limits import STORY_LENGTH, SpaceLimits, plain_
 from dorothie_gym.session.spaces.observations import Observation
 from dorothie_gym.session.view_steps import write_lanes
 from dorothie_gym.sim.config import FRAME_RATE
-from dorothie_gym.sim.ego.path_search import point_before
+from dorothie_gym.sim.ego.path_search import last_point_before
 from dorothie_gym.sim.randomness import POOL, draw_share, seed_stream
 from dorothie_gym.support.compilation import compiled
 from dorothie_gym.support.compilation.records import Flag, Float, Int32, Int64, RecordArray, UInt64
@@ -131,7 +131,7 @@ def finds_moment(
 def note_path(world: WorldArrays, path: NDArray[np.int64]) -> None:
     """Writes the lanes ahead, as the Ad-Wizard observes them."""
     points = int(world.plan[0].points)
-    write_lanes(world.course, points, point_before(world.course, points, world.car[0].s), path)
+    write_lanes(world.course, points, last_point_before(world.course, points, world.car[0].s), path)
 
 
 @compiled

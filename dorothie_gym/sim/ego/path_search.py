@@ -13,7 +13,7 @@ SEARCH = 6.0
 
 
 @compiled
-def point_before(course: RecordArray[CoursePointRecord], count: int, at: float) -> int:
+def last_point_before(course: RecordArray[CoursePointRecord], count: int, at: float) -> int:
     """Returns the number of the point at or before a distance along a path of so many points."""
     low, high = 0, count
     while low < high:
@@ -58,7 +58,7 @@ def progress_on_path(
     """
     end = count - 1
     best, answer = math.inf, near
-    first, last = point_before(course, count, near - window), point_before(course, count, near + window)
+    first, last = last_point_before(course, count, near - window), last_point_before(course, count, near + window)
     for k in range(first, min(last + 1, end)):
         one, other = course[k], course[k + 1]
         t = foot_on_segment(one, other, x, y, k == 0, k == end - 1)
