@@ -1,6 +1,7 @@
 // Talk: what was said, typing with the acts of the classifier as chips, quick phrases, corrections with two clicks.
 
-import { button, clock, h, icon, words } from './dom.js';
+import { button, clock, h, icon, words } from '/static/dom.js';
+import { popover } from '/static/popover.js';
 
 const NAMES = { participant: 'Participant', co_wizard: 'Car', ad_wizard: 'Message', experimenter: 'Experimenter' };
 
@@ -130,12 +131,8 @@ export class Talk {
   }
 
   choose(chip, span, correct) {
-    document.querySelector('.popover')?.remove();
     const { vocabulary } = this.link.hello;
     const slots = structuredClone(span.slots);
-    const close = () => { box.remove(); removeEventListener('pointerdown', outside, true); if (chip.isConnected) chip.focus(); };
-    const outside = event => { if (!box.contains(event.target)) close(); };
-    const take = move => { close(); correct({ move, slots }); };
     const values = Object.entries(slots).flatMap(([slot, found]) => found.map(value =>
       h('button', { type: 'button', class: 'chip value', 'aria-pressed': 'true', title: 'Leave this out', onclick: event => {
         const kept = event.currentTarget.getAttribute('aria-pressed') !== 'true';
@@ -143,18 +140,12 @@ export class Talk {
         slots[slot] = kept ? [...slots[slot], value] : slots[slot].filter(other => other !== value);
         if (!slots[slot].length) delete slots[slot];
       } }, `${slot}: ${words(value)}`)));
-    const box = h('div', { class: 'popover', role: 'dialog', 'aria-label': `Act of “${span.text}”` },
+    popover(`Act of “${span.text}”`, close => [
       h('p', { class: 'quoted', text: `“${span.text}”` }),
       values.length ? h('div', { class: 'chips', role: 'group', 'aria-label': 'Values' }, values) : null,
       h('div', { class: 'moves', role: 'group', 'aria-label': 'Moves' }, vocabulary.moves.map(([move, hint]) =>
-        h('button', { type: 'button', 'aria-pressed': String(move === span.move), title: hint, onclick: () => take(move) }, h('b', { text: move }), h('small', { text: hint })))));
-    box.addEventListener('keydown', event => { if (event.key === 'Escape') { event.stopPropagation(); close(); } });
-    document.body.append(box);
-    const at = chip.getBoundingClientRect(), size = box.getBoundingClientRect();
-    box.style.left = `${Math.max(8, Math.min(innerWidth - size.width - 8, at.left))}px`;
-    box.style.top = `${at.top > size.height + 12 ? at.top - size.height - 6 : Math.min(innerHeight - size.height - 8, at.bottom + 6)}px`;
-    addEventListener('pointerdown', outside, true);
-    (box.querySelector('.moves [aria-pressed="true"]') ?? box.querySelector('button')).focus();
+        h('button', { type: 'button', 'aria-pressed': String(move === span.move), 'data-first': move === span.move, title: hint, onclick: () => { close(); correct({ move, slots }); } }, h('b', { text: move }), h('small', { text: hint })))),
+    ], { beside: chip });
   }
 
   corrected({ utterance, span, move, slots }) {
