@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import html
 import mimetypes
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Final
 
@@ -41,39 +41,20 @@ _PAGE: Final = """<!doctype html>
 """
 
 
-class KeptFile:
-    """Content with its type and tag.
-
-    Args:
-        content: the content.
-        kind: media type.
-    """
-
-    def __init__(self, content: bytes, kind: str) -> None:
-        self._content, self._kind = content, kind
-        self._tag = f'"{hashlib.sha256(content).hexdigest()[:24]}"'
-
-    def answer(self, request: Request) -> Response:
-        """Answers with the content, or that the browser has it already."""
-        if self._tag in request.headers.get("if-none-match", ""):
-            return Response(status_code=304, headers={"ETag": self._tag})
-        return Response(self._content, media_type=self._kind, headers={"ETag": self._tag})
-
-
 def files(path: str, folder: Path) -> Route:
     """Returns the route that serves the files of a folder below a path; files in folders of it are not served."""
-    kept = {each.name: KeptFile(each.read_bytes(), _kind(each)) for each in folder.iterdir() if each.is_file()}
+    kept = {each.name: _kept(each.read_bytes(), _kind(each)) for each in folder.iterdir() if each.is_file()}
 
     async def serve(request: Request) -> Response:
         found = kept.get(str(request.path_params["name"]))
         if found is None:
             raise HTTPException(404)
-        return found.answer(request)
+        return await found(request)
 
     return Route(f"{path}/{{name:path}}", serve)
 
 
-def page(path: str, *, title: str, subject: str, script: str, styles: Sequence[str] = ()) -> Route:
+def page(path: str, title: str, subject: str, script: str, *styles: str) -> Route:
     """Returns the route that serves a page, whose script makes its content.
 
     Args:
@@ -83,14 +64,9 @@ def page(path: str, *, title: str, subject: str, script: str, styles: Sequence[s
         script: path of the script.
         styles: paths of further style sheets.
     """
-    sheets = [f'<link rel="stylesheet" href="{sheet}">' for sheet in ("/static/style.css", *styles)]
-    text = _PAGE.format(title=html.escape(title), subject=html.escape(subject), script=script, styles="\n".join(sheets))
-    kept = KeptFile(text.encode(), TYPES[".html"])
-
-    async def serve(request: Request) -> Response:
-        return kept.answer(request)
-
-    return Route(path, serve)
+    sheets = "\n".join(f'<link rel="stylesheet" href="{sheet}">' for sheet in ("/static/style.css", *styles))
+    text = _PAGE.format(title=html.escape(title), subject=html.escape(subject), script=script, styles=sheets)
+    return Route(path, _kept(text.encode(), TYPES[".html"]))
 
 
 def redirection(path: str, to: str) -> Route:
@@ -100,6 +76,18 @@ def redirection(path: str, to: str) -> Route:
         return RedirectResponse(to)
 
     return Route(path, lead)
+
+
+def _kept(content: bytes, kind: str) -> Callable[[Request], Awaitable[Response]]:
+    """Returns a handler that answers with content, or that the browser has it already."""
+    tag = f'"{hashlib.sha256(content).hexdigest()[:24]}"'
+
+    async def serve(request: Request) -> Response:
+        if tag in request.headers.get("if-none-match", ""):
+            return Response(status_code=304, headers={"ETag": tag})
+        return Response(content, media_type=kind, headers={"ETag": tag})
+
+    return serve
 
 
 def _kind(path: Path) -> str:

@@ -74,11 +74,7 @@ class AnnotationServer:
             [
                 redirection("/", "/annotate"),
                 page(
-                    "/annotate",
-                    title="dorothie_gym annotation",
-                    subject="session",
-                    script="/annotation/main.js",
-                    styles=["/annotation/annotate.css"],
+                    "/annotate", "dorothie_gym annotation", "session", "/annotation/main.js", "/annotation/annotate.css"
                 ),
                 self._route("/api/seat", self._greet),
                 self._route(session, self._session),

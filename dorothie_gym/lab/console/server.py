@@ -36,6 +36,9 @@ logger = logging.getLogger(__name__)
 
 STATIC: Final = Path(__file__).parent / "static"
 
+STYLE: Final = "/console/console.css"
+"""Style sheet of pages with a seat."""
+
 JOIN_SECONDS: Final = 10.0
 """Time for the first message of a connection [s]."""
 
@@ -129,13 +132,7 @@ class Console:
 
         return [
             *([] if self._speech is None else self._speech.routes()),
-            page(
-                "/seat",
-                title="dorothie_gym console",
-                subject="session",
-                script="/console/main.js",
-                styles=["/console/console.css"],
-            ),
+            page("/seat", "dorothie_gym console", "session", "/console/main.js", STYLE),
             Route("/towns/{name}.json", town),
             WebSocketRoute("/ws", websocket),
             files("/static", SHARED),

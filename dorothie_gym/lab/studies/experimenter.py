@@ -11,6 +11,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from dorothie_gym.lab.console.seat import EXPERIMENTER, RoomState
+from dorothie_gym.lab.console.server import STYLE
 from dorothie_gym.lab.gate import Gate, RequestError
 from dorothie_gym.lab.pages import page
 from dorothie_gym.lab.studies import requests as r
@@ -48,13 +49,7 @@ class Experimenter:
     def routes(self, gate: Gate) -> list[Route]:
         """Returns the routes of the page and its requests, which pass a gate."""
         return [
-            page(
-                "/experimenter",
-                title="Experimenter",
-                subject="study",
-                script="/studies/experimenter.js",
-                styles=["/console/console.css", "/studies/study.css"],
-            ),
+            page("/experimenter", "Experimenter", "study", "/studies/experimenter.js", STYLE, "/studies/study.css"),
             gate.route(f"{PATH}/enter", partial(self._enter, gate)),
             gate.route(f"{PATH}/overview", partial(self._overview, gate)),
             gate.route(f"{PATH}/readmit", partial(self._readmit, gate)),

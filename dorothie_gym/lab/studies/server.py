@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from dorothie_gym.lab.admission import network_of
-from dorothie_gym.lab.console.server import Console
+from dorothie_gym.lab.console.server import STYLE, Console
 from dorothie_gym.lab.gate import RETRY_SECONDS, Caller, Gate, Handler, RequestError, Wording
 from dorothie_gym.lab.pages import files, page
 from dorothie_gym.lab.studies import requests as r
@@ -133,9 +133,8 @@ class StudyServer:
             "wait": self._wait,
             "withdraw": self._withdraw,
         }
-        styles = ["/console/console.css", "/studies/study.css"]
         routes = [
-            page("/", title="Study", subject="study", script="/studies/study.js", styles=styles),
+            page("/", "Study", "study", "/studies/study.js", STYLE, "/studies/study.css"),
             *(self.gate.route(f"/study/{name}", handler) for name, handler in actions.items()),
             *self.experimenter.routes(self.gate),
             files("/studies", STATIC),

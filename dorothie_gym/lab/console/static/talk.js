@@ -4,6 +4,7 @@ import { button, clock, h, icon, words } from '/static/dom.js';
 import { popover } from '/static/popover.js';
 
 const NAMES = { participant: 'Participant', co_wizard: 'Car', ad_wizard: 'Message', experimenter: 'Experimenter' };
+const NEAR = 60;  // distance from the end at which a person still reads there [px]
 
 export class Talk {
   /**
@@ -17,6 +18,10 @@ export class Talk {
     this.list = h('div', { class: 'lines', role: 'log', 'aria-label': 'Talk', tabindex: '0' });
     this.typing = h('p', { class: 'typing', 'aria-live': 'polite' });
     this.element = h('section', { class: 'panel talk', 'aria-label': 'Talk' }, h('h2', { text: 'Talk' }), this.list, this.typing);
+    this.low = true;  // the list shows its end
+    this.top = 0;
+    this.list.addEventListener('scroll', () => this.scrolled());
+    new ResizeObserver(() => this.toEnd()).observe(this.list);  // chips, hints and quick phrases take of its space
     if (own) this.addInput(quick, keys, alt);
     link.on('parsed', message => this.parsed(message)).on('corrected', message => this.corrected(message));
   }
@@ -35,19 +40,28 @@ export class Talk {
   }
 
   /** Empties the talk, for a new session or after a new connection. */
-  clear() { this.list.replaceChildren(); this.pending = []; }
+  clear() { this.list.replaceChildren(); this.pending = []; this.low = true; }
+
+  /** Shows the last line, unless the person has scrolled up. */
+  toEnd() { if (this.low) this.list.scrollTop = this.list.scrollHeight; }
+
+  /** Notes whether the end is shown; only scrolling up leaves it, not less space for the list. */
+  scrolled() {
+    const { scrollTop, scrollHeight, clientHeight } = this.list;
+    this.low = scrollHeight - scrollTop - clientHeight < NEAR || (this.low && scrollTop >= this.top);
+    this.top = scrollTop;
+  }
 
   // --- lines --------------------------------------------------------------------------------------------------------
 
   add(entries) {
-    const low = this.list.scrollHeight - this.list.scrollTop - this.list.clientHeight < 60;
     for (const entry of entries) {
       const own = entry.who === this.own;
       if (own) this.settle(entry.text);
       this.list.append(this.line(entry, own));
     }
     for (const line of this.pending) this.list.append(line);  // what waits stays below
-    if (low) this.list.scrollTop = this.list.scrollHeight;
+    this.toEnd();
   }
 
   line(entry, own) {
@@ -68,7 +82,8 @@ export class Talk {
     const line = h('div', { class: 'line own waiting' }, h('span', { class: 'who', text: 'You' }), h('p', { text }));
     this.pending.push(line);
     this.list.append(line);
-    this.list.scrollTop = this.list.scrollHeight;
+    this.low = true;
+    this.toEnd();
   }
 
   settle(text) {
@@ -152,5 +167,6 @@ export class Talk {
     const row = this.list.querySelector(`.chips[data-utterance="${utterance}"]`);
     const old = row?.children[span];
     if (old) old.replaceWith(this.chip({ text: old.title.replace(/^“|”.*$/g, ''), move, slots, corrected: true }, act => this.link.send({ k: 'correct', utterance, span, ...act })));
+    this.toEnd();
   }
 }
