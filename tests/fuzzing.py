@@ -96,7 +96,7 @@ def raw_requests(drawn: random.Random, count: int) -> Iterator[bytes]:
                 b"GET %b HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n" % path,
                 b"POST %b HTTP/1.1\r\nHost: x\r\nContent-Length: -5\r\n\r\n" % path,
                 b"GET %b\x00 HTTP/1.1\r\nHost: x\r\n\r\n" % path,
-                b"GET / HTTP/9.9\r\n\r\n",
+                b"GET %b HTTP/9.9\r\n\r\n" % path,
                 b"GET /seat HTTP/1.1\r\nHost: \xff\xfe\r\nX: " + b"a" * 200_000 + b"\r\n\r\n",
                 drawn.randbytes(drawn.randrange(1, 400)),
             ]

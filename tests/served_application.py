@@ -6,7 +6,7 @@ import socket
 import threading
 from typing import Any, Self
 
-from dorothie_gym.lab.console.web_server import web_server
+from dorothie_gym.lab.web import web_server
 
 
 class ServedApplication:

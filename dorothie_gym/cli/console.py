@@ -118,7 +118,7 @@ def _config(
 def _room(town: str, storyboard: str | None, seed: int, roles: str, out: Path | None, config: ConsoleConfig) -> Room:
     from dorothie_gym.lab.console.room import Room
     from dorothie_gym.lab.console.seating import parse_roles
-    from dorothie_gym.lab.console.town_page import town_page
+    from dorothie_gym.lab.town_page import town_page
     from dorothie_gym.session.session_engine import SessionEngine
 
     plans = parse_roles(roles)
@@ -135,7 +135,7 @@ def _resumed_room(
     from dorothie_gym.lab.console.resuming import Resumed
     from dorothie_gym.lab.console.room import Room
     from dorothie_gym.lab.console.seating import parse_roles
-    from dorothie_gym.lab.console.town_page import town_page
+    from dorothie_gym.lab.town_page import town_page
     from dorothie_gym.tasks.parsing import load_template
 
     resumed = Resumed.load(folder)

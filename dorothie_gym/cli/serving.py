@@ -66,7 +66,7 @@ def serve(app: Starlette, listener: socket.socket, host: str) -> None:
         listener: socket that listens.
         host: name or address that was given with `--host`.
     """
-    from dorothie_gym.lab.console.web_server import web_server
+    from dorothie_gym.lab.web import web_server
 
     atexit.register(gc.freeze)  # a last search for garbage would take as long as a session has objects
     sys.setswitchinterval(SWITCH_INTERVAL)

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import msgspec
 
-from dorothie_gym.lab.console.rate_limit import TokenBucket
+from dorothie_gym.lab.admission import TokenBucket
 
 MOST_WAITING: Final = 300
 """Messages that may wait for a slow browser; beyond that the connection is closed and can be made again: 30 s."""

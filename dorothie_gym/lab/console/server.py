@@ -10,33 +10,34 @@ from collections.abc import AsyncIterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
-from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
-from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
-from starlette.middleware import Middleware
-from starlette.requests import HTTPConnection, Request
-from starlette.responses import RedirectResponse, Response
+from starlette.requests import Request
+from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from dorothie_gym.dialogue.grammar import load_grammar
 from dorothie_gym.lab.console.connection import CloseCode, Closing, Connection, encode
-from dorothie_gym.lab.console.hosts import ForeignHosts
-from dorothie_gym.lab.console.kept_files import KeptFiles
 from dorothie_gym.lab.console.messages import Join, MessageError, decode_message
 from dorothie_gym.lab.console.pace import run_room
-from dorothie_gym.lab.console.protocols import recognise
 from dorothie_gym.lab.console.room import Room
 from dorothie_gym.lab.console.seat import Seat
 from dorothie_gym.lab.console.spoken_turns import SpokenTurns
-from dorothie_gym.lab.console.town_page import town_page
+from dorothie_gym.lab.gate import gzipped_json
+from dorothie_gym.lab.hosts import is_same_origin
+from dorothie_gym.lab.pages import SHARED, files, page, redirection
+from dorothie_gym.lab.protocols import recognise
+from dorothie_gym.lab.town_page import town_page
+from dorothie_gym.lab.web import application
 
 logger = logging.getLogger(__name__)
 
 STATIC: Final = Path(__file__).parent / "static"
+
+STYLE: Final = "/console/console.css"
+"""Style sheet of pages with a seat."""
 
 JOIN_SECONDS: Final = 10.0
 """Time for the first message of a connection [s]."""
@@ -49,20 +50,6 @@ MOST_WATCHING: Final = 500
 
 THREADS: Final = 4
 """Threads for the ticks of all rooms; they share one core, as Python code holds a lock."""
-
-HEADERS: Final = {
-    "Content-Security-Policy": (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
-        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-    ),
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Permissions-Policy": "camera=(), geolocation=(), payment=()",
-    "Cache-Control": "no-cache",
-}
-"""Headers of every answer: nothing from other hosts, no inline scripts, no frames, no referrer."""
 
 
 class Console:
@@ -124,36 +111,32 @@ class Console:
     def app(self) -> Starlette:
         """Returns the application, which plays the sessions while it runs."""
 
-        async def root(request: Request) -> Response:
-            return RedirectResponse("/seat")
-
         @contextlib.asynccontextmanager
         async def lifespan(app: Starlette) -> AsyncIterator[None]:
             async with self.running():
                 yield
 
-        routes = [Route("/", root), *self.routes()]
-        return Starlette(routes=routes, lifespan=lifespan, middleware=protection())
+        return application([redirection("/", "/seat"), *self.routes()], lifespan)
 
     def routes(self) -> list[BaseRoute]:
         """Returns the routes of seats, maps, static files and the websocket."""
-        files = KeptFiles(STATIC)
 
         async def town(request: Request) -> Response:
-            page = await asyncio.to_thread(self.town_page, request.path_params["name"])
-            if page is None:
+            found = await asyncio.to_thread(self.town_page, request.path_params["name"])
+            if found is None:
                 raise HTTPException(404)
-            return Response(page, media_type="application/json", headers={"Content-Encoding": "gzip"})
+            return gzipped_json(found)
 
         async def websocket(socket: WebSocket) -> None:
             await _serve(self, socket)
 
         return [
             *([] if self._speech is None else self._speech.routes()),
-            files.page("/seat", "index.html"),
+            page("/seat", "dorothie_gym console", "session", "/console/main.js", STYLE),
             Route("/towns/{name}.json", town),
             WebSocketRoute("/ws", websocket),
-            files.route("/static"),
+            files("/static", SHARED),
+            files("/console", STATIC),
         ]
 
     @contextlib.asynccontextmanager
@@ -182,44 +165,7 @@ class Console:
             self._speech.close()
 
 
-class SecurityHeaders:
-    """Adds `HEADERS` to every answer.
-
-    Args:
-        app: the application.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handles a request."""
-
-        async def send_with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in HEADERS.items():
-                    headers.setdefault(name, value)
-            await send(message)
-
-        await self._app(scope, receive, send_with_headers if scope["type"] == "http" else send)
-
-
-def protection() -> list[Middleware]:
-    """Returns what protects the pages of every server: headers, and the refusal of foreign host names."""
-    return [Middleware(SecurityHeaders), Middleware(ForeignHosts)]
-
-
 # --- websocket --------------------------------------------------------------------------------------------------------
-
-
-def is_same_origin(connection: HTTPConnection) -> bool:
-    """Returns whether a request comes from a page of this server, or from a program without an origin."""
-    origin = connection.headers.get("origin")
-    try:
-        return origin is None or urlsplit(origin).netloc.lower() == connection.headers.get("host", "").lower()
-    except ValueError:  # no address
-        return False
 
 
 async def _serve(console: Console, socket: WebSocket) -> None:

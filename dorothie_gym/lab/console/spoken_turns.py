@@ -12,14 +12,14 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Final, TypeAlias
 
 import numpy as np
-from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from dorothie_gym.lab.console.protocols import recognise
 from dorothie_gym.lab.console.room import Room
 from dorothie_gym.lab.console.seat import Seat
+from dorothie_gym.lab.gate import RequestError, bearer_token, receive_body
+from dorothie_gym.lab.protocols import recognise
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.speech.backends import find_recognizer, find_synthesizer
 from dorothie_gym.speech.spoken_understanding import readable
@@ -73,10 +73,12 @@ class SpokenTurns:
         """Answers with the text that was recognised, and the name of the recording if it is kept."""
         room, seat = self._seat(request)
         if seat.token in self._busy:
-            raise HTTPException(429, "the last recording is still being recognised")
+            raise RequestError(429, "the last recording is still being recognised")
         self._busy.add(seat.token)
         try:
-            content = await _body(request)
+            content = await receive_body(request, MAX_BYTES, f"a recording has at most {LONGEST_TURN:.0f} s")
+            if len(content) % 2:
+                raise RequestError(400, "a recording consists of 16-bit samples, 16 kHz, mono")
             loop = asyncio.get_running_loop()
             answer = await loop.run_in_executor(self._thread, _recognise, room, seat, content)
         finally:
@@ -89,7 +91,7 @@ class SpokenTurns:
         entries, line = seat.talk.entries, int(request.path_params["line"])
         speakers = {role.value: role for role in PITCHES if role is not seat.role}
         if line >= len(entries) or entries[line]["who"] not in speakers:
-            raise HTTPException(404, "there is no such line of another speaker")
+            raise RequestError(404, "there is no such line of another speaker")
         role, text = speakers[entries[line]["who"]], str(entries[line]["text"])
         loop = asyncio.get_running_loop()
         content = await loop.run_in_executor(self._thread, _spoken, text, role)
@@ -97,24 +99,11 @@ class SpokenTurns:
 
     def _seat(self, request: Request) -> tuple[Room, Seat]:
         """Returns room and seat of the secret in the header `Authorization`; only roles that talk have speech."""
-        kind, _, token = request.headers.get("authorization", "").partition(" ")
-        found = self._find(token) if kind.lower() == "bearer" else None
+        found = self._find(bearer_token(request))
         if found is None or found[1].role not in PITCHES:
-            raise HTTPException(403, "no seat that talks has this secret")
+            raise RequestError(403, "no seat that talks has this secret")
         recognise(request)
         return found
-
-
-async def _body(request: Request) -> bytes:
-    """Returns the body of a request; one that is too large is not read to its end."""
-    content = bytearray()
-    async for part in request.stream():
-        content += part
-        if len(content) > MAX_BYTES:
-            raise HTTPException(413, f"a recording has at most {LONGEST_TURN:.0f} s")
-    if len(content) % 2:
-        raise HTTPException(400, "a recording consists of 16-bit samples, 16 kHz, mono")
-    return bytes(content)
 
 
 def _recognise(room: Room, seat: Seat, content: bytes) -> dict[str, object]:

@@ -1,38 +1,21 @@
-"""Answers of the server of a study: views as JSON with a tag, refusals, and cookies."""
+"""Answers of the server of a study: views as JSON with a tag, and cookies."""
 
 from __future__ import annotations
 
 import hashlib
 from typing import Any
 
-import msgspec
 from starlette.requests import Request
 from starlette.responses import Response
 
+from dorothie_gym.lab.gate import json_answer
+
 
 def answer(view: dict[str, Any]) -> Response:
-    """Answers with a view, which is not stored; equal views have equal tags (`ETag`)."""
-    content = msgspec.json.encode(view)
-    return Response(
-        content,
-        media_type="application/json",
-        headers={"Cache-Control": "no-store", "ETag": hashlib.sha256(content).hexdigest()[:24]},
-    )
-
-
-def refusal(status: int, reason: str, retry: int | None = None) -> Response:
-    """Answers that a request is refused.
-
-    Args:
-        status: status of the answer.
-        reason: reason, which the page shows.
-        retry: time after which the same request may succeed [s]; None if it will not.
-    """
-    refused = answer({"error": reason})
-    refused.status_code = status
-    if retry is not None:
-        refused.headers["Retry-After"] = str(retry)
-    return refused
+    """Answers with a view; equal views have equal tags (`ETag`)."""
+    made = json_answer(view)
+    made.headers["ETag"] = hashlib.sha256(made.body).hexdigest()[:24]
+    return made
 
 
 def cookie_name(request: Request, name: str) -> str:

@@ -3,33 +3,30 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Awaitable, Callable
-from pathlib import Path
+from functools import partial
 from typing import Any, Final
 
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from dorothie_gym.lab.console.kept_files import KeptFiles
 from dorothie_gym.lab.console.seat import EXPERIMENTER, RoomState
+from dorothie_gym.lab.console.server import STYLE
+from dorothie_gym.lab.gate import Gate, RequestError
+from dorothie_gym.lab.pages import page
 from dorothie_gym.lab.studies import requests as r
-from dorothie_gym.lab.studies.answers import answer, cookie_name, refusal, set_secret
+from dorothie_gym.lab.studies.answers import answer, cookie_name, set_secret
 from dorothie_gym.lab.studies.entrance import Entrance
 from dorothie_gym.lab.studies.open_rooms import OpenRoom
 from dorothie_gym.lab.studies.progress import Progress
 from dorothie_gym.lab.studies.records import digest
 from dorothie_gym.lab.studies.stages import RefusedError
 
-STATIC: Final = Path(__file__).parent / "static"
-
 COOKIE: Final = "dorothie_experimenter"
 """Cookie with the secret of the experimenter's browser; scripts of pages cannot read it."""
 
 PATH: Final = "/study/experimenter"
 """Beginning of the paths of the experimenter's requests, to which alone the cookie is sent."""
-
-Handler = Callable[[Request], Awaitable[Response]]
 
 
 class Experimenter:
@@ -49,17 +46,13 @@ class Experimenter:
         self._unused = True
         self._browser: bytes | None = None
 
-    def routes(self, guarded: Callable[[Handler], Handler]) -> list[Route]:
-        """Returns the routes of the page and its requests.
-
-        Args:
-            guarded: refuses requests of other pages, too many ones, and malformed ones.
-        """
+    def routes(self, gate: Gate) -> list[Route]:
+        """Returns the routes of the page and its requests, which pass a gate."""
         return [
-            KeptFiles(STATIC).page("/experimenter", "experimenter.html"),
-            Route(f"{PATH}/enter", guarded(self._enter), methods=["POST"]),
-            Route(f"{PATH}/overview", guarded(self._overview), methods=["POST"]),
-            Route(f"{PATH}/readmit", guarded(self._readmit), methods=["POST"]),
+            page("/experimenter", "Experimenter", "study", "/studies/experimenter.js", STYLE, "/studies/study.css"),
+            gate.route(f"{PATH}/enter", partial(self._enter, gate)),
+            gate.route(f"{PATH}/overview", partial(self._overview, gate)),
+            gate.route(f"{PATH}/readmit", partial(self._readmit, gate)),
         ]
 
     def is_known(self, request: Request) -> bool:
@@ -67,8 +60,12 @@ class Experimenter:
         given = request.cookies.get(cookie_name(request, COOKIE))
         return bool(given) and self._browser is not None and secrets.compare_digest(digest(str(given)), self._browser)
 
-    async def _enter(self, request: Request) -> Response:
-        body = r.read_body(request, r.Enter)
+    def _check(self, request: Request) -> None:
+        if not self.is_known(request):
+            raise RequestError(401, "Open the link of the experimenter.")
+
+    async def _enter(self, gate: Gate, request: Request) -> Response:
+        body = gate.read(request, r.Enter)
         if self.is_known(request):
             return answer(self.overview())
         if not self._unused or not secrets.compare_digest(digest(body.token), digest(self.token)):
@@ -82,15 +79,15 @@ class Experimenter:
         set_secret(entered, request, COOKIE, secret, None, PATH)
         return entered
 
-    async def _overview(self, request: Request) -> Response:
-        r.read_body(request, r.Overview)
-        return answer(self.overview()) if self.is_known(request) else refusal(401, "Open the link of the experimenter.")
+    async def _overview(self, gate: Gate, request: Request) -> Response:
+        gate.read(request, r.Overview)
+        self._check(request)
+        return answer(self.overview())
 
-    async def _readmit(self, request: Request) -> Response:
+    async def _readmit(self, gate: Gate, request: Request) -> Response:
         """Answers with the token of a link with which a person goes on in another browser, once."""
-        body = r.read_body(request, r.Readmit)
-        if not self.is_known(request):
-            return refusal(401, "Open the link of the experimenter.")
+        body = gate.read(request, r.Readmit)
+        self._check(request)
         token = self._entrance.readmit(body.participant.strip())
         if token is None:
             raise RefusedError("Nobody with this number, or this id of the recruiting platform, takes part.")

@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, TypeAlias, TypeVar
+from typing import Annotated, TypeAlias
 
-import msgspec
 from msgspec import Meta, Struct
-from starlette.requests import ClientDisconnect, Request
 
 from dorothie_gym.lab.studies.items import MAX_TEXT
 from dorothie_gym.lab.studies.stages import Stage
 from dorothie_gym.ontology.roles import Role
-
-
-class BodyError(Exception):
-    """The body of a request is refused.
-
-    Attributes:
-        status: status of the answer.
-    """
-
-    def __init__(self, status: int, reason: str) -> None:
-        super().__init__(reason)
-        self.status = status
 
 
 class Body(Struct, forbid_unknown_fields=True, frozen=True):
@@ -96,45 +82,3 @@ class Withdraw(Body, frozen=True):
     """Withdrawal, which the person must have confirmed."""
 
     sure: bool
-
-
-_T = TypeVar("_T", bound=Body)
-
-
-async def receive_body(request: Request, limit: int) -> None:
-    """Receives the body of a request for `read_body`.
-
-    Args:
-        request: the request.
-        limit: largest size [bytes]; no more is read.
-
-    Raises:
-        BodyError: it is too large, not sent as JSON, or not complete.
-    """
-    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
-        raise BodyError(415, "The body must be JSON.")
-    content = bytearray()
-    try:
-        async for part in request.stream():
-            content += part
-            if len(content) > limit:
-                raise BodyError(413, "The request is too large.")
-    except ClientDisconnect:
-        raise BodyError(400, "The request was not complete.") from None
-    request.state.body = bytes(content)
-
-
-def read_body(request: Request, kind: type[_T]) -> _T:
-    """Returns the body of a request that was received.
-
-    Args:
-        request: the request.
-        kind: type of the body.
-
-    Raises:
-        BodyError: it is malformed.
-    """
-    try:
-        return msgspec.json.decode(request.state.body, type=kind)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        raise BodyError(400, "The request is malformed.") from None

@@ -12,10 +12,10 @@ from dorothie_gym.lab.console.config import AbsenceRules, AfterAbsence, ConsoleC
 from dorothie_gym.lab.console.resuming import Resumed
 from dorothie_gym.lab.console.room import Room
 from dorothie_gym.lab.console.seating import plan_seat
-from dorothie_gym.lab.console.town_page import town_page
 from dorothie_gym.lab.studies.record_types import SESSIONS_FOLDER, SessionRow
 from dorothie_gym.lab.studies.study import HUMAN, Scenario, Study
 from dorothie_gym.lab.studies.study_file import sources
+from dorothie_gym.lab.town_page import town_page
 from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.recording.file_names import SessionState

@@ -6,23 +6,20 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections import OrderedDict
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Final, TypeVar
 
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import Response
-from starlette.routing import Route
 
-from dorothie_gym.lab.console.kept_files import KeptFiles
-from dorothie_gym.lab.console.protocols import recognise
-from dorothie_gym.lab.console.rate_limit import TokenBucket
-from dorothie_gym.lab.console.server import Console, is_same_origin, protection
-from dorothie_gym.lab.console.visitors import network_of
+from dorothie_gym.lab.admission import network_of
+from dorothie_gym.lab.console.server import STYLE, Console
+from dorothie_gym.lab.gate import RETRY_SECONDS, Caller, Gate, Handler, RequestError, Wording
+from dorothie_gym.lab.pages import files, page
 from dorothie_gym.lab.studies import requests as r
-from dorothie_gym.lab.studies.answers import answer, cookie_name, refusal, set_secret
+from dorothie_gym.lab.studies.answers import answer, cookie_name, set_secret
 from dorothie_gym.lab.studies.database import StorageError
 from dorothie_gym.lab.studies.entrance import Entrance
 from dorothie_gym.lab.studies.experimenter import Experimenter
@@ -36,6 +33,7 @@ from dorothie_gym.lab.studies.records import StudyRecords
 from dorothie_gym.lab.studies.room_building import RoomBuilder
 from dorothie_gym.lab.studies.stages import RefusedError
 from dorothie_gym.lab.studies.study import Study
+from dorothie_gym.lab.web import application
 
 logger = logging.getLogger(__name__)
 
@@ -47,9 +45,6 @@ COOKIE: Final = "dorothie_study"
 """Cookie with the secret of a participant's browser (see `answers.cookie_name`); scripts of pages cannot read it."""
 
 COOKIE_SECONDS: Final = 14 * 86400
-
-MAX_BYTES: Final = 256 * 1024
-"""Largest body of a request [bytes]: 50 long texts of a questionnaire."""
 
 NEWS_SECONDS: Final = 20.0
 """Longest time that a request for news waits [s]: below the time-outs of proxies."""
@@ -72,11 +67,13 @@ ENTRIES: Final = (400.0, 10.0)
 A laboratory or a lecture hall shares one address; an entry costs some 10 ms.
 """
 
-RETRY_SECONDS: Final = 2
-"""Time after which a page that was refused as one of too many asks again [s]."""
-
-MOST_BUCKETS: Final = 10_000
-"""Most participants and addresses whose requests are counted."""
+WORDING: Final = Wording(
+    field="error",
+    foreign="This page belongs to another server.",
+    hasty="Many requests are coming in. Please wait a moment.",
+    large="The request is too large.",
+    malformed="The request is malformed.",
+)
 
 
 class StudyServer:
@@ -92,6 +89,7 @@ class StudyServer:
         progress: participants.
         entrance: links, invitations, and the way back.
         experimenter: page of the experimenter, and the token of its link.
+        gate: limits of the requests.
 
     Raises:
         SpeechError: people can speak, and the extra `speech` is not installed.
@@ -107,12 +105,11 @@ class StudyServer:
         self.progress = Progress(study, records, self.rooms, self._presence)
         self.entrance = Entrance(study, records)
         self.experimenter = Experimenter(self.progress, self.entrance)
-        self._buckets: OrderedDict[str, TokenBucket] = OrderedDict()
+        self.gate = Gate(self._identify, _explain, WORDING, json_only=True)
         self._withdrawing: set[str] = set()
 
     def app(self) -> Starlette:
         """Returns the application, which plays the study while it runs."""
-        files = KeptFiles(STATIC)
 
         @contextlib.asynccontextmanager
         async def lifespan(app: Starlette) -> AsyncIterator[None]:
@@ -127,7 +124,7 @@ class StudyServer:
                     await asyncio.gather(task, return_exceptions=True)
                     self._presence.tell()
 
-        actions: dict[str, Callable[[Request], Awaitable[Response]]] = {
+        actions: dict[str, Handler] = {
             "join": self._join,
             "news": self._news,
             "consent": self._consent,
@@ -137,13 +134,13 @@ class StudyServer:
             "withdraw": self._withdraw,
         }
         routes = [
-            files.page("/", "study.html"),
-            *(Route(f"/study/{name}", self._guarded(run), methods=["POST"]) for name, run in actions.items()),
-            *self.experimenter.routes(self._guarded),
-            files.route("/study-static"),
+            page("/", "Study", "study", "/studies/study.js", STYLE, "/studies/study.css"),
+            *(self.gate.route(f"/study/{name}", handler) for name, handler in actions.items()),
+            *self.experimenter.routes(self.gate),
+            files("/studies", STATIC),
             *self.console.routes(),
         ]
-        return Starlette(routes=routes, lifespan=lifespan, middleware=protection())
+        return application(routes, lifespan)
 
     async def _supervise(self) -> None:
         """Pairs people, notes the ends of sessions, and deletes people who did not decide to take part."""
@@ -173,40 +170,16 @@ class StudyServer:
 
     # --- requests ---------------------------------------------------------------------------------------------------
 
-    def _guarded(self, run: Callable[[Request], Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
-        """Refuses requests of other pages, too many ones, and malformed ones."""
+    def _identify(self, request: Request) -> Caller:
+        person = self._person(request)
+        if person is not None:
+            return Caller(key=person.id, budget=REQUESTS, known=True)
+        if self.experimenter.is_known(request):
+            return Caller(key="experimenter", budget=REQUESTS, known=True)
+        return Caller(key=network_of(request.client.host if request.client else None), budget=ENTRIES, known=False)
 
-        async def handle(request: Request) -> Response:
-            if not is_same_origin(request):
-                return refusal(403, "This page belongs to another server.")
-            address = network_of(request.client.host if request.client else None)
-            try:
-                person = self._person(request)
-                known = person.id if person else "experimenter" if self.experimenter.is_known(request) else None
-                if known is not None:
-                    recognise(request)
-                await r.receive_body(request, MAX_BYTES)  # those that never end would count for others at an address
-                if not self._admits(known or address, known is not None):
-                    return refusal(429, "Many requests are coming in. Please wait a moment.", RETRY_SECONDS)
-                return await run(request)
-            except r.BodyError as error:
-                return refusal(error.status, str(error))
-            except StorageError as error:
-                logger.warning("a request of the page could not be stored: %s", error)
-                return refusal(503, "This could not be stored. Please wait a moment.", RETRY_SECONDS)
-            except NotSignedInError:
-                return refusal(401, f"You do not take part here any more. Contact: {self.progress.study.contact}")
-            except (RefusedError, AnswerError) as error:
-                return refusal(409, str(error))
-
-        return handle
-
-    def _admits(self, key: str, known: bool) -> bool:
-        bucket = self._buckets.pop(key, None) or TokenBucket(*(REQUESTS if known else ENTRIES))
-        self._buckets[key] = bucket
-        while len(self._buckets) > MOST_BUCKETS:
-            self._buckets.popitem(last=False)
-        return bucket.admits(time.monotonic())
+    def _not_signed_in(self) -> RequestError:
+        return RequestError(401, f"You do not take part here any more. Contact: {self.progress.study.contact}")
 
     def _person(self, request: Request) -> Participant | None:
         secret = request.cookies.get(cookie_name(request, COOKIE))
@@ -215,10 +188,10 @@ class StudyServer:
 
     def _read(self, request: Request, kind: type[_T]) -> tuple[Participant, _T]:
         """Returns the participant and the body of a request."""
-        body = r.read_body(request, kind)
+        body = self.gate.read(request, kind)
         person = self._person(request)  # again, as the body may have taken long to come
         if person is None:
-            raise NotSignedInError
+            raise self._not_signed_in()
         self._presence.see(person.id)
         return person, body
 
@@ -229,7 +202,7 @@ class StudyServer:
         return answer(entrance_view(self.progress) if found is None else participant_view(self.progress, found))
 
     async def _join(self, request: Request) -> Response:
-        body = r.read_body(request, r.Join)
+        body = self.gate.read(request, r.Join)
         person, given = self._person(request), (body.parameters, body.invitation)
         if person is not None and not self.entrance.is_other_person(person.id, *given):
             return self._view(person)
@@ -241,7 +214,7 @@ class StudyServer:
     def _known(self, name: str) -> Participant:
         found = self._records.participant(name)
         if found is None:
-            raise NotSignedInError
+            raise self._not_signed_in()
         return found
 
     async def _news(self, request: Request) -> Response:
@@ -311,8 +284,11 @@ _NOT_YET: Final = (
 )
 
 
-class NotSignedInError(Exception):
-    """A request needs a participant and has none."""
+def _explain(error: BaseException) -> RequestError | None:
+    if isinstance(error, StorageError):
+        logger.warning("a request of the page could not be stored: %s", error)
+        return RequestError(503, "This could not be stored. Please wait a moment.", RETRY_SECONDS)
+    return RequestError(409, str(error)) if isinstance(error, RefusedError | AnswerError) else None
 
 
 def _farewell(request: Request, text: str, *, again: bool = False) -> Response:

@@ -23,9 +23,9 @@ from tests.lab.console.test_fuzz import closing_code
 
 @pytest.fixture
 def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
-    monkeypatch.setattr("dorothie_gym.lab.console.web_server.MOST_STRANGERS", 40)
+    monkeypatch.setattr("dorothie_gym.lab.web.MOST_STRANGERS", 40)
     monkeypatch.setattr("dorothie_gym.lab.console.server.MOST_JOINING", 20)
-    monkeypatch.setattr("dorothie_gym.lab.console.visitors.STRANGER_SECONDS", 2.0)
+    monkeypatch.setattr("dorothie_gym.lab.admission.STRANGER_SECONDS", 2.0)
     with Served(Table("co_wizard=human").room) as running:
         yield running
 
@@ -42,7 +42,7 @@ def is_closed(connection: socket.socket) -> bool:
 
 
 def seat_somebody(served: Served) -> None:
-    assert served.get("/static/main.js")[0] == 200
+    assert served.get("/console/main.js")[0] == 200
     with served.connect(served.room.seats["spectator"].token) as socket:
         assert json.loads(socket.recv(timeout=10))["k"] == "hello"
 
@@ -96,7 +96,7 @@ def test_a_message_before_the_answer_to_the_handshake_is_read(served: Served) ->
 
 def test_pipelined_requests_are_answered_in_order(served: Served) -> None:
     with socket.create_connection(("127.0.0.1", served.port), timeout=20) as raw:
-        paths = [b"/seat", b"/nothing", b"/static/main.js"] * 10
+        paths = [b"/seat", b"/nothing", b"/console/main.js"] * 10
         for path in paths:
             raw.sendall(b"GET " + path + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
         raw.sendall(b"GET /seat HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n")

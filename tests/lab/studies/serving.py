@@ -15,9 +15,9 @@ from typing import Any
 
 import websockets.sync.client as sockets
 
-from dorothie_gym.lab.console.web_server import WebServer, web_server
 from dorothie_gym.lab.studies.folder import running_study
 from dorothie_gym.lab.studies.server import StudyServer
+from dorothie_gym.lab.web import WebServer, web_server
 
 
 class ServedStudy:

@@ -143,7 +143,7 @@ def test_a_crowd_waits_and_comes_in(browsers: Browsers, monkeypatch: pytest.Monk
     page = browsers.tab(LINK)
     page.wait_for_selector("text=Many people are coming in")
     monkeypatch.undo()
-    browsers.served.study._buckets.clear()
+    browsers.served.study.gate.budgets.clear()
     at(page, "consent")
 
 

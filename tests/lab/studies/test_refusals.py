@@ -13,7 +13,8 @@ import pytest
 
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
-from dorothie_gym.lab.studies.server import ENTRIES, MAX_BYTES, REQUESTS
+from dorothie_gym.lab.gate import MAX_BODY
+from dorothie_gym.lab.studies.server import ENTRIES, REQUESTS
 from tests.fuzzing import COUNTS, GROWTH, check_raw_requests, malformed, memory, needs_memory
 from tests.lab.console.malformed_messages import SOUND, STRICT, refusals
 from tests.lab.studies.content import SOLO, write_study
@@ -35,7 +36,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedStudy]:
 def person(served: ServedStudy, monkeypatch: pytest.MonkeyPatch) -> Client:
     monkeypatch.setattr("dorothie_gym.lab.studies.server.ENTRIES", (1e6, 1e6))
     assert served.study is not None
-    served.study._buckets.clear()
+    served.study.gate.budgets.clear()
     made = Client(served.port)
     made.do("join")
     return made
@@ -85,7 +86,7 @@ def test_steps_out_of_order_are_refused(person: Client) -> None:
 
 
 def test_large_bodies_are_not_read(served: ServedStudy, person: Client) -> None:
-    status, _, _ = person.send("POST", "/study/answers", b"a" * (MAX_BYTES + 1), JSON)
+    status, _, _ = person.send("POST", "/study/answers", b"a" * (MAX_BODY + 1), JSON)
     assert status == 413
     with socket.create_connection(("127.0.0.1", served.port), timeout=10) as raw:  # a body without an end
         raw.sendall(b"POST /study/join HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n")
@@ -105,9 +106,9 @@ def test_other_types_and_methods_are_refused(served: ServedStudy, person: Client
     for action in ACTIONS:
         assert person.send("GET", f"/study/{action}")[0] == 405
     for path in (
-        "/study-static/../server.py",
-        "/study-static/%2e%2e/server.py",
-        "/study-static//etc/passwd",
+        "/studies/../server.py",
+        "/studies/%2e%2e/server.py",
+        "/studies//etc/passwd",
         "/study/",
     ):
         assert person.send("GET", path)[0] == 404
@@ -160,7 +161,7 @@ def test_forwarded_addresses_are_believed_from_configured_proxies_only(
                 person.do("join")
             assert served.study is not None
             addresses = {"203.0.113.5", "2001:db8::/64", ""} if believed else {"127.0.0.1"}
-            assert set(served.study._buckets) == addresses
+            assert set(served.study.gate.budgets) == addresses
 
 
 def test_floods_are_refused(served: ServedStudy, person: Client, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,7 +221,7 @@ def test_random_requests_are_refused_and_leave_no_traces(
     monkeypatch.setattr("dorothie_gym.lab.studies.server.REQUESTS", (1e6, 1e6))
     monkeypatch.setattr("dorothie_gym.lab.studies.server.NEWS_SECONDS", 0.0)
     assert served.study is not None
-    served.study._buckets.clear()
+    served.study.gate.budgets.clear()
     drawn, before = random.Random(seed + request.config.getoption("--malformed-seed")), memory()
     known = person.view["id"]
     for _ in range(count):

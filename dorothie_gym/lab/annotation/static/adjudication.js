@@ -1,7 +1,7 @@
 // Adjudication: what each annotator has marked for the current utterance, agreement, and the history of decisions.
 
 import { h, words } from '/static/dom.js';
-import { popover } from './popover.js';
+import { popover } from '/static/popover.js';
 import { letter } from './units.js';
 
 const LAYERS = { undecided: 'not finished by all' };

@@ -6,7 +6,7 @@ import { Adjudication } from './adjudication.js';
 import { Decision } from './decision.js';
 import { Film } from './film.js';
 import { Marks } from './marks.js';
-import { closePopover } from './popover.js';
+import { closePopover } from '/static/popover.js';
 import { chooseWord } from './split.js';
 import { Timeline } from './timeline.js';
 import { Transcript } from './transcript.js';

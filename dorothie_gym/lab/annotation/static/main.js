@@ -1,14 +1,15 @@
 // Start of the page: the seat of the link's secret, the sessions, and the desk of the open session.
 
-import { button, h } from '/static/dom.js';
+import { button, h, sentence } from '/static/dom.js';
 import { Api } from './api.js';
 import { Desk } from './desk.js';
-import { sentence } from './marks.js';
 
-const main = document.getElementById('main'), bar = document.getElementById('bar'), dropped = document.getElementById('dropped');
+const main = document.getElementById('main'), bar = document.getElementById('bar');
+const dropped = h('div', { id: 'dropped', class: 'dropped', role: 'alert' });
 const secret = () => location.hash.slice(1);
 let api = null, seat = null, desk = null, saved = null, wanted = null;
 
+main.before(dropped);
 addEventListener('beforeunload', event => { if (desk?.marks.waiting) event.preventDefault(); });
 addEventListener('hashchange', () => { if (seat) takeLink(); else location.reload(); });
 if (!secret()) card('dorothie_gym annotation', 'Open your link. It ends in # and a secret, which belongs to the link.');

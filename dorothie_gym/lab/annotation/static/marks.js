@@ -3,6 +3,8 @@
 // What is shown is the state of the server with the marks that wait. Each load begins a generation: edits of an earlier
 // one were made on marks that are no longer there, so they are dropped and named.
 
+import { notice, sentence } from '/static/dom.js';
+
 const key = (speaker, utterance) => `${speaker}/${utterance}`;
 
 export class Marks extends EventTarget {
@@ -158,4 +160,3 @@ function plain({ words, move, slots, exchange, transaction, suggested }) {
 }
 
 const isNumber = value => Number.isInteger(value);
-export const sentence = text => text[0].toUpperCase() + text.slice(1);

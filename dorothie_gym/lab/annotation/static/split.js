@@ -1,7 +1,7 @@
 // Choice of the word at which a new span begins: arrows and Enter, or a click.
 
 import { h } from '/static/dom.js';
-import { popover } from './popover.js';
+import { popover } from '/static/popover.js';
 
 /** Lets the annotator choose a word; `take` gets the number of words before it. */
 export function chooseWord(said, take) {
@@ -13,7 +13,6 @@ export function chooseWord(said, take) {
   popover('Where does the next span begin?', (close, fill) => [
     h('p', { class: 'cut', role: 'group', 'aria-label': 'Words' }, said.map((word, k) => (k ? h('button', { type: 'button', class: 'word', 'aria-pressed': String(k === at), onclick: () => { close(); take(k); } }, word) : h('span', { text: word })))),
     h('p', { class: 'hint', text: 'Left and right choose the word, Enter splits before it.' }),
-    h('button', { type: 'button', class: 'primary', onclick: () => { close(); take(at); } }, `Split before “${said[at]}”`),
-  ], keys);
-  document.querySelector('.popover .primary').focus();
+    h('button', { type: 'button', class: 'primary', 'data-first': true, onclick: () => { close(); take(at); } }, `Split before “${said[at]}”`),
+  ], { keys });
 }

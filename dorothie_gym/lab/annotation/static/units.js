@@ -1,7 +1,7 @@
 // Exchange and transaction of a span, and the marks of the unit: exception, goal, end.
 
 import { h, words } from '/static/dom.js';
-import { popover } from './popover.js';
+import { popover } from '/static/popover.js';
 
 const RECENT = 5;
 
@@ -48,7 +48,7 @@ function choose({ marks, layer, title, at: [k, s], take, marksOf, rows, save }) 
     current() === null ? null : rows.map(([field, label, values, letters]) => h('div', { class: 'flags', role: 'group', 'aria-label': label }, h('b', { text: label }), values.map(value => h('button', { type: 'button', class: 'chip', 'aria-pressed': String(marksOf(current())[field] === value),
       onclick: () => toggle(field, value, fill) }, words(value), letters[value] ? h('kbd', { 'aria-hidden': 'true', text: letters[value].toUpperCase() }) : null)))),
     h('button', { type: 'button', class: 'primary', onclick: close }, 'Done'),
-  ], keys);
+  ], { keys });
 }
 
 /** Number of a new unit: that of its first word in the session, as in the final version; beyond all words if it is taken. */

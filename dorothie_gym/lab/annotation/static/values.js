@@ -1,7 +1,7 @@
 // Slot values of a span: typing filters, Enter takes the first match; names of the town come first.
 
 import { h, words } from '/static/dom.js';
-import { popover } from './popover.js';
+import { popover } from '/static/popover.js';
 
 /** Lets the annotator choose values. `slots` are the present ones; `take` gets the new ones. */
 export function chooseValues(vocabulary, page, text, slots, take) {

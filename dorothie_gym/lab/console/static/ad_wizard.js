@@ -1,8 +1,8 @@
 // Seat of the Ad-Wizard: the world from above, weather, props and actors by clicks, faults, changes of the task.
 
-import { button, h, icon, notice, panel, rebuild, words } from './dom.js';
+import { button, h, icon, notice, panel, rebuild, words } from '/static/dom.js';
 import { errandMarks } from './errands.js';
-import { MapView } from './map.js';
+import { MapView } from '/static/map.js';
 import { PinLinks, where, zoomButtons } from './pins.js';
 import { Talk } from './talk.js';
 

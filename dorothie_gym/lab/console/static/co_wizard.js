@@ -1,8 +1,8 @@
 // Seat of the Co-Wizard: map with what it knows, actions, beliefs, talk.
 
-import { button, clock, h, icon, notice, panel, rebuild, words } from './dom.js';
+import { button, clock, h, icon, notice, panel, rebuild, words } from '/static/dom.js';
 import { Hints } from './hints.js';
-import { COLOURS, MapView } from './map.js';
+import { COLOURS, MapView } from '/static/map.js';
 import { PinLinks, zoomButtons } from './pins.js';
 import { Speech } from './speech.js';
 import { NEAR, rule, StopSign } from './stops.js';

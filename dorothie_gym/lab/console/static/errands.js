@@ -1,6 +1,6 @@
 // Errands of a seat that may know them: numbers in the order of the list, the marks of their pins, their stopping places.
 
-import { COLOURS } from './map.js';
+import { COLOURS } from '/static/map.js';
 
 /** Returns the marks of the pins of errands, by row of the landmarks. */
 export function errandMarks(tasks) {

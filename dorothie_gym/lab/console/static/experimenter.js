@@ -1,8 +1,8 @@
 // Seats of the experimenter and of spectators: the true state of everything, and the control of the session.
 
-import { button, clock, h, icon, panel, rebuild, words } from './dom.js';
+import { button, clock, h, icon, panel, rebuild, words } from '/static/dom.js';
 import { errandMarks, nextStops } from './errands.js';
-import { MapView } from './map.js';
+import { MapView } from '/static/map.js';
 import { PinLinks, where } from './pins.js';
 import { Talk } from './talk.js';
 import { Windscreen } from './windscreen.js';

@@ -1,6 +1,6 @@
 // Hints in the first minute of a session: what to do next.
 
-import { h, icon } from './dom.js';
+import { h, icon } from '/static/dom.js';
 
 const FIRST = 60;  // time for which hints are shown [s]
 

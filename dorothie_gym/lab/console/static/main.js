@@ -1,6 +1,6 @@
 // Start of the page: the seat of the link's secret.
 
-import { h } from './dom.js';
+import { h } from '/static/dom.js';
 import { openSeat } from './seat_page.js';
 
 const token = location.hash.slice(1);

@@ -1,9 +1,9 @@
 // Seat of the participant: story, errands, map with all places, view through the windscreen, talk.
 
-import { h, icon, panel, rebuild } from './dom.js';
+import { h, icon, panel, rebuild } from '/static/dom.js';
 import { errandMarks, nextStops } from './errands.js';
 import { Hints } from './hints.js';
-import { MapView } from './map.js';
+import { MapView } from '/static/map.js';
 import { PinLinks, where, zoomButtons } from './pins.js';
 import { Speech } from './speech.js';
 import { rule, StopSign } from './stops.js';

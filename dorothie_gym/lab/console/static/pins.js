@@ -1,6 +1,6 @@
 // Links between the errands of a list and their pins on the map: either shows the other by hover, click and focus.
 
-import { h, icon } from './dom.js';
+import { h, icon } from '/static/dom.js';
 
 const EDGE = 14;  // distance of the badges of pins out of sight from the edge of the map [px]
 

@@ -2,9 +2,9 @@
 
 import { AdWizardPage } from './ad_wizard.js';
 import { CoWizardPage } from './co_wizard.js';
-import { button, clock, h, notice } from './dom.js';
+import { button, clock, h, notice, sentence } from '/static/dom.js';
 import { ExperimenterPage } from './experimenter.js';
-import { Keys } from './keys.js';
+import { Keys } from '/static/keys.js';
 import { Link } from './link.js';
 import { ParticipantPage } from './participant.js';
 import { rule } from './stops.js';
@@ -77,13 +77,11 @@ function update(link, { fields, talk, events, refused }, then) {
   page.talk.state(now);
   if (talk) { page.talk.add(talk); page.hear?.(talk); }
   if (events) page.addEvents?.(events);
-  if (refused) for (const reason of refused) notice(words(reason), 'error');
+  if (refused) for (const reason of refused) notice(sentence(reason), 'error');
   if ('time' in fields) time.textContent = clock(now.time);
   if ('state' in fields || 'why' in fields) showState(now);
   if (fields.outcome) showOutcome(link, now.outcome, then);
 }
-
-const words = reason => reason[0].toUpperCase() + reason.slice(1);
 
 function showState({ state: now, why }) {
   const text = { waiting: 'Waiting for the others', running: '', over: 'Over' }[now] ?? (why === 'experimenter' ? 'Paused by the experimenter' : `Paused: somebody is away. ${next.others ?? ''}`.trim());

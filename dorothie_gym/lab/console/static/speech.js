@@ -1,6 +1,6 @@
 // Speech at a seat: hold to talk, the recognised words as typed ones, and what others say spoken aloud.
 
-import { button, h, notice } from './dom.js';
+import { button, h, notice } from '/static/dom.js';
 
 const RATE = 16000, LONGEST = 30;
 
@@ -42,7 +42,7 @@ export class Speech {
     try {
       const context = this.context();
       await context.resume();
-      this.ready ??= context.audioWorklet.addModule('/static/microphone.js');
+      this.ready ??= context.audioWorklet.addModule('/console/microphone.js');
       await this.ready;
       this.stream = await navigator.mediaDevices.getUserMedia({ audio: { channelCount: 1, echoCancellation: true, noiseSuppression: false } });
     } catch (error) {

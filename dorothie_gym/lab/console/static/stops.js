@@ -1,6 +1,6 @@
 // Stopping places: which ones are near, a sign with the distance, and a mark above the picture through the windscreen.
 
-import { h } from './dom.js';
+import { h } from '/static/dom.js';
 
 export const NEAR = 60;  // distance from which on a stopping place is shown [m]
 const STANDING = 0.5, REACTION = 0.5;  // speed of a car that stands [km/h]; time from seeing the sign to braking [s]

@@ -1,8 +1,10 @@
 // Talk: what was said, typing with the acts of the classifier as chips, quick phrases, corrections with two clicks.
 
-import { button, clock, h, icon, words } from './dom.js';
+import { button, clock, h, icon, words } from '/static/dom.js';
+import { popover } from '/static/popover.js';
 
 const NAMES = { participant: 'Participant', co_wizard: 'Car', ad_wizard: 'Message', experimenter: 'Experimenter' };
+const NEAR = 60;  // distance from the end at which a person still reads there [px]
 
 export class Talk {
   /**
@@ -16,6 +18,10 @@ export class Talk {
     this.list = h('div', { class: 'lines', role: 'log', 'aria-label': 'Talk', tabindex: '0' });
     this.typing = h('p', { class: 'typing', 'aria-live': 'polite' });
     this.element = h('section', { class: 'panel talk', 'aria-label': 'Talk' }, h('h2', { text: 'Talk' }), this.list, this.typing);
+    this.low = true;  // the list shows its end
+    this.top = 0;
+    this.list.addEventListener('scroll', () => this.scrolled());
+    new ResizeObserver(() => this.toEnd()).observe(this.list);  // chips, hints and quick phrases take of its space
     if (own) this.addInput(quick, keys, alt);
     link.on('parsed', message => this.parsed(message)).on('corrected', message => this.corrected(message));
   }
@@ -34,19 +40,28 @@ export class Talk {
   }
 
   /** Empties the talk, for a new session or after a new connection. */
-  clear() { this.list.replaceChildren(); this.pending = []; }
+  clear() { this.list.replaceChildren(); this.pending = []; this.low = true; }
+
+  /** Shows the last line, unless the person has scrolled up. */
+  toEnd() { if (this.low) this.list.scrollTop = this.list.scrollHeight; }
+
+  /** Notes whether the end is shown; only scrolling up leaves it, not less space for the list. */
+  scrolled() {
+    const { scrollTop, scrollHeight, clientHeight } = this.list;
+    this.low = scrollHeight - scrollTop - clientHeight < NEAR || (this.low && scrollTop >= this.top);
+    this.top = scrollTop;
+  }
 
   // --- lines --------------------------------------------------------------------------------------------------------
 
   add(entries) {
-    const low = this.list.scrollHeight - this.list.scrollTop - this.list.clientHeight < 60;
     for (const entry of entries) {
       const own = entry.who === this.own;
       if (own) this.settle(entry.text);
       this.list.append(this.line(entry, own));
     }
     for (const line of this.pending) this.list.append(line);  // what waits stays below
-    if (low) this.list.scrollTop = this.list.scrollHeight;
+    this.toEnd();
   }
 
   line(entry, own) {
@@ -67,7 +82,8 @@ export class Talk {
     const line = h('div', { class: 'line own waiting' }, h('span', { class: 'who', text: 'You' }), h('p', { text }));
     this.pending.push(line);
     this.list.append(line);
-    this.list.scrollTop = this.list.scrollHeight;
+    this.low = true;
+    this.toEnd();
   }
 
   settle(text) {
@@ -130,12 +146,8 @@ export class Talk {
   }
 
   choose(chip, span, correct) {
-    document.querySelector('.popover')?.remove();
     const { vocabulary } = this.link.hello;
     const slots = structuredClone(span.slots);
-    const close = () => { box.remove(); removeEventListener('pointerdown', outside, true); if (chip.isConnected) chip.focus(); };
-    const outside = event => { if (!box.contains(event.target)) close(); };
-    const take = move => { close(); correct({ move, slots }); };
     const values = Object.entries(slots).flatMap(([slot, found]) => found.map(value =>
       h('button', { type: 'button', class: 'chip value', 'aria-pressed': 'true', title: 'Leave this out', onclick: event => {
         const kept = event.currentTarget.getAttribute('aria-pressed') !== 'true';
@@ -143,23 +155,18 @@ export class Talk {
         slots[slot] = kept ? [...slots[slot], value] : slots[slot].filter(other => other !== value);
         if (!slots[slot].length) delete slots[slot];
       } }, `${slot}: ${words(value)}`)));
-    const box = h('div', { class: 'popover', role: 'dialog', 'aria-label': `Act of “${span.text}”` },
+    popover(`Act of “${span.text}”`, close => [
       h('p', { class: 'quoted', text: `“${span.text}”` }),
       values.length ? h('div', { class: 'chips', role: 'group', 'aria-label': 'Values' }, values) : null,
       h('div', { class: 'moves', role: 'group', 'aria-label': 'Moves' }, vocabulary.moves.map(([move, hint]) =>
-        h('button', { type: 'button', 'aria-pressed': String(move === span.move), title: hint, onclick: () => take(move) }, h('b', { text: move }), h('small', { text: hint })))));
-    box.addEventListener('keydown', event => { if (event.key === 'Escape') { event.stopPropagation(); close(); } });
-    document.body.append(box);
-    const at = chip.getBoundingClientRect(), size = box.getBoundingClientRect();
-    box.style.left = `${Math.max(8, Math.min(innerWidth - size.width - 8, at.left))}px`;
-    box.style.top = `${at.top > size.height + 12 ? at.top - size.height - 6 : Math.min(innerHeight - size.height - 8, at.bottom + 6)}px`;
-    addEventListener('pointerdown', outside, true);
-    (box.querySelector('.moves [aria-pressed="true"]') ?? box.querySelector('button')).focus();
+        h('button', { type: 'button', 'aria-pressed': String(move === span.move), 'data-first': move === span.move, title: hint, onclick: () => { close(); correct({ move, slots }); } }, h('b', { text: move }), h('small', { text: hint })))),
+    ], { beside: chip });
   }
 
   corrected({ utterance, span, move, slots }) {
     const row = this.list.querySelector(`.chips[data-utterance="${utterance}"]`);
     const old = row?.children[span];
     if (old) old.replaceWith(this.chip({ text: old.title.replace(/^“|”.*$/g, ''), move, slots, corrected: true }, act => this.link.send({ k: 'correct', utterance, span, ...act })));
+    this.toEnd();
   }
 }

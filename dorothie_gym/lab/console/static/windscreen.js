@@ -1,6 +1,6 @@
 // View through the windscreen: a stream of pictures, which can be turned off.
 
-import { h, icon } from './dom.js';
+import { h, icon } from '/static/dom.js';
 import { paintStops } from './stops.js';
 
 export class Windscreen {

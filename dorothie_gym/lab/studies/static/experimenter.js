@@ -1,7 +1,8 @@
 // Page of the experimenter of a study: people who wait, rooms, and the seat of the experimenter in one of them.
 
 import { button, clock, h, rebuild } from '/static/dom.js';
-import { openSeat } from '/static/seat_page.js';
+import { openSeat } from '/console/seat_page.js';
+import { passes, post } from './requests.js';
 
 const PERIOD = 2000;  // between two looks [ms]
 const ROLES = { participant: 'Participant', co_wizard: 'Co-Wizard', ad_wizard: 'Ad-Wizard' };
@@ -10,21 +11,14 @@ const main = document.getElementById('main'), bar = document.getElementById('bar
 const counts = h('p', {}), people = h('ul', { class: 'people' }), made = h('p', { class: 'made', role: 'status' }), waiting = h('ul', {}), rooms = h('div', { class: 'rooms' });
 let seated = false;
 
-async function post(name, body) {
-  const answer = await fetch(`/study/experimenter/${name}`, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body) });
-  const view = await answer.json();
-  if (!answer.ok) throw Object.assign(new Error(view.error), { status: answer.status });
-  return view;
-}
-
 async function start() {
   const token = location.hash.slice(1);
   try {
-    const view = token ? await post('enter', { token }) : await post('overview', {});
+    const { view } = token ? await post('experimenter/enter', { token }) : await post('experimenter/overview', {});
     history.replaceState(null, '', location.pathname);  // the token does not stay in the address
     open(view);
   } catch (error) {
-    const again = !error.status || error.status === 429 || error.status >= 500;
+    const again = passes(error);
     const text = again ? 'The server does not answer. This page tries again.' : error.message;
     main.replaceChildren(h('div', { class: 'card' }, h('h1', { text: 'Experimenter' }), h('p', { text })));
     if (again) setTimeout(start, PERIOD);
@@ -52,7 +46,7 @@ function back() {
 
 async function readmit(participant) {
   try {
-    const { token } = await post('readmit', { participant });
+    const { token } = (await post('experimenter/readmit', { participant })).view;
     const link = `${location.origin}/#${token}`;
     made.replaceChildren(`Link for ${participant}: `, h('code', { text: link }), ' ', button('Copy', { class: 'soft', run: () => navigator.clipboard.writeText(link) }));
   } catch (error) { made.textContent = error.status ? error.message : 'The server does not answer. Please try again in a moment.'; }
@@ -61,7 +55,7 @@ async function readmit(participant) {
 async function look() {
   if (seated) return;
   try {
-    show(await post('overview', {}));
+    show((await post('experimenter/overview', {})).view);
     bar.querySelector('.state').textContent = '';
   } catch (error) {
     if (error.status === 401) return location.reload();

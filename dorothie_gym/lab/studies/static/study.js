@@ -1,25 +1,16 @@
 // Page of a participant: shows the stage that the server names, from consent to completion code.
 
 import { button, h, notice } from '/static/dom.js';
-import { openSeat } from '/static/seat_page.js';
+import { openSeat } from '/console/seat_page.js';
 import { Questionnaire, forgetDrafts } from './forms.js';
 import { prose } from './prose.js';
+import { passes, post } from './requests.js';
 
 const RETRY = 2000;  // [ms]
 const main = document.getElementById('main'), bar = document.getElementById('bar');
 let tag = '', shown = '', seated = false, asking = null, acting = null, over = false, contact = '', joined = 0;
 
 // --- server ----------------------------------------------------------------------------------------------------------
-
-async function post(name, body, signal) {
-  const answer = await fetch(`/study/${name}`, { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body), signal });
-  const view = await answer.json();
-  if (!answer.ok) throw Object.assign(new Error(view.error), { status: answer.status, wait: 1000 * Number(answer.headers.get('Retry-After')) });
-  return { view, newTag: answer.headers.get('ETag') };
-}
-
-/** Whether the same request may succeed later: there is no connection, or the server has too much to do. */
-const passes = error => !error.status || error.status === 429 || error.status >= 500;
 
 const pause = time => new Promise(done => setTimeout(done, time));
 

@@ -1,4 +1,15 @@
-"""Web server of the commands with people in browsers: uvicorn with limits that hold under floods."""
+"""Web server of the commands with people in browsers: how a request is accepted, limited and answered.
+
+A request takes this way:
+
+1. Its connection gets a place, or another one gives way (`admission.Visitors`).
+2. It is read a part at a time, in turn with the other connections (`protocols`, `admission.Turns`).
+3. Browsers that came by the name of another machine are refused (`hosts.ForeignHosts`).
+4. The gate of the server asks who sends it, receives its body up to a limit, and counts it (`gate.Gate`).
+5. The handler answers, or an error says why not; each answer forbids content of other hosts (`HEADERS`).
+
+Pages and static files (`pages`) and websockets, whose first message shows their secret, need no gate.
+"""
 
 from __future__ import annotations
 
@@ -8,20 +19,22 @@ import logging
 import os
 import socket
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Final
 
 from starlette.applications import Starlette
+from starlette.datastructures import MutableHeaders
+from starlette.middleware import Middleware
 from starlette.requests import ClientDisconnect
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.routing import BaseRoute
+from starlette.types import ASGIApp, Lifespan, Message, Receive, Scope, Send
 from uvicorn import Config, Server
 
-from dorothie_gym.lab.console.messages import MAX_BYTES
-from dorothie_gym.lab.console.protocols import Guard, GuardedHttp, GuardedSocket
-from dorothie_gym.lab.console.turns import Turns
-from dorothie_gym.lab.console.visitors import MOST_KNOWN, MOST_STRANGERS, Visitors
+from dorothie_gym.lab.admission import MOST_KNOWN, MOST_STRANGERS, Turns, Visitors
+from dorothie_gym.lab.hosts import ForeignHosts
+from dorothie_gym.lab.protocols import Guard, GuardedHttp, GuardedSocket
 
 logger = logging.getLogger(__name__)
 
@@ -31,8 +44,14 @@ ACCEPTED_AT_ONCE: Final = 32
 BACKLOG: Final = 2048
 """Connections that the system keeps until they are accepted: a flood must not fill it, as browsers then wait 1 s."""
 
+MAX_MESSAGE: Final = 16 * 1024
+"""Largest message of a websocket [bytes]; a server that expects shorter ones refuses those with a reason."""
+
 DESCRIPTORS: Final = 8192
 """Open files that the process asks the system for: connections, records and pictures."""
+
+FOR_CONNECTIONS: Final = 0.75
+"""Share of the open files that connections may take; the rest is for files."""
 
 QUIET_SECONDS: Final = 60.0
 """Time in which the same kind of message is not logged again [s]."""
@@ -46,6 +65,23 @@ LOGGERS: Final = "uvicorn.error", "asyncio", __name__
 
 FORWARDED: Final = "FORWARDED_ALLOW_IPS"
 """Variable of uvicorn with the addresses of proxies whose `X-Forwarded-For` is believed; by default of none."""
+
+HEADERS: Final = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), geolocation=(), payment=()",
+    "Cache-Control": "no-cache",
+}
+"""Headers of every answer: nothing from other hosts, no inline scripts, no frames, no referrer."""
+
+
+# --- server -----------------------------------------------------------------------------------------------------------
 
 
 class WebServer(Server):
@@ -88,13 +124,15 @@ def web_server(app: Starlette, *, host_names: Collection[str] = (), **options: A
         options: settings of uvicorn that differ from the usual ones.
     """
     app.state.host_names = frozenset(map(str.lower, host_names))
-    visitors = Visitors(time.monotonic, strangers=_allowed(MOST_STRANGERS), known=_allowed(MOST_KNOWN))
+    most = MOST_STRANGERS + MOST_KNOWN
+    share = connections_allowed(most) / most
+    visitors = Visitors(time.monotonic, strangers=int(share * MOST_STRANGERS), known=int(share * MOST_KNOWN))
     guard, proxies = Guard(visitors, Turns()), os.environ.get(FORWARDED, "")
     usual: dict[str, Any] = {
         "loop": "asyncio",
         "http": partial(GuardedHttp, guard),
         "ws": GuardedSocket,
-        "ws_max_size": 2 * MAX_BYTES,
+        "ws_max_size": MAX_MESSAGE,
         "ws_per_message_deflate": False,
         "proxy_headers": bool(proxies),
         "forwarded_allow_ips": proxies,
@@ -105,29 +143,8 @@ def web_server(app: Starlette, *, host_names: Collection[str] = (), **options: A
         "timeout_graceful_shutdown": 2,
     }
     config = Config(Outermost(app), **(usual | options))
-    for name in LOGGERS:  # after the configuration has set up logging
-        found = logging.getLogger(name)
-        if not any(isinstance(each, RepeatedMessages) for each in found.filters):
-            found.addFilter(RepeatedMessages())
+    quieten(LOGGERS)  # after the configuration has set up logging
     return WebServer(config, visitors)
-
-
-def _allowed(most: int) -> int:
-    """Returns a number of connections that the limit of open files allows, after raising that limit."""
-    try:
-        import resource
-    except ImportError:  # Windows, which has no such limit
-        return most
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft != resource.RLIM_INFINITY and soft < DESCRIPTORS:
-        wanted = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(DESCRIPTORS, hard)
-        try:
-            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
-            soft = wanted
-        except (OSError, ValueError):
-            logger.debug("the limit of open files stays at %d", soft)
-    share = most / (MOST_STRANGERS + MOST_KNOWN)
-    return most if soft == resource.RLIM_INFINITY else min(most, int(share * soft * 0.75))  # the rest is for files
 
 
 class Outermost:
@@ -168,6 +185,65 @@ class Outermost:
         if scope["type"] == "http" and not started:
             await send({"type": "http.response.start", "status": status, "headers": [(b"content-length", b"0")]})
             await send({"type": "http.response.body", "body": b""})
+
+
+# --- application ------------------------------------------------------------------------------------------------------
+
+
+def application(routes: Sequence[BaseRoute], lifespan: Lifespan[Starlette] | None = None) -> Starlette:
+    """Returns an application whose answers have `HEADERS`, and which refuses foreign host names."""
+    middleware = [Middleware(SecurityHeaders), Middleware(ForeignHosts)]
+    return Starlette(routes=routes, lifespan=lifespan, middleware=middleware)
+
+
+class SecurityHeaders:
+    """Adds `HEADERS` to every answer.
+
+    Args:
+        app: the application.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handles a request."""
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers if scope["type"] == "http" else send)
+
+
+# --- limits of the process --------------------------------------------------------------------------------------------
+
+
+def connections_allowed(wanted: int) -> int:
+    """Returns how many connections the limit of open files allows, at most those wanted, after raising that limit."""
+    try:
+        import resource
+    except ImportError:  # Windows, which has no such limit
+        return wanted
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != resource.RLIM_INFINITY and soft < DESCRIPTORS:
+        raised = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(DESCRIPTORS, hard)
+        try:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (raised, hard))
+            soft = raised
+        except (OSError, ValueError):
+            logger.debug("the limit of open files stays at %d", soft)
+    return wanted if soft == resource.RLIM_INFINITY else min(wanted, int(FOR_CONNECTIONS * soft))
+
+
+def quieten(names: tuple[str, ...]) -> None:
+    """Limits how often loggers repeat messages of the same kind."""
+    for found in map(logging.getLogger, names):
+        if not any(isinstance(each, RepeatedMessages) for each in found.filters):
+            found.addFilter(RepeatedMessages())
 
 
 @dataclass

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import pytest
 
-from dorothie_gym.lab.console.visitors import (
+from dorothie_gym.lab.admission import (
     ANSWER_SECONDS,
     ENDED_AT_ONCE,
     KNOWN_SECONDS,

@@ -10,8 +10,7 @@ import pytest
 
 pytest.importorskip("uvicorn", reason="needs the extra console")
 
-from dorothie_gym.lab.console.turns import Turns
-from dorothie_gym.lab.console.visitors import REQUESTS, Visitor
+from dorothie_gym.lab.admission import REQUESTS, Turns, Visitor
 
 
 class Line:

@@ -93,5 +93,8 @@ export function notice(text, kind = 'info') {
 export const clock = seconds => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, '0')}`;
 const LABELS = { constructioncone: 'construction cone', streetbarrier: 'street barrier', trafficcone: 'traffic cone', trafficsign: 'traffic sign', trafficwarning: 'warning sign', SevenEleven: 'Seven-Eleven' };
 
+/** Returns a text with a capital letter at its beginning. */
+export const sentence = text => text[0].toUpperCase() + text.slice(1);
+
 /** Returns a label of a vocabulary as words. */
 export const words = label => LABELS[label] ?? label.replace(/([a-z])([A-Z])/g, '$1 $2');

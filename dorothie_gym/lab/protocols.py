@@ -18,8 +18,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from uvicorn.server import ServerState
 from websockets.frames import CloseCode
 
-from dorothie_gym.lab.console.turns import Turns
-from dorothie_gym.lab.console.visitors import Visitor, Visitors
+from dorothie_gym.lab.admission import Turns, Visitor, Visitors
 
 PART: Final = 16 * 1024
 """Bytes of a connection that are read in one turn; parts of a body may be as small as a byte, and cost as much."""

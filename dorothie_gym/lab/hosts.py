@@ -1,4 +1,4 @@
-"""Names under which browsers may reach a server: pages of other sites cannot reach it by names of their own."""
+"""Hosts: names under which browsers may reach a server, and the host of the page that sends a request."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import ipaddress
 import socket
 import threading
 from typing import Final
+from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
+from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -92,3 +94,12 @@ def is_cleartext_browser(headers: Headers) -> bool:
     opens_page = "text/html" in headers.get("accept", "")
     secure = headers.get("x-forwarded-proto", "").lower() == "https" or "sec-fetch-site" in headers
     return opens_page and not secure
+
+
+def is_same_origin(connection: HTTPConnection) -> bool:
+    """Returns whether a request comes from a page of this server, or from a program without an origin."""
+    origin = connection.headers.get("origin")
+    try:
+        return origin is None or urlsplit(origin).netloc.lower() == connection.headers.get("host", "").lower()
+    except ValueError:  # no address
+        return False
