@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.vocabulary import complete
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.batch.threads import turns_of
@@ -43,8 +44,8 @@ _step_share = direct(step_share)
 FAULT_SECONDS = 30.0
 """Duration of a sensor fault [s] (design)."""
 
-CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
-"""Share of the signal left by a fault of the view: blur halves the sight."""
+CLARITY = complete({Sensor.BLUR: 0.25, Sensor.GPS: 1.0, Sensor.VIEW: 0.0}, Sensor, "CLARITY", __name__)
+"""Share of the signal of the view that the fault of a sensor leaves: blur halves the sight."""
 
 
 def parts_of(frames: int) -> list[int]:
