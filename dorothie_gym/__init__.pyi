@@ -4,7 +4,6 @@ from ._version import __version__ as __version__
 from .archive import load_sessions as load_sessions
 from .envs.duo_wizard_v0 import DuoWizardEnv as DuoWizardEnv
 from .envs.duo_wizard_vector_env import DuoWizardVectorEnv as DuoWizardVectorEnv
-from .envs.navigation.config import NavigationWeights as NavigationWeights
 from .envs.navigation_continuous_v0 import NavigationContinuousEnv as NavigationContinuousEnv
 from .envs.navigation_v0 import NavigationEnv as NavigationEnv
 from .envs.nfd_v0 import NfDEnv as NfDEnv
@@ -23,8 +22,9 @@ from .session.camera_config import CameraConfig as CameraConfig
 from .session.camera_config import CameraMount as CameraMount
 from .session.camera_config import CameraOutput as CameraOutput
 from .session.config import EnvConfig as EnvConfig
-from .session.config import RewardWeights as RewardWeights
 from .session.recording import Session as Session
+from .session.rewards import NavigationWeights as NavigationWeights
+from .session.rewards import RewardWeights as RewardWeights
 from .session.scenario import Scenario as Scenario
 from .session.scenario import draw_scenario as draw_scenario
 from .session.spaces import SpaceLimits as SpaceLimits

@@ -20,14 +20,8 @@ from sklearn.feature_extraction.text import HashingVectorizer
 from sklearn.linear_model import LogisticRegression
 
 from dorothie_gym.archive import Task
+from dorothie_gym.evaluation import teacher_forced
 from dorothie_gym.evaluation.rollout import default_corpus
-from dorothie_gym.evaluation.teacher_forced import (
-    ActionPredictions,
-    ActPredictions,
-    TaskPredictions,
-    evaluate_files,
-    write_predictions,
-)
 from dorothie_gym.evaluation.teacher_forced.features import BatchSpec, Columns, PointTable, build, gather, points
 from dorothie_gym.ontology import DialogueMove
 
@@ -46,22 +40,24 @@ def features(columns: Columns, table: PointTable) -> csr_matrix:
     return hstack(blocks).tocsr()
 
 
-def predict(columns: Columns, task: Task) -> TaskPredictions:
+def predict(columns: Columns, task: Task) -> teacher_forced.TaskPredictions:
     """Fits the fold "train" and predicts the points of the fold "test"."""
     train, test = points(columns, task, "train"), points(columns, task, "test")
     labels = train.label_action if task is Task.NFD else train.label_move
     model = LogisticRegression(max_iter=200).fit(features(columns, train), labels)
     classes = model.predict(features(columns, test)).astype(np.int64)
-    predicted: ActionPredictions | ActPredictions
+    predicted: teacher_forced.ActionPredictions | teacher_forced.ActPredictions
     if task is Task.NFD:  # the median angle of each action
         angles = np.array([np.nanmedian(train.label_angle[labels == k]) for k in range(labels.max() + 1)])
-        predicted = ActionPredictions(actions=classes, angles=np.nan_to_num(angles[classes]))
+        predicted = teacher_forced.ActionPredictions(actions=classes, angles=np.nan_to_num(angles[classes]))
     else:  # slots that most points have; better slots need a better model
         slots = np.tile(train.label_slots.mean(axis=0) > 0.5, (len(test), 1))
-        predicted = ActPredictions(moves=classes, slots=slots)
+        predicted = teacher_forced.ActPredictions(moves=classes, slots=slots)
     sessions = np.array(columns.sessions.names)[test.session]
     events = test.event.astype(np.int64)
-    return TaskPredictions(model="mine", seed=0, task=task, sessions=sessions, events=events, predicted=predicted)
+    return teacher_forced.TaskPredictions(
+        model="mine", seed=0, task=task, sessions=sessions, events=events, predicted=predicted
+    )
 
 
 def main() -> None:
@@ -73,8 +69,8 @@ def main() -> None:
 
     corpus = options.corpus or default_corpus()
     columns = build(corpus)
-    write_predictions(options.out, [predict(columns, task) for task in Task])
-    for part, metrics in evaluate_files([options.out], corpus).to_json()["models"]["mine"].items():
+    teacher_forced.write_predictions(options.out, [predict(columns, task) for task in Task])
+    for part, metrics in teacher_forced.evaluate_files([options.out], corpus).to_json()["models"]["mine"].items():
         for key in ("ufn_move_accuracy", "rfn_move_accuracy", "nfd_action_accuracy"):
             print(f"{part:8}{key:24}{metrics[key]['mean']:.3f}")
 

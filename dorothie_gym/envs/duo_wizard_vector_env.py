@@ -18,9 +18,10 @@ from dorothie_gym.envs.session_view import SessionView, metadata_at
 from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.session.channel_kind import ChannelKind
-from dorothie_gym.session.config import EnvConfig, term_names
+from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.perception_model import PerceptionModel
 from dorothie_gym.session.pictures import OBSERVERS, picture_spaces
+from dorothie_gym.session.rewards import term_names
 from dorothie_gym.session.scenario import Scenario, scenario_option
 from dorothie_gym.session.session_batch import SessionBatch
 from dorothie_gym.session.session_engine import SessionEngine, StepOutcome

@@ -10,7 +10,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.cameras import DriverObservation, driver_space
-from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.continuous_control import CONTINUOUS_FIELD_SPECS, CONTINUOUS_FIELDS
 from dorothie_gym.envs.navigation.env import DrivingEnv
 from dorothie_gym.envs.session_view import metadata_at
@@ -18,6 +18,7 @@ from dorothie_gym.errors import short_repr
 from dorothie_gym.maps.town import Town
 from dorothie_gym.policies.navigation.observation_vector import Vector
 from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.rewards import NavigationWeights, weights_of
 from dorothie_gym.session.scenario import ResetOptions
 from dorothie_gym.session.spaces.actions import StepInfo
 from dorothie_gym.session.spaces.fields import FieldSpec, signal

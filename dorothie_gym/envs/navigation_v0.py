@@ -9,7 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from dorothie_gym.envs.navigation.cameras import DriverObservation, driver_space
-from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.env import DrivingEnv
 from dorothie_gym.envs.session_view import metadata_at
 from dorothie_gym.maps.town import Town
@@ -17,6 +17,7 @@ from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, navigation_space
 from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.rewards import NavigationWeights, weights_of
 from dorothie_gym.session.scenario import ResetOptions
 from dorothie_gym.session.spaces.actions import StepInfo
 from dorothie_gym.support.action_values import whole_number

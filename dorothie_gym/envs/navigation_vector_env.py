@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from dorothie_gym.envs.batched_env import Towns
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import driver_space
-from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights, weights_of
+from dorothie_gym.envs.navigation.config import NavigationConfig
 from dorothie_gym.envs.navigation.vector_env import DrivingVectorEnv
 from dorothie_gym.errors import short_repr
 from dorothie_gym.policies.navigation.actions import ACTIONS
 from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import navigation_space
 from dorothie_gym.session.camera_config import CameraConfig
+from dorothie_gym.session.rewards import NavigationWeights, weights_of
 from dorothie_gym.support.action_values import as_array
 from dorothie_gym.support.render_view import RenderView
 from dorothie_gym.support.vector_infos import Infos, masked_infos

@@ -34,6 +34,7 @@ from dorothie_gym.envs.history_space import (
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.dialogue_acts import LABELS
 from dorothie_gym.session.recording.session import Session
+from dorothie_gym.session.rewards import ACT_TERMS, DECISION_TERMS, act_terms, decision_terms
 from dorothie_gym.session.scenario import ResetOptions
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo
 from dorothie_gym.session.spaces.limits import SpaceLimits
@@ -82,7 +83,7 @@ class ActRules(PointRules[InferencePoint]):
     `slots` is 1 if neither the point nor the prediction has slot values.
     """
 
-    terms = ("move", "slots")
+    terms = ACT_TERMS
 
     @property
     def action_space(self) -> spaces.Dict:
@@ -101,9 +102,7 @@ class ActRules(PointRules[InferencePoint]):
     def score(self, action: ActionMapping, point: InferencePoint) -> dict[str, float]:
         """Returns `move` and `slots`."""
         truth, guess = np.array(point.act.vector, dtype=np.bool_), np.asarray(action["slots"], dtype=np.bool_)
-        hits, named = int((truth & guess).sum()), int(truth.sum() + guess.sum())
-        right = int(action["move"]) == int(point.act.move)
-        return {"move": float(right), "slots": 2.0 * hits / named if named else 1.0}
+        return act_terms(int(action["move"]) == int(point.act.move), truth, guess)
 
 
 class DecisionRules(PointRules[DecisionPoint]):
@@ -112,7 +111,7 @@ class DecisionRules(PointRules[DecisionPoint]):
     `joint` is undefined if the recording lacks the angle.
     """
 
-    terms = ("action", "joint")
+    terms = DECISION_TERMS
 
     @property
     def action_space(self) -> spaces.Dict:
@@ -132,11 +131,9 @@ class DecisionRules(PointRules[DecisionPoint]):
 
     def score(self, action: ActionMapping, point: DecisionPoint) -> dict[str, float]:
         """Returns `action` and, if the angle is known, `joint`."""
-        right = int(action["action"]) == point.action.nfd_class
-        if np.isnan(point.angle):
-            return {"action": float(right)}
-        near = angle_error(float(action["angle"]), point.angle) < ANGLE_TOLERANCE
-        return {"action": float(right), "joint": float(right and near)}
+        error = None if np.isnan(point.angle) else angle_error(float(action["angle"]), point.angle)
+        is_right = int(action["action"]) == point.action.nfd_class
+        return decision_terms(is_right, None if error is None else error < ANGLE_TOLERANCE)
 
 
 RULES: Final[Mapping[Task, PointRules[Any]]] = {

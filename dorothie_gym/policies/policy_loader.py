@@ -1,4 +1,8 @@
-"""Policies by name, shipped trained policies among them, and trained policies from files."""
+"""Policies by name, shipped trained policies among them, and trained policies from files.
+
+The module of a policy is imported when the policy is made (by the lazy faces of `policies` and its packages): who asks
+for the names needs none of them.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +15,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, TypeAlias
 
+from dorothie_gym import policies
 from dorothie_gym.errors import MAX_SHOWN, InputFileError, PolicyLoadError, did_you_mean, short_repr
 from dorothie_gym.ontology.roles import Role
-from dorothie_gym.policies.ad_wizard import ScriptedAdWizard
-from dorothie_gym.policies.co_wizard.policy import ScriptedCoWizard
+from dorothie_gym.policies import language_model as model_policies
 from dorothie_gym.policies.language_model.config import LanguageModelConfig
-from dorothie_gym.policies.language_model.policy import LanguageModelPolicy
-from dorothie_gym.policies.participant.policy import ScriptedParticipant
 from dorothie_gym.policies.persona import parse_traits
 from dorothie_gym.policies.policy import AnyPolicy
 from dorothie_gym.policies.pretrained import check_fits, is_pretrained, names_for, pretrained_folder
-from dorothie_gym.policies.trivial import LaneFollowPolicy, RandomPolicy, SilentPolicy
 from dorothie_gym.session.spaces.limits import SpaceLimits
 from dorothie_gym.support.input_files import MAX_MODEL_JSON, MAX_WEIGHTS, check_file, raising, read_json
 
@@ -65,14 +66,16 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
     if _gives_traits(name, role):
         traits = parse_traits(name.removeprefix(WITH_TRAITS))
         if role is Role.PARTICIPANT:
-            return ScriptedParticipant(limits, traits=traits)
-        return ScriptedCoWizard(limits, traits=traits)
+            return policies.ScriptedParticipant(limits, traits=traits)
+        return policies.ScriptedCoWizard(limits, traits=traits)
     if name.startswith(LANGUAGE_MODEL):
-        return LanguageModelPolicy(role, LanguageModelConfig.usual(name.removeprefix(LANGUAGE_MODEL)), limits)
+        return model_policies.LanguageModelPolicy(
+            role, LanguageModelConfig.usual(name.removeprefix(LANGUAGE_MODEL)), limits
+        )
     if name == "silent":
-        return SilentPolicy(role, limits)
+        return policies.SilentPolicy(role, limits)
     if name == "random":
-        return RandomPolicy(role, limits)
+        return policies.RandomPolicy(role, limits)
     if name not in policy_names(role):
         hint = did_you_mean(name, policy_names(role))
         raise ValueError(f"there is no policy {name!r}; {hint}the policies are {', '.join(policy_names(role))}")
@@ -80,10 +83,10 @@ def make_policy(name: str, role: Role, limits: SpaceLimits | None = None) -> Any
         check_fits(name)
         return _trained_player(name, pretrained_folder(name), role).make(role, limits or SpaceLimits())
     if name == LANE_FOLLOW:
-        return LaneFollowPolicy(limits)
+        return policies.LaneFollowPolicy(limits)
     if role is Role.PARTICIPANT:
-        return ScriptedParticipant(limits)
-    return ScriptedCoWizard(limits) if role is Role.CO_WIZARD else ScriptedAdWizard(limits)
+        return policies.ScriptedParticipant(limits)
+    return policies.ScriptedCoWizard(limits) if role is Role.CO_WIZARD else policies.ScriptedAdWizard(limits)
 
 
 def _gives_traits(name: str, role: Role) -> bool:
@@ -175,7 +178,7 @@ class Player:
             ValueError: the role has no policy of this name, the file cannot be read, or a library is not installed.
         """
         if self.language_model is not None:
-            return LanguageModelPolicy(role, self.language_model, limits)
+            return model_policies.LanguageModelPolicy(role, self.language_model, limits)
         if self.path is None or self.loader is None:
             return make_policy(self.name, role, limits)
         with _reporting_missing_library(self.name):

@@ -1,96 +1,17 @@
-"""Settings of a session, and the reward terms that its weights give."""
+"""Settings of a session."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import TypeAlias
 
 from dorothie_gym.dialogue.conversation import WORDS_PER_SECOND
 from dorothie_gym.dialogue.recognition_errors import USUAL_WORD_ERROR_RATE
-from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.camera_config import CameraConfig
 from dorothie_gym.session.channel_kind import ChannelKind
 from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.rewards import RewardWeights
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.support.copying import shared
-
-RewardTerms: TypeAlias = dict[str, float]
-"""Terms of a role's reward, by name."""
-
-_SIGNS = ((Role.PARTICIPANT, 1.0), (Role.CO_WIZARD, 1.0), (Role.AD_WIZARD, -1.0))
-"""Roles and the sign of the shared reward terms: the Ad-Wizard plays against the others."""
-
-
-def term_names(role: Role) -> tuple[str, ...]:
-    """Returns the names of the terms of a role's reward, in order."""
-    return ("subgoal", "success", "collision", "time", "refusal", *(() if role is Role.AD_WIZARD else ("talk",)))
-
-
-@shared
-@dataclass(frozen=True, kw_only=True)
-class RewardWeights:
-    """Weights of the reward terms. Participant and Co-Wizard share the first four; the Ad-Wizard gets them negated.
-
-    Attributes:
-        subgoal: reward for each subgoal reached.
-        success: reward at the end, if every live subgoal was reached without a collision caused by the ego.
-        collision: reward for each collision caused by the ego.
-        time: reward per second [1/s].
-        talk: reward for each utterance span of the role itself (participant and Co-Wizard).
-        refusal: reward for each refused action of the role.
-
-    Raises:
-        ValueError: a weight is not finite; names the field.
-    """
-
-    subgoal: float = 1.0
-    success: float = 5.0
-    collision: float = -2.0
-    time: float = -0.005
-    talk: float = -0.01
-    refusal: float = -0.02
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not math.isfinite(value):
-                raise ValueError(f"RewardWeights.{name} is {value}; it must be a finite number")
-
-    def terms(
-        self,
-        *,
-        reached: int,
-        success: bool,
-        collisions: int,
-        decision_frequency: float,
-        refusals: Mapping[Role, int],
-        spoken: Mapping[Role, bool],
-    ) -> dict[Role, RewardTerms]:
-        """Returns the reward terms of one decision, by role.
-
-        Args:
-            reached: number of subgoals reached.
-            success: whether the session has ended with every live subgoal reached and no collision.
-            collisions: number of collisions caused by the ego.
-            decision_frequency: decisions per second [Hz].
-            refusals: number of refused actions, by role.
-            spoken: whether an utterance span began, for the roles that speak.
-        """
-        subgoal, success_reward = self.subgoal * reached, self.success * success
-        collision, time = self.collision * collisions, self.time / decision_frequency
-        terms: dict[Role, RewardTerms] = {}
-        for role, sign in _SIGNS:
-            own = terms[role] = {
-                "subgoal": sign * subgoal,
-                "success": sign * success_reward,
-                "collision": sign * collision,
-                "time": sign * time,
-                "refusal": self.refusal * refusals[role],
-            }
-            if role in spoken:
-                own["talk"] = self.talk * spoken[role]
-        return terms
 
 
 @shared

@@ -15,7 +15,7 @@ from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, WeatherParameter
 from dorothie_gym.session.beliefs import BeliefTracker
 from dorothie_gym.session.cabin import CabinState
-from dorothie_gym.session.config import EnvConfig, RewardTerms
+from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.dialogue_channel import DialogueChannel
 from dorothie_gym.session.exception_executor import ExceptionExecutor
 from dorothie_gym.session.masks import ActionMasks
@@ -24,6 +24,7 @@ from dorothie_gym.session.perception_model import PerceptionModel
 from dorothie_gym.session.providers import Pictures, VisiblePerception, draw_pictures, see_by_camera
 from dorothie_gym.session.recording.events import EndReason, Event, EventType
 from dorothie_gym.session.recording.header import SessionHeader
+from dorothie_gym.session.rewards import RewardTerms
 from dorothie_gym.session.scenario import Scenario, header_of
 from dorothie_gym.session.session_log import EventLog, SessionSummary, SubgoalCounts, SubgoalTracker
 from dorothie_gym.session.session_views import SessionViews

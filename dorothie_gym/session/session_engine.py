@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dorothie_gym import maps  # lazy: a town that is given needs no reader
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES, Role
-from dorothie_gym.session.config import EnvConfig, RewardTerms, term_names
+from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.live_session import LiveSession, StepBegun
 from dorothie_gym.session.masks import RoleMask
 from dorothie_gym.session.observations import LazyObservations
@@ -21,6 +21,7 @@ from dorothie_gym.session.perception_model import PerceptionModel
 from dorothie_gym.session.pictures import OBSERVERS, picture_spaces
 from dorothie_gym.session.recording.events import EndReason, Event
 from dorothie_gym.session.recording.header import SessionHeader
+from dorothie_gym.session.rewards import RewardTerms, term_names
 from dorothie_gym.session.scenario import Scenario, draw_scenario, template_option
 from dorothie_gym.session.session_log import SessionSummary
 from dorothie_gym.session.spaces.actions import ActionDecoder, ActionMapping, RoleAction, StepInfo

@@ -7,13 +7,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from dorothie_gym.envs.navigation.config import NavigationWeights
 from dorothie_gym.envs.navigation_continuous_v0 import NavigationContinuousEnv
 from dorothie_gym.envs.navigation_v0 import NavigationEnv
 from dorothie_gym.ontology import DialogueMove
 from dorothie_gym.policies.navigation import FIELD_SPECS, FIELDS, NavigationAction, layout
 from dorothie_gym.policies.navigation.cost_to_go import CostToGo
-from dorothie_gym.session.config import RewardWeights
+from dorothie_gym.session.rewards import NavigationWeights, RewardWeights
 from dorothie_gym.session.scenario import draw_scenario
 from tests.envs.navigation_drivers import drive, follow_lane, obey
 

@@ -1,8 +1,7 @@
-"""Settings of the navigation environments: difficulty, guidance, reward and observation."""
+"""Settings of the navigation environments: difficulty, guidance and observation."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -13,6 +12,7 @@ from dorothie_gym.policies.navigation.instructor import Guidance
 from dorothie_gym.policies.navigation.observation_vector import DECISION_FREQUENCY, MAX_SECONDS
 from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.rewards import NavigationWeights
 from dorothie_gym.sim.config import WorldConfig
 from dorothie_gym.support.copying import shared
 from dorothie_gym.support.input_files import settings_of
@@ -28,54 +28,6 @@ OBSERVATIONS: Final = ("vector", "camera")
 
 SMALL_CAMERA: Final = CameraConfig(width=84, height=84)
 """Camera of drivers unless another one is given."""
-
-
-@shared
-@dataclass(frozen=True, kw_only=True)
-class NavigationWeights:
-    """Weights of the reward terms; a term of weight 0 is reported as 0.
-
-    Attributes:
-        progress: reward for each metre by which the cost to go decreases. The cost to go is that of the route to the
-            present goal in metres at 40 km/h; as a difference of potentials it leaves the optimal policy unchanged (Ng,
-            Harada and Russell 1999).
-        subgoal: reward for each subgoal reached.
-        success: reward at the end, if every live subgoal was reached without a collision caused by the ego.
-        collision: reward for each collision caused by the ego.
-        infraction: reward for each red light, stop sign, stretch off the road or on the wrong side.
-        gave_up: reward at the end, if the participant has given up or the ego has left the road.
-        time: reward per second [1/s].
-        action: reward for each action that is carried out; discourages needless actions.
-        refusal: reward for each action that is refused.
-
-    Raises:
-        ValueError: a weight is not finite; names the field.
-    """
-
-    progress: float = 0.02
-    subgoal: float = 1.0
-    success: float = 2.0
-    collision: float = -1.0
-    infraction: float = -0.1
-    gave_up: float = -1.0
-    time: float = -0.02
-    action: float = -0.005
-    refusal: float = -0.01
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not math.isfinite(value):
-                raise ValueError(f"NavigationWeights.{name} is {value}; it must be a finite number")
-
-
-REWARDS: Mapping[str, NavigationWeights] = MappingProxyType(
-    {
-        "dense": NavigationWeights(),
-        "careful": NavigationWeights(collision=-3.0),
-        "sparse": NavigationWeights(progress=0.0, infraction=0.0, gave_up=0.0, time=0.0, action=0.0, refusal=0.0),
-    }
-)
-"""Weights by name."""
 
 
 @shared
@@ -146,12 +98,3 @@ class NavigationConfig:
             max_seconds=self.max_seconds,
             world=WorldConfig(vehicles=vehicles, pedestrians=pedestrians),
         )
-
-
-def weights_of(reward: str | NavigationWeights | Mapping[str, object]) -> NavigationWeights:
-    """Returns weights given by name, directly or by their fields; raises `ValueError` for an unknown name or field."""
-    if not isinstance(reward, str):
-        return settings_of(reward, NavigationWeights, "reward")
-    if reward not in REWARDS:
-        raise ValueError(f"reward is {reward!r}; it must be one of {', '.join(REWARDS)}, or NavigationWeights")
-    return REWARDS[reward]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import DriverObservation
 from dorothie_gym.envs.navigation.config import NavigationConfig
-from dorothie_gym.envs.navigation.episode import TERMS, Ending
+from dorothie_gym.envs.navigation.episode import Ending
 from dorothie_gym.envs.navigation.render import DrivingView
 from dorothie_gym.envs.navigation.rows import INFRACTIONS
 from dorothie_gym.envs.session_view import SessionView, metadata_at
@@ -21,6 +21,7 @@ from dorothie_gym.maps.catalogue import load_town
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.session.live_session import LiveSession
+from dorothie_gym.session.rewards import NAVIGATION_TERMS
 from dorothie_gym.session.scenario import ResetOptions, check_options, scenario_option, template_option
 from dorothie_gym.session.spaces.actions import StepInfo
 from dorothie_gym.support.copying import Restorable
@@ -129,7 +130,7 @@ class DrivingEnv(Restorable, TimeLimitedEnv[DriverObservation, Action]):
         outcome = batch.outcomes[0]
         reasons = batch.refusals(0)
         info: StepInfo = {
-            "reward_terms": dict(zip(TERMS, outcome["terms"].tolist(), strict=True)),
+            "reward_terms": dict(zip(NAVIGATION_TERMS, outcome["terms"].tolist(), strict=True)),
             "refused": {kind: bool(reason) for kind, reason in reasons.items()},
             "refusal_reason": "; ".join(filter(None, reasons.values())),
             "infractions": dict(zip(INFRACTIONS, batch.infractions[0].tolist(), strict=True)),

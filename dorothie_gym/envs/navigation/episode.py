@@ -1,15 +1,16 @@
-"""Reward and end of an episode of the navigation environments (compiled)."""
+"""End of an episode of the navigation environments, and what is rewarded (compiled)."""
 
 from __future__ import annotations
 
 import enum
 import math
-from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights
+from dorothie_gym.envs.navigation.config import NavigationConfig
+from dorothie_gym.session.rewards import NAVIGATION_TERMS, write_navigation_terms
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.state.codes import COLLISION
 from dorothie_gym.support.compilation import compiled
@@ -27,9 +28,6 @@ LEFT_ROAD_DISTANCE = 15.0
 
 EARLY = 1e-9
 """Time by which rounding may let a limit seem not yet reached [s]."""
-
-TERMS: Final = tuple(vars(NavigationWeights()))
-"""Names of the reward terms, in order."""
 
 
 class Ending(enum.IntEnum):
@@ -73,7 +71,7 @@ class EpisodeRecord:
     counted: Int32  # subgoals, collisions of the ego's own fault, and infractions that were rewarded so far
     collisions: Int64
     broken: Int64
-    terms: Annotated[NDArray[np.float64], "f8", (len(TERMS),)]  # of the last decision
+    terms: Annotated[NDArray[np.float64], "f8", (len(NAVIGATION_TERMS),)]  # of the last decision
     reward: Float
     ending: Int32  # `Ending`
 
@@ -81,7 +79,7 @@ class EpisodeRecord:
 class EpisodeSettings:
     """Settings of an episode, see `NavigationConfig`."""
 
-    weights: Annotated[NDArray[np.float64], "f8", (len(TERMS),)]
+    weights: Annotated[NDArray[np.float64], "f8", (len(NAVIGATION_TERMS),)]
     frequency: Float  # of decisions [Hz]
     patience: Float  # [s]
     max_seconds: Float
@@ -130,17 +128,17 @@ def judge(world: WorldArrays, episode: EpisodeArrays) -> None:
     for kind in range(len(world.watch[0].counts)):
         broken += world.watch[0].counts[kind] if kind != COLLISION else 0
     failed = state.ending == _LEFT_ROAD or state.ending == _GAVE_UP
-    terms, weights = state.terms, settings.weights
-    terms[0] = weights[0] * state.progress
-    terms[1] = weights[1] * (state.reached - state.counted)
-    terms[2] = weights[2] * (1.0 if collisions == 0 and state.done and state.succeeded else 0.0)
-    terms[3] = weights[3] * (collisions - state.collisions)
-    terms[4] = weights[4] * (broken - state.broken)
-    terms[5] = weights[5] * (1.0 if failed else 0.0)
-    terms[6] = weights[6] / settings.frequency
-    terms[7] = weights[7] * (1.0 if state.acted and state.refusals == 0 else 0.0)
-    terms[8] = weights[8] * state.refusals
+    state.reward = write_navigation_terms(
+        state.terms,
+        settings.weights,
+        state.progress,
+        state.reached - state.counted,
+        collisions == 0 and bool(state.done) and bool(state.succeeded),
+        collisions - state.collisions,
+        broken - state.broken,
+        failed,
+        settings.frequency,
+        bool(state.acted) and state.refusals == 0,
+        state.refusals,
+    )
     state.counted, state.collisions, state.broken = state.reached, collisions, broken
-    state.reward = 0.0
-    for k in range(len(terms)):
-        state.reward += terms[k]

@@ -20,12 +20,13 @@ from dorothie_gym.envs.batched_env import BatchedEnv, Towns
 from dorothie_gym.envs.navigation.batch import DrivingBatch
 from dorothie_gym.envs.navigation.cameras import DriverObservation
 from dorothie_gym.envs.navigation.config import NavigationConfig
-from dorothie_gym.envs.navigation.episode import TERMS, Ending
+from dorothie_gym.envs.navigation.episode import Ending
 from dorothie_gym.envs.navigation.render import DrivingView
 from dorothie_gym.envs.navigation.rows import INFRACTIONS, REFUSED
 from dorothie_gym.envs.session_view import SessionView
 from dorothie_gym.errors import short_repr
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.session.rewards import NAVIGATION_TERMS
 from dorothie_gym.session.scenario import Scenario, check_options, scenario_option, template_option
 from dorothie_gym.support.render_view import checked_view
 from dorothie_gym.support.vector_infos import Infos, mask_of, masked_infos, seeds_of
@@ -67,7 +68,7 @@ class DrivingVectorEnv(
         )
         self._rewards = np.zeros(num_envs)
         self._terminations, self._truncations = (np.zeros(num_envs, dtype=np.bool_) for _ in range(2))
-        self._terms = np.zeros((num_envs, len(TERMS)))
+        self._terms = np.zeros((num_envs, len(NAVIGATION_TERMS)))
         self._infractions = np.zeros((num_envs, len(INFRACTIONS)), dtype=np.int64)
         self._subgoals = np.zeros((num_envs, 2), dtype=np.int64)
         self._success = np.zeros(num_envs, dtype=np.bool_)
@@ -254,7 +255,7 @@ class DrivingVectorEnv(
 
     def _infos(self, mask: NDArray[np.bool_]) -> Infos:
         """Returns the infos of the environments of a mask; what belongs to the end of an episode is "" or 0 before."""
-        terms = {name: self._terms[:, k] for k, name in enumerate(TERMS)}
+        terms = {name: self._terms[:, k] for k, name in enumerate(NAVIGATION_TERMS)}
         infractions = {name: self._infractions[:, k] for k, name in enumerate(INFRACTIONS)}
         over = self._terminations | self._truncations
         subgoals = {"live": self._subgoals[:, 0] * over, "reached": self._subgoals[:, 1] * over}

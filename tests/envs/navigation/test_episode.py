@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from dorothie_gym.envs.navigation.config import NavigationConfig, NavigationWeights
-from dorothie_gym.envs.navigation.episode import LEFT_ROAD_DISTANCE, TERMS, Ending, EpisodeArrays, episode_arrays, judge
+from dorothie_gym.envs.navigation.config import NavigationConfig
+from dorothie_gym.envs.navigation.episode import LEFT_ROAD_DISTANCE, Ending, EpisodeArrays, episode_arrays, judge
+from dorothie_gym.session.rewards import NAVIGATION_TERMS, NavigationWeights
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.state.codes import Breach
 from dorothie_gym.sim.state.town_arrays import empty_town
@@ -39,7 +40,7 @@ class Episode:
 
     @property
     def terms(self) -> dict[str, float]:
-        return dict(zip(TERMS, self.state["terms"].tolist(), strict=True))
+        return dict(zip(NAVIGATION_TERMS, self.state["terms"].tolist(), strict=True))
 
 
 def test_events_are_rewarded_once() -> None:
