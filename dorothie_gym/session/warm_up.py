@@ -69,7 +69,7 @@ def warm_up(progress: Progress | None = None, *, everything: bool = False) -> No
     with reporting(progress) as report, _helper(report) as wait:
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
         engine.reset(seed=0)
-        engine.session.observe()
+        engine.session.observer.observe()
         _compile_rare()
         _call_what_follows_a_step(engine.session.world)
         if everything:

@@ -1,4 +1,10 @@
-"""World of a session: a town with the ego, traffic, pedestrians and props, weather and sensor faults."""
+"""World of a session: a town with the ego, traffic, pedestrians and props, weather and sensor faults.
+
+A session steps its world between two decisions (`World.step`). Everything that moves is a row of the arrays in
+`World.actors`, which the compiled loop in `sim/step.py` steps at 30 Hz; `World.ego` takes the Co-Wizard's actions.
+
+Fourth of the five files that explain the package. Next: `policies/policy.py`.
+"""
 
 from __future__ import annotations
 
