@@ -169,7 +169,7 @@ def played(engine: SessionEngine, seeds: Sequence[int], census: Census | None) -
         before, begun = census.seconds if census else 0.0, time.process_time()
         ending = play_session(engine, policies, seed=seed, on_step=census)
         spent = time.process_time() - begun - (census.seconds - before if census else 0.0)
-        perception = engine.session.camera_perception
+        perception = engine.session.observer.camera_perception
         landmarks = engine.scenario.storyboard.landmarks
         recognised = () if perception is None else perception.recognised
         yield {

@@ -114,7 +114,7 @@ def played_spans(sessions: int, spans: int, seed: int, progress: Progress = igno
         play_session(
             engine, {role: player.make(role, engine.limits) for role, player in ALL_SCRIPTED.items()}, seed=plan.seed
         )
-        said += engine.session.said
+        said += engine.session.dialogue.said
         progress("sessions", 0.3 * (number + 1) / sessions)
     found = [span for utterance in said for span in utterance.spans]
     order = np.random.default_rng(seed).permutation(len(found))[:spans]

@@ -305,6 +305,9 @@ def _cues() -> MoveCues:
         "{verb}": f"(?:{'|'.join(strings('cues.yaml: verbs', data.get('verbs')))})",
     }
     rules = tuple(_rule(f"cues.yaml: moves[{n}]", rule, terms) for n, rule in enumerate(data.get("moves", [])))
+    ruled = {rule.move for rule in rules}
+    if missing := [move.label for move in DialogueMove if move not in ruled]:
+        raise PhraseFileError(f"dorothie_gym/dialogue/data/cues.yaml: moves has no rule for {', '.join(missing)}")
     answers = {
         parse_move(before): {parse_move(guess): parse_move(move) for guess, move in changes.items()}
         for before, changes in data.get("answers", {}).items()

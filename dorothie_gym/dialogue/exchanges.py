@@ -12,6 +12,7 @@ from dorothie_gym.dialogue.conversation import Utterance
 from dorothie_gym.ontology.dialogue_acts import DialogueAct, DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import ActionValue, SlotValue
+from dorothie_gym.ontology.vocabulary import check_complete
 
 ANSWER_TIMEOUT = 10.0
 """Time without an answer after which an exchange is abandoned [s] (dialogue spec, phenomenon 21)."""
@@ -49,6 +50,13 @@ EXPECTATIONS: Mapping[DialogueMove, frozenset[DialogueMove]] = MappingProxyType(
     }
 )
 """Responses that fulfil each initiating move. Confuse is a response to all of them and fulfils none."""
+
+check_complete(
+    {*EXPECTATIONS, *itertools.chain(*EXPECTATIONS.values()), DialogueMove.CONFUSE, DialogueMove.IRRELEVANT},
+    DialogueMove,
+    "EXPECTATIONS",
+    __name__,
+)
 
 _ASKING = frozenset({DialogueMove.CHECK, DialogueMove.QUERY_YN, DialogueMove.QUERY_W})
 

@@ -23,7 +23,7 @@ from dorothie_gym.ontology.dialogue_acts import DialogueMove
 from dorothie_gym.ontology.roles import Role
 from dorothie_gym.ontology.slots import SLOT_VALUES, ActionValue, Slot, SlotValue
 from dorothie_gym.ontology.spellings import parse_move, parse_role, parse_slot
-from dorothie_gym.ontology.world_exceptions import PropKind
+from dorothie_gym.ontology.world_exceptions import PropKind, Sensor, WeatherParameter
 
 SLOT_FIELDS: Mapping[str, Slot] = {
     "do": Slot.ACTION,
@@ -58,6 +58,13 @@ VOICES = (Role.PARTICIPANT, Role.CO_WIZARD)
 
 _NAMELESS = frozenset({"Unknown", "Unlabeled", "Queried"})
 _ACTIONS = {value.label: value for value in ActionValue}
+_REMARKS = (
+    *(f"{change}_{parameter}" for parameter in WeatherParameter for change in ("much", "less")),
+    *(f"failed_{sensor}" for sensor in Sensor),
+)
+"""Topics of the remarks of scripted speakers (`policies.notable_conditions`) about each member of a vocabulary."""
+
+_FOLDER = "dorothie_gym/dialogue/data/talk"
 MARKER_KINDS = ("opener", "closer", "alarm")
 """Kinds of discourse markers: before a sentence, after it, and before it during an exception."""
 
@@ -233,14 +240,28 @@ class _Builder:
             for voice in VOICES:
                 # Fallback template without slots, topic and details; it guarantees words for every act.
                 if not any(_is_plain(item) and item.speaker in (None, voice) for item in self.templates[move]):
-                    raise PhraseFileError(f"data/talk: {move.label} has no template without slots for {voice.value}")
+                    raise PhraseFileError(
+                        f"{_FOLDER}: {move.label} has no template without slots for {voice.value}; "
+                        f"add a section `== {move.label}` to a file there"
+                    )
         for action in ActionValue:
             for form in ("do", "doing"):
                 if (form, "plain") not in self.actions[action]:
-                    raise PhraseFileError(f"data/talk: there is no section `== {form} {action.label}`")
+                    raise PhraseFileError(f"{_FOLDER}: there is no section `== {form} {action.label}`")
         for slot in SPOKEN_SLOTS:
             if None not in self.tails[slot]:
-                raise PhraseFileError(f"data/talk: there is no section `== tail {slot.label}`")
+                raise PhraseFileError(f"{_FOLDER}: there is no section `== tail {slot.label}`")
+        self._check_world()
+
+    def _check_world(self) -> None:
+        """Checks that there are words for each prop, each change of the weather and each fault."""
+        for kind in PropKind:
+            if kind not in self.props:
+                raise PhraseFileError(f"{_FOLDER}: there is no section `== prop {kind}` with its names")
+        topics = {template.topic for template in self.templates[DialogueMove.EXPLAIN]}
+        for topic in _REMARKS:
+            if topic not in topics:
+                raise PhraseFileError(f"{_FOLDER}: there is no section `== Explain topic={topic}`")
 
 
 def _split_close(text: str) -> tuple[str, str]:

@@ -163,7 +163,7 @@ def bare_name(words: Sequence[str]) -> tuple[str, ...]:
 def _entry(data: YamlMapping, slot: str, label: str) -> Mapping[str, object]:
     entry = data.get(slot, {}).get(label)
     if not isinstance(entry, dict):
-        raise PhraseFileError(f"lexicon.yaml: {slot}.{label} is missing")
+        raise PhraseFileError(f"dorothie_gym/dialogue/data/lexicon.yaml: {slot}.{label} is missing")
     return entry
 
 

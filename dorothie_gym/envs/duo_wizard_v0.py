@@ -1,4 +1,11 @@
-"""`DuoWizard-v0`: a participant, a Co-Wizard and an Ad-Wizard in a town (paper, section 3)."""
+"""`DuoWizard-v0`: a participant, a Co-Wizard and an Ad-Wizard in a town (paper, section 3).
+
+The environment is PettingZoo's face of a session: it hands the actions of the three agents to a `SessionEngine` and
+returns what the roles observe. Users make it (`parallel_env(town="brookside")`); rollouts and the console play the
+engine itself. The docstring of the class states the contract of a session.
+
+First of the five files that explain the package (docs/architecture.md). Next: `session/session_engine.py`.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +19,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 from pettingzoo import AECEnv, ParallelEnv
-from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
 from dorothie_gym.envs.session_view import METADATA, SessionView, metadata_at
+from dorothie_gym.envs.turn_based_duo_wizard import TurnBasedDuoWizard
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import AGENT_ROLES
 from dorothie_gym.session.config import EnvConfig
@@ -28,7 +35,7 @@ from dorothie_gym.session.session_log import SessionSummary
 from dorothie_gym.session.spaces.actions import ActionDict, ActionMapping, StepInfo, action_space
 from dorothie_gym.session.spaces.limits import UNBOUNDED, SpaceLimits
 from dorothie_gym.session.spaces.observations import Observation
-from dorothie_gym.support.copying import Restorable, State
+from dorothie_gym.support.copying import Restorable
 from dorothie_gym.tasks.storyboard import StoryboardTemplate
 
 _METADATA: dict[str, object] = {"name": "duo_wizard_v0", **METADATA, "is_parallelizable": True}
@@ -268,36 +275,6 @@ class DuoWizardEnv(Restorable, ParallelEnv[str, Observation, ActionDict]):
     def summary(self) -> SessionSummary:
         """Returns the state of the session in JSON types."""
         return self.engine.summary()
-
-
-class TurnBasedDuoWizard(parallel_to_aec_wrapper[str, Observation, ActionDict | None]):
-    """PettingZoo's turn-based form of a `DuoWizardEnv`, whose states hold whose turn it is and the actions so far."""
-
-    env: DuoWizardEnv
-
-    def __init__(self, parallel: DuoWizardEnv) -> None:
-        # PettingZoo declares actions that may be None, for agents that are done
-        super().__init__(parallel)  # pyright: ignore[reportArgumentType]
-        self._constant = frozenset((*vars(self), "_constant"))
-        parallel.turns = self
-
-    def clone_state(self) -> State:
-        """Returns the present state, see `DuoWizardEnv.clone_state`."""
-        return self.env.clone_state()
-
-    def restore_state(self, state: State) -> None:
-        """Goes back to a state, see `DuoWizardEnv.restore_state`."""
-        self.env.restore_state(state)
-
-    def turn_values(self) -> dict[str, object]:
-        """Returns what changes beside the session: whose turn it is, the actions of the others, results to be seen."""
-        return {name: value for name, value in vars(self).items() if name not in self._constant}
-
-    def apply_turn_values(self, values: dict[str, object]) -> None:
-        """Applies the values that `turn_values` has returned."""
-        for name in self.turn_values():
-            delattr(self, name)
-        self.__dict__.update(values)
 
 
 parallel_env = raw_env = DuoWizardEnv

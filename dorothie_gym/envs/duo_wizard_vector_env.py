@@ -326,7 +326,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
             refused = np.zeros((self.num_envs, len(REFUSABLE[role])), dtype=np.bool_)
             reasons = np.full(self.num_envs, None, dtype=object)
             for number in numbers:
-                found = self.engines[number].session.refusals[role].values()
+                found = self.engines[number].session.log.refusals[role].values()
                 refused[number] = [bool(reason) for reason in found]
                 reasons[number] = "; ".join(filter(None, found))
             infos[agent] = info = {

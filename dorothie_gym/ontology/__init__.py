@@ -1,6 +1,19 @@
 """Closed vocabularies: roles, dialogue moves, slots, actions, exceptions, and their spellings in files.
 
 Depends on the standard library only; all other packages depend on this one.
+
+The vocabularies are closed: moves, slot values and actions keep the numbers of SDN, so that the same models read its
+corpus and ours, and spaces have one entry for each member. Landmark kinds are closed for the same reason. When a list
+grows:
+
+- Models with an input or output for each member no longer fit. The shipped models that read moves, landmarks or weather
+  are refused until they are trained again (`python benchmarks/pretrained.py`).
+- Scripted roles and storyboards draw from the lists: the sessions of a seed change.
+- Recordings have a column for each weather parameter; those without the new one are refused.
+- New members go to the end, with a number that no recording, model or layout of SDN uses.
+
+A table with an entry for each member is made with `vocabulary.complete`. Importing its module then fails with an error
+that names the missing member and the file. "What a change costs" in CONTRIBUTING.md lists the files of each change.
 """
 
 from dorothie_gym.errors import OntologyError

@@ -12,7 +12,7 @@ from typing import Self, TypeAlias
 
 from dorothie_gym.errors import OntologyError
 from dorothie_gym.ontology.slots import SLOT_VALUES, Slot, SlotValue
-from dorothie_gym.ontology.vocabulary import LabelledInt, unknown_spelling
+from dorothie_gym.ontology.vocabulary import LabelledInt, complete, unknown_spelling
 from dorothie_gym.support.copying import shared
 
 
@@ -374,7 +374,9 @@ def groups_of(move: DialogueMove) -> tuple[MoveGroup, ...]:
     return tuple(question.group for question, _ in path_to(move) if question.group is not None)
 
 
-_PATHS: Mapping[DialogueMove, TreePath] = MappingProxyType({move: path for path, move in paths()})
+_PATHS: Mapping[DialogueMove, TreePath] = complete(
+    {move: path for path, move in paths()}, DialogueMove, "DECISION_TREE", __name__
+)
 
 MOVE_GROUPS: Mapping[MoveGroup, tuple[DialogueMove, ...]] = MappingProxyType(
     {group: tuple(move for move in DialogueMove if group in groups_of(move)) for group in MoveGroup}

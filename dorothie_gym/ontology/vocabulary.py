@@ -5,8 +5,8 @@ from __future__ import annotations
 import difflib
 import functools
 import unicodedata
-from collections.abc import Iterable, Mapping
-from enum import IntEnum
+from collections.abc import Collection, Iterable, Mapping
+from enum import Enum, IntEnum
 from types import MappingProxyType
 from typing import Generic, Self, TypeVar
 
@@ -37,6 +37,36 @@ def unknown_spelling(text: object, vocabulary: str, known: Iterable[str]) -> Ont
     nearest = _nearest(text[:LONGEST].lower(), spellings)
     hint = f"; the nearest known spelling is {nearest!r}" if nearest is not None else ""
     return OntologyError(f"{vocabulary}: {_shown(repr(text))} is unknown{hint}")
+
+
+Key = TypeVar("Key", bound=Enum)
+Entry = TypeVar("Entry")
+
+
+def check_complete(found: Collection[Key], members: Iterable[Key], table: str, module: str) -> None:
+    """Checks, when a module is imported, that its table knows every member of a vocabulary.
+
+    Args:
+        found: members that the table knows.
+        members: the vocabulary.
+        table: name of the table, for the message.
+        module: `__name__` of the module in which the table is written.
+
+    Raises:
+        OntologyError: a member is missing; names the table, its file and what it lacks.
+    """
+    missing = [f"{type(member).__name__}.{member.name}" for member in members if member not in found]
+    if missing:
+        raise OntologyError(
+            f"{table} of {module.replace('.', '/')}.py has no entry for {', '.join(missing)}; every member needs one "
+            "(CONTRIBUTING.md, What a change costs)"
+        )
+
+
+def complete(entries: Mapping[Key, Entry], members: Iterable[Key], table: str, module: str) -> Mapping[Key, Entry]:
+    """Returns a table, for reading, after `check_complete`; arguments and errors are its."""
+    check_complete(entries, members, table, module)
+    return MappingProxyType(dict(entries))
 
 
 class LabelledInt(IntEnum):

@@ -13,6 +13,7 @@ import numpy as np
 
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.vocabulary import check_complete
 from dorothie_gym.ontology.world_exceptions import ExceptionKind, PropKind, Sensor, WeatherParameter
 from dorothie_gym.policies.observation_parser import place_on_path, read_landmarks, read_subgoals, scalar, weather
 from dorothie_gym.policies.policy import Policy, replace
@@ -109,6 +110,8 @@ FOGS: Mapping[WeatherParameter, tuple[float, tuple[float, float]]] = MappingProx
     }
 )
 """The same in fog, of which they are details."""
+
+check_complete({*WEATHERS, *FOGS}, WeatherParameter, "WEATHERS", __name__)
 
 FOGS_FROM = 0.4
 """Share of the density from which on there is fog."""

@@ -14,6 +14,7 @@ from dorothie_gym.dialogue.nlu import ParsedText
 from dorothie_gym.dialogue.propositions import Predicate, Proposition
 from dorothie_gym.dialogue.realization_context import Wording
 from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.vocabulary import complete
 from dorothie_gym.ontology.world_exceptions import Sensor
 from dorothie_gym.ontology.world_exceptions import WeatherParameter as W
 from dorothie_gym.policies.guidance_config import FOG_LIMIT, RAIN_LIMIT
@@ -30,7 +31,7 @@ def _turned(azimuth: float) -> float:
     return abs(wrap_degrees(azimuth))
 
 
-CONSPICUOUS: Final[Mapping[W, Callable[[Mapping[W, float]], float]]] = MappingProxyType(
+CONSPICUOUS: Final[Mapping[W, Callable[[Mapping[W, float]], float]]] = complete(
     {
         W.CLOUDINESS: lambda now: now[W.CLOUDINESS] / 75.0,
         W.PRECIPITATION: lambda now: now[W.PRECIPITATION] / RAIN_LIMIT,
@@ -42,7 +43,10 @@ CONSPICUOUS: Final[Mapping[W, Callable[[Mapping[W, float]], float]]] = MappingPr
         W.FOG_DISTANCE: lambda now: now[W.FOG_DISTANCE] / 25.0 * (now[W.FOG_DENSITY] > FOG_LIMIT),
         W.FOG_FALLOFF: lambda now: now[W.FOG_FALLOFF] / 1.5 * (now[W.FOG_DENSITY] > FOG_LIMIT),
         W.WETNESS: lambda now: now[W.WETNESS] / 45.0,
-    }
+    },
+    W,
+    "CONSPICUOUS",
+    __name__,
 )
 """How conspicuous each parameter is; it is noticed from 1 on, and its end below `OVER`. The sun is noticed when it is
 within 15 degrees of the horizon, or stands elsewhere than at noon."""

@@ -7,10 +7,14 @@ values of a passenger car.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
+from dorothie_gym.ontology.world_exceptions import WeatherParameter
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.copying import shared
+
+if TYPE_CHECKING:
+    from dorothie_gym.sim.world import World
 
 _IDLE: Final = 42.0
 """Level of a car with a running engine at a standstill [dB(A)]."""
@@ -69,6 +73,16 @@ class CabinState:
                 raise ValueError(f"CabinState.{name} is {value}; it must be in 0..100 percent")
         if not 0 <= self.talkers <= 100:
             raise ValueError(f"CabinState.talkers is {self.talkers}; it must be in 0..100")
+
+
+def cabin_of(world: World) -> CabinState:
+    """Returns what makes noise in the car of a world now."""
+    weather = world.weather.values
+    return CabinState(
+        speed=abs(float(world.car.speed)),
+        rain=weather[WeatherParameter.PRECIPITATION],
+        wind=weather[WeatherParameter.WIND_INTENSITY],
+    )
 
 
 def noise_levels(state: CabinState) -> dict[str, float]:

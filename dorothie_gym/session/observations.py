@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,14 @@ from dorothie_gym.ontology.roles import AGENT_ROLES, Role
 from dorothie_gym.ontology.slots import GoalStatus
 from dorothie_gym.ontology.world_exceptions import PropKind, Sensor
 from dorothie_gym.session.beliefs import BeliefTracker
+from dorothie_gym.session.config import EnvConfig
+from dorothie_gym.session.masks import ActionMasks
+from dorothie_gym.session.perception_model import PerceptionModel
+from dorothie_gym.session.providers import Pictures, VisiblePerception, draw_pictures, see_by_camera
 from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.session_views import SessionViews
 from dorothie_gym.session.spaces.actions import NO_MOVE
-from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, plain_text
+from dorothie_gym.session.spaces.limits import MESSAGE_LENGTH, STORY_LENGTH, SpaceLimits, plain_text
 from dorothie_gym.session.spaces.observations import (
     MAX_UTTERANCE,
     MESSAGE_KINDS,
@@ -27,12 +31,18 @@ from dorothie_gym.session.spaces.observations import (
     Observation,
     SubgoalColumn,
 )
+from dorothie_gym.session.view_arrays import RoleArrays
+from dorothie_gym.session.view_steps import EVERYTHING
 from dorothie_gym.sim.ego.motion_control import motion_of
 from dorothie_gym.sim.state.codes import Motion
+from dorothie_gym.sim.world import World
 from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.copying import CachedViews
 from dorothie_gym.tasks.state import TaskState
 from dorothie_gym.tasks.storyboard import Landmark
+
+if TYPE_CHECKING:
+    from dorothie_gym.pictures.camera.first_person_camera import CameraFrame
 
 Table = NDArray[np.float64]
 
@@ -240,6 +250,87 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
             row[SubgoalColumn.CAN_TRIGGER] = i in triggers
             row[SubgoalColumn.CAN_DELETE] = i in deletions
             row[SubgoalColumn.CAN_CHANGE] = i in changes
+
+
+# --- observations of a session in progress ----------------------------------------------------------------------------
+
+
+class SessionObserver:
+    """Observations, masks and pictures of a session at the present decision.
+
+    Rows and masks are made when they are first used: not all sessions are observed by dicts, or asked for masks.
+
+    Attributes:
+        delivered: speech and messages of the last decision; the session replaces it.
+        camera_perception: what the picture shows, if the roles see by the camera.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        scenario: Scenario,
+        task: TaskState,
+        beliefs: BeliefTracker,
+        config: EnvConfig,
+        limits: SpaceLimits,
+        delivered: DeliveredMessages,
+    ) -> None:
+        self._world, self._scenario, self._task, self._beliefs = world, scenario, task, beliefs
+        self._config, self._limits, self.delivered = config, limits, delivered
+        self._pictures: Pictures | None = (
+            None if config.camera is None else draw_pictures(world, scenario, config.camera)
+        )
+        self.camera_perception: VisiblePerception | None = (
+            see_by_camera(world, scenario) if config.perception is PerceptionModel.CAMERA else None
+        )
+
+    @cached_property
+    def _views(self) -> SessionViews:
+        return SessionViews(self._world, RoleArrays(self._limits, self._config.observe_acts), 0)
+
+    @cached_property
+    def _builder(self) -> ObservationBuilder:
+        return ObservationBuilder(self._views, self._scenario, self._task, self._beliefs)
+
+    @cached_property
+    def masks(self) -> ActionMasks:
+        """Masks of the actions that would be carried out now."""
+        return ActionMasks(self._views, self._task)
+
+    def share_views(self, arrays: RoleArrays, row: int) -> None:
+        """Makes the session, which has not been observed yet, write observations and masks into a row of arrays."""
+        self._views = SessionViews(self._world, arrays, row)
+        self.write()
+
+    def write(self) -> None:
+        """Writes all of the observations and masks that the compiled code does not, and what it reads."""
+        self._world.write_weather()
+        self._builder.write(self.delivered)
+        self.masks.write()
+
+    def observe(self) -> None:
+        """Writes the observations and masks into the row of the session."""
+        self.write()
+        self._views.write(EVERYTHING)
+
+    def look(self) -> None:
+        """Looks at the picture of another decision, if the roles see by the camera."""
+        if self.camera_perception is not None:
+            self.camera_perception.look()
+            self._beliefs.recognised = self.camera_perception.recognised
+
+    def observations(self, roles: Sequence[Role], decision: int) -> dict[str, Observation]:
+        """Builds the observations of some roles at the decision of a number, by agent."""
+        observations = self._builder.build(self.delivered, roles)
+        if self.camera_perception is not None:
+            self.camera_perception.add_to(observations)
+        if self._pictures is not None:
+            self._pictures.add_to(observations, decision)
+        return observations
+
+    def picture(self, decision: int) -> CameraFrame | None:
+        """Returns the picture of the camera on the car, boxes included; None without a camera."""
+        return None if self._pictures is None else self._pictures.frame(decision)
 
 
 # --- observations on demand -------------------------------------------------------------------------------------------

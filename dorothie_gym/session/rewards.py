@@ -15,7 +15,7 @@ asks for them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, TypeAlias
@@ -105,7 +105,23 @@ class RewardWeights:
             }
             if role in spoken:
                 own["talk"] = self.talk * spoken[role]
+            if own.keys() != _NAMES[role]:
+                raise _disagreement("RewardWeights.terms", own, _NAMES[role])
         return terms
+
+
+def _disagreement(computes: str, terms: Iterable[str], names: Iterable[str]) -> NotImplementedError:
+    """Returns the error for terms that are not those that have a weight and a name."""
+    found, wanted = set(terms), set(names)
+    lacks, extra = ", ".join(sorted(wanted - found)) or "none", ", ".join(sorted(found - wanted)) or "none"
+    path = f"{__name__.replace('.', '/')}.py"
+    return NotImplementedError(f"{computes} of {path} and the weights disagree: it lacks {lacks}, and has {extra} more")
+
+
+_NAMES = {role: frozenset(term_names(role)) for role, _ in _SIGNS}
+
+if (_named := frozenset().union(*_NAMES.values())) != vars(RewardWeights()).keys():
+    raise _disagreement("term_names", _named, vars(RewardWeights()))
 
 
 # --- Driving by instructions ------------------------------------------------------------------------------------------
@@ -215,6 +231,19 @@ def write_navigation_terms(
     for k in range(len(terms)):
         reward += terms[k]
     return reward
+
+
+def _check_navigation_terms() -> None:
+    """Checks that `write_navigation_terms` writes a term for each weight."""
+    terms = np.full(len(NAVIGATION_TERMS), math.nan)
+    in_python = getattr(write_navigation_terms, "py_func", write_navigation_terms)  # compiled code checks no bounds
+    in_python(terms, np.zeros(len(terms)), 0.0, 0, False, 0, 0, False, 1.0, False, 0)
+    if np.isnan(terms).any():
+        written = [name for name, term in zip(NAVIGATION_TERMS, terms.tolist(), strict=True) if not math.isnan(term)]
+        raise _disagreement("write_navigation_terms", written, NAVIGATION_TERMS)
+
+
+_check_navigation_terms()
 
 
 # --- Predictions of the three tasks -----------------------------------------------------------------------------------

@@ -124,6 +124,17 @@ def _name_streets(town: Town, rng: np.random.Generator) -> tuple[StreetName, ...
     return tuple(names)
 
 
+def session_seeds(scenario: Scenario) -> list[np.random.SeedSequence]:
+    """Returns the seeds of a session: of the world, of words, of the recogniser, of styles, and of voices."""
+    # A new subsystem takes a further child at the end: the seeds of the others stay as they are.
+    return np.random.SeedSequence([scenario.seed, 1]).spawn(5)
+
+
+def world_seed_of(scenario: Scenario) -> np.random.SeedSequence:
+    """Returns the first of the seeds of a session, that of the world, without the others."""
+    return np.random.SeedSequence([scenario.seed, 1], spawn_key=(0,))
+
+
 def header_of(scenario: Scenario, town: str, config: EnvConfig) -> SessionHeader:
     """Returns the header of a session's record.
 

@@ -108,7 +108,7 @@ class SessionBatch(CachedViews):
         engine = self.engines[row]
         engine.reset(seed, scenario=scenario)
         self._worlds.put(row, engine.session.world)
-        engine.session.share_views(self.views, row)
+        engine.session.observer.share_views(self.views, row)
 
     # --- A decision -------------------------------------------------------------------------------------------------
 
@@ -149,12 +149,12 @@ class SessionBatch(CachedViews):
         """Writes the observations and masks of some sessions, or of all that have begun."""
         if rows is not None:
             for row in rows:
-                self.engines[row].session.observe()
+                self.engines[row].session.observer.observe()
             self._draw(rows)
             return
         for engine in self.engines:
             if engine.has_begun:
-                engine.session.write_views()
+                engine.session.observer.write()
         town = town_arrays(network_of(self.town)), turn_options(self.town)
         self._worlds.share(_observe_share, *town, self._worlds.arrays, *self.views.written, EVERYTHING)
         self._draw([row for row, engine in enumerate(self.engines) if engine.has_begun])

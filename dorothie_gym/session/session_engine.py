@@ -1,4 +1,11 @@
-"""Sessions of a town, one after the other: decoding of actions, seeds, and the end of a session."""
+"""Sessions of a town, one after the other: decoding of actions, seeds, and the end of a session.
+
+`SessionEngine.step` plays one decision: it decodes the actions of the three roles, lets the session carry them out
+(`begin_step`), steps the world by half a second of physics, and lets the session draw the consequences (`end_step`).
+Environments (`envs/`), rollouts (`evaluation/rollout/play.py`) and the console (`lab/console/room.py`) call it.
+
+Second of the five files that explain the package. Next: `session/live_session.py`.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +29,7 @@ from dorothie_gym.session.pictures import OBSERVERS, picture_spaces
 from dorothie_gym.session.recording.events import EndReason, Event
 from dorothie_gym.session.recording.header import SessionHeader
 from dorothie_gym.session.rewards import RewardTerms, term_names
-from dorothie_gym.session.scenario import Scenario, draw_scenario, template_option
+from dorothie_gym.session.scenario import Scenario, draw_scenario, header_of, template_option
 from dorothie_gym.session.session_log import SessionSummary
 from dorothie_gym.session.spaces.actions import ActionDecoder, ActionMapping, RoleAction, StepInfo
 from dorothie_gym.session.spaces.fields import dict_space
@@ -235,7 +242,7 @@ class SessionEngine(Restorable):
 
     def mask(self, role: Role) -> RoleMask:
         """Returns the mask of a role's action space at the present decision."""
-        return self.session.masks.mask(role)
+        return self.session.observer.masks.mask(role)
 
     def info(self, role: Role, terms: RewardTerms | None = None) -> StepInfo:
         """Returns the info dictionary of a role, always with the same keys; the caller owns everything in it.
@@ -246,11 +253,11 @@ class SessionEngine(Restorable):
         """
         session = self.session
         return {
-            "action_mask": session.masks.mask(role),
+            "action_mask": session.observer.masks.mask(role),
             "reward_terms": dict(terms) if terms else dict.fromkeys(term_names(role), 0.0),
-            "refused": {kind: bool(reason) for kind, reason in session.refusals[role].items()},
-            "refusal_reason": "; ".join(session.refused[role]),
-            "infractions": dict(session.infractions),
+            "refused": {kind: bool(reason) for kind, reason in session.log.refusals[role].items()},
+            "refusal_reason": "; ".join(session.log.refused[role]),
+            "infractions": session.log.infractions,
         }
 
     # --- the record -------------------------------------------------------------------------------------------------
@@ -268,7 +275,7 @@ class SessionEngine(Restorable):
     @property
     def last_recordings(self) -> Mapping[str, Samples]:
         """Audio of the spans that were over at the last decision, at 16 kHz, by file name; none without speech."""
-        return self.session.recordings
+        return self.session.dialogue.recordings
 
     @property
     def last_frames(self) -> NDArray[np.float64]:
@@ -277,7 +284,8 @@ class SessionEngine(Restorable):
 
     def session_header(self) -> SessionHeader:
         """Returns the header of the session's record."""
-        return self.session.header()
+        session = self.session
+        return header_of(session.scenario, session.world.town.name, session.config)
 
     def summary(self) -> SessionSummary:
         """Returns the state of the session in JSON types: success, subgoals, counts."""

@@ -11,7 +11,7 @@ from dorothie_gym.ontology.slots import ARRIVAL_DISTANCE
 from dorothie_gym.session.dialogue_channel import DialogueChannel
 from dorothie_gym.session.recording.events import Event, EventType
 from dorothie_gym.session.scenario import Scenario
-from dorothie_gym.sim.infractions import WorldEvent, WorldEventKind
+from dorothie_gym.sim.infractions import INFRACTION_KINDS, WorldEvent, WorldEventKind
 from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.tasks.state import TaskState
@@ -25,6 +25,8 @@ _WORLD_EVENTS = {
     WorldEventKind.OFF_ROAD: EventType.OFF_ROAD,
     WorldEventKind.WRONG_WAY: EventType.WRONG_WAY,
 }
+
+_INFRACTIONS = tuple((kind.value, kind) for kind in INFRACTION_KINDS)
 
 EventData: TypeAlias = dict[str, object]
 """Data of an event, in JSON types."""
@@ -125,6 +127,38 @@ class EventLog:
         self.refusals[role][kind] = f"{action}: {reason}"
         self.counts["refusals"] += 1
         self.add(EventType.REFUSAL, role, {"action": action, "reason": reason})
+
+    @property
+    def infractions(self) -> dict[str, int]:
+        """Number of infractions so far by kind, collisions of any cause included."""
+        counts = self._world.reports.infractions
+        return {name: counts.get(kind, 0) for name, kind in _INFRACTIONS}
+
+    def summary(self, task: TaskState, dialogue: DialogueChannel, *, reached: int, success: bool) -> SessionSummary:
+        """Returns the state of the session in JSON types, without the reason of its end.
+
+        Args:
+            task: progress in the storyboard.
+            dialogue: dialogue channel, which counts exchanges and transactions.
+            reached: number of live subgoals that are reached.
+            success: whether every live subgoal is reached and no collision was caused by the ego.
+        """
+        counts = self.counts
+        return SessionSummary(
+            success=success,
+            arrived=task.done,
+            subgoals=SubgoalCounts(live=len(task.live), reached=reached),
+            collisions=self._world.collisions,
+            infractions=self.infractions,
+            seconds=round(self._world.time, 3),
+            utterances=counts["utterances"],
+            acts=counts["acts"],
+            physical_actions=counts["physical_actions"],
+            exceptions=counts["exceptions"],
+            refusals=counts["refusals"],
+            exchanges=dialogue.exchanges,
+            transactions=dialogue.transactions,
+        )
 
 
 class SubgoalTracker:

@@ -20,7 +20,6 @@ from dorothie_gym.session.view_arrays import (
     TurnOptions,
 )
 from dorothie_gym.sim.batch.threads import take
-from dorothie_gym.sim.batch.worlds import world_of
 from dorothie_gym.sim.config import FRAME_RATE
 from dorothie_gym.sim.ego.feasibility import may_change_cruise
 from dorothie_gym.sim.ego.manoeuvres import find_feasible
@@ -30,6 +29,7 @@ from dorothie_gym.sim.network.lane_lookup import closest_lane, wrap_radians
 from dorothie_gym.sim.sensing.perception import see
 from dorothie_gym.sim.state.codes import Feasible
 from dorothie_gym.sim.state.ego_records import CoursePointRecord
+from dorothie_gym.sim.state.world_arrays import world_of
 from dorothie_gym.support import portable_math as pm
 from dorothie_gym.support.compilation import compiled, concurrent
 from dorothie_gym.support.compilation.records import RecordArray

@@ -1,6 +1,6 @@
 """Compilation of the simulation ahead of its use, in two processes where there are two processors.
 
-Half of the work is the loop over substeps (`sim.batch.worlds.step_share`), which a second process compiles meanwhile:
+Half of the work is the loop over substeps (`sim.step.step_share`), which a second process compiles meanwhile:
 it leaves the machine code in the cache, where the first one finds it.
 """
 
@@ -24,7 +24,7 @@ from dorothie_gym.session.config import EnvConfig
 from dorothie_gym.session.session_engine import SessionEngine
 from dorothie_gym.session.spaces.actions import noop
 from dorothie_gym.sim.batch.threads import turns_of
-from dorothie_gym.sim.batch.worlds import alone, step_share
+from dorothie_gym.sim.batch.worlds import alone
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.decision_setup import note_props
 from dorothie_gym.sim.network.network import TownNetwork
@@ -33,6 +33,7 @@ from dorothie_gym.sim.sensing.perception import look_around
 from dorothie_gym.sim.state.codes import Footway
 from dorothie_gym.sim.state.town_arrays import TownArrays, empty_town
 from dorothie_gym.sim.state.world_arrays import WorldArrays, empty_world
+from dorothie_gym.sim.step import step_share
 from dorothie_gym.sim.town_env import TownEnv
 from dorothie_gym.sim.world import World
 from dorothie_gym.support.compilation.dispatcher import CompiledFunction
@@ -68,7 +69,7 @@ def warm_up(progress: Progress | None = None, *, everything: bool = False) -> No
     with reporting(progress) as report, _helper(report) as wait:
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))
         engine.reset(seed=0)
-        engine.session.observe()
+        engine.session.observer.observe()
         _compile_rare()
         _call_what_follows_a_step(engine.session.world)
         if everything:

@@ -1,4 +1,4 @@
-"""Substeps of a world: all of a decision in one compiled call."""
+"""Substeps of a world, and of a share of the worlds of a batch: all of a decision in one compiled call."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
+from dorothie_gym.sim.batch.threads import take
 from dorothie_gym.sim.collisions import collide
 from dorothie_gym.sim.ego.decision_setup import prepare
 from dorothie_gym.sim.ego.manoeuvres import note_place
@@ -16,8 +17,8 @@ from dorothie_gym.sim.network.lane_lookup import closest_lane, value_near
 from dorothie_gym.sim.pedestrians.walking import walk
 from dorothie_gym.sim.sensing.localizer import localize
 from dorothie_gym.sim.state.body_records import VehicleRecord
-from dorothie_gym.sim.state.codes import Kind, Refusal, Wait
-from dorothie_gym.sim.state.world_arrays import note_pose, trace
+from dorothie_gym.sim.state.codes import NO_SPACE, Kind, Refusal, Wait
+from dorothie_gym.sim.state.world_arrays import note_pose, trace, world_of
 from dorothie_gym.sim.traffic.idm_traffic import drive
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import TRAFFIC_STANDING
@@ -26,7 +27,7 @@ from dorothie_gym.sim.traffic.route import locate
 from dorothie_gym.sim.traffic.vehicle_models import move, slip_of
 from dorothie_gym.sim.traffic_rules import watch
 from dorothie_gym.support import portable_math as pm
-from dorothie_gym.support.compilation import compiled, inlined
+from dorothie_gym.support.compilation import compiled, concurrent, inlined
 
 if TYPE_CHECKING:
     from dorothie_gym.sim.state.town_arrays import TownArrays
@@ -77,6 +78,38 @@ def step(
         localize(world, dt)
         watch(town, world)
     return Refusal.NONE
+
+
+@concurrent
+def step_share(
+    turns: NDArray[np.int64],
+    home: int,
+    town: TownArrays,
+    batch: WorldArrays,
+    substeps: int,
+    dt: float,
+    acceleration: Array,
+    steering: Array,
+    answers: NDArray[np.int64],
+) -> None:
+    """Steps worlds of a batch, until all of them have been taken.
+
+    Args:
+        turns: numbers of the worlds, see `threads.take`; shared by all threads that work on the batch.
+        home: number of the block that is this thread's own.
+        town: arrays of the town.
+        batch: arrays of all worlds.
+        substeps: how many.
+        dt: time of each [s].
+        acceleration: (worlds,) of each world's vehicles of the kind `Kind.EGO` [m/s^2].
+        steering: (worlds,) angle of their front wheels, positive to the right [rad].
+        answers: (worlds,) `Refusal.NO_SPACE` of those that are to be stepped; replaced by the answers of `step`.
+    """
+    number = take(turns, home)
+    while number >= 0:
+        if answers[number] == NO_SPACE:
+            answers[number] = step(town, world_of(batch, number), substeps, dt, acceleration[number], steering[number])
+        number = take(turns, home)
 
 
 # Each phase is compiled on its own: inlined into one function they would take the compiler twice as long.

@@ -1,4 +1,10 @@
-"""World of a session: a town with the ego, traffic, pedestrians and props, weather and sensor faults."""
+"""World of a session: a town with the ego, traffic, pedestrians and props, weather and sensor faults.
+
+A session steps its world between two decisions (`World.step`). Everything that moves is a row of the arrays in
+`World.actors`, which the compiled loop in `sim/step.py` steps at 30 Hz; `World.ego` takes the Co-Wizard's actions.
+
+Fourth of the five files that explain the package. Next: `policies/policy.py`.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +18,15 @@ from numpy.typing import NDArray
 from dorothie_gym.maps.model import Array
 from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.slots import ObjectClass
+from dorothie_gym.ontology.vocabulary import complete
 from dorothie_gym.ontology.world_exceptions import Sensor, WeatherParameter
 from dorothie_gym.sim.actors import Actors
 from dorothie_gym.sim.batch.threads import turns_of
-from dorothie_gym.sim.batch.worlds import alone, step_share
+from dorothie_gym.sim.batch.worlds import alone
 from dorothie_gym.sim.config import FRAME_COLUMNS, FRAME_RATE, WorldConfig
 from dorothie_gym.sim.ego.decision_setup import note_props
-from dorothie_gym.sim.ego.ego_controller import EgoController
+from dorothie_gym.sim.ego.ego_controller import EgoController, LocalPlanner
 from dorothie_gym.sim.ego.obstacles import Hazard, PerceivedBody
-from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car, CarRecord
 from dorothie_gym.sim.infractions import WorldEvent, WorldEventLog
 from dorothie_gym.sim.network.network import TownNetwork, network_of
@@ -31,6 +37,7 @@ from dorothie_gym.sim.sensing.visibility import Visibility
 from dorothie_gym.sim.state.codes import NO_SPACE
 from dorothie_gym.sim.state.town_arrays import town_arrays
 from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
+from dorothie_gym.sim.step import step_share
 from dorothie_gym.sim.traffic.parameters import MAX_SUBSTEPS
 from dorothie_gym.sim.weather import Weather, Wind
 from dorothie_gym.sim.world_start import OwnArrays, WorldSeeds, start_world
@@ -43,8 +50,8 @@ _step_share = direct(step_share)
 FAULT_SECONDS = 30.0
 """Duration of a sensor fault [s] (design)."""
 
-CLARITY = {Sensor.BLUR: 0.25, Sensor.VIEW: 0.0}
-"""Share of the signal left by a fault of the view: blur halves the sight."""
+CLARITY = complete({Sensor.BLUR: 0.25, Sensor.GPS: 1.0, Sensor.VIEW: 0.0}, Sensor, "CLARITY", __name__)
+"""Share of the signal of the view that the fault of a sensor leaves: blur halves the sight."""
 
 
 def parts_of(frames: int) -> list[int]:

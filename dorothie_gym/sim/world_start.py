@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
+from dorothie_gym.sim.ego.ego_controller import request_path
 from dorothie_gym.sim.ego.manoeuvres import BEGIN
-from dorothie_gym.sim.ego.planner import request_path
 from dorothie_gym.sim.network.network import TownNetwork
 from dorothie_gym.sim.population import add_car, populate
 from dorothie_gym.sim.sensing.localizer import switch_on

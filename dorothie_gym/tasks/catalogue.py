@@ -49,17 +49,19 @@ class LandmarkKind:
 
 @functools.cache
 def catalogue() -> Mapping[LandmarkName, LandmarkKind]:
-    """Returns the ten kinds in the order of the ids of the ontology.
+    """Returns all kinds in the order of the ids of the ontology.
 
     Raises:
-        ValueError: if the data file does not describe every landmark of the ontology.
+        OntologyError: if the data file does not describe every landmark of the ontology; names those.
     """
     text = (resources.files("dorothie_gym.tasks") / DATA_FILE).read_text(encoding="utf-8")
     rows = yaml.safe_load(text)
     names = [name for name in LandmarkName if name not in _NOT_A_PLACE]
     labels = [name.label for name in names]
-    if sorted(rows) != sorted(labels):
-        raise ValueError(f"{DATA_FILE}: has {sorted(rows)}, but the ontology has {sorted(labels)}")
+    if missing := [label for label in labels if label not in rows]:
+        raise OntologyError(f"dorothie_gym/tasks/{DATA_FILE}: describes no {', '.join(missing)}; add an entry for each")
+    if unknown := [label for label in rows if label not in labels]:
+        raise OntologyError(f"dorothie_gym/tasks/{DATA_FILE}: {unknown[0]} is no LandmarkName of the ontology")
     return {
         name: LandmarkKind(
             name=name,

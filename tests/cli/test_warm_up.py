@@ -21,7 +21,7 @@ from dorothie_gym.envs import warm_up as batches
 from dorothie_gym.pictures.camera import warm_up as camera
 from dorothie_gym.session import warm_up as compiling
 
-NAMES = ("sim.step.step", "sim.batch.worlds.step_share")
+NAMES = ("sim.step.step", "sim.step.step_share")
 BATCH_NAME = "envs.driving_steps.act_share"
 CAMERA_NAME = "camera.shading.shade"
 

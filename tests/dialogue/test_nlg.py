@@ -164,6 +164,15 @@ def test_grammar_without_words_for_an_action_raises_error():
 
 
 @pytest.mark.parametrize(
+    "head", ["== prop dumpster", "== Explain topic=less_wetness", "== Explain co_wizard topic=failed_gps"]
+)
+def test_grammar_without_words_for_a_member_of_the_world_names_the_section(head):
+    section = head.replace(" co_wizard", "")
+    with pytest.raises(PhraseFileError, match=f"dialogue/data/talk: there is no section `{section}`"):
+        parse_grammar(without_section("36_around.talk", head))
+
+
+@pytest.mark.parametrize(
     ("line", "reason"),
     [
         ("== Explain\nthe {weather} is fine", "weather"),

@@ -186,11 +186,11 @@ def test_utterances_and_faults_in_progress_go_on_in_the_copy() -> None:
     talking = ParticipantAction(speech=speech).encode(env.limits)
     fault = AdWizardAction(exception=ExceptionKind.SENSOR_FAULT, sensor=Sensor.BLUR, on=True).encode(env.limits)
     env.step({**quiet, "participant": talking, "ad_wizard": fault})
-    assert env.session.world.faults and not env.session.said
+    assert env.session.world.faults and not env.session.dialogue.said
     twin = copy.deepcopy(env)
     for _ in range(80):
         assert_equal(env.step(quiet), twin.step(quiet))
-    assert len(env.session.said) == len(twin.session.said) == 1
+    assert len(env.session.dialogue.said) == len(twin.session.dialogue.said) == 1
     assert not twin.session.world.faults
 
 

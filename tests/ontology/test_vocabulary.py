@@ -3,7 +3,8 @@ import pickle
 import pytest
 
 from dorothie_gym.errors import OntologyError
-from dorothie_gym.ontology.vocabulary import Vocabulary, normalise, unknown_spelling
+from dorothie_gym.ontology.roles import Role
+from dorothie_gym.ontology.vocabulary import Vocabulary, complete, normalise, unknown_spelling
 
 
 def test_look_up_ignores_case_space_and_punctuation() -> None:
@@ -45,3 +46,16 @@ def test_error_is_a_value_error_and_survives_pickling() -> None:
 def test_long_text_is_truncated_in_comparison_and_error() -> None:
     for text in ("a" * 100_000, ["a"] * 100_000):
         assert len(str(unknown_spelling(text, "slots", ["Action", "Street"]))) < 250
+
+
+def test_table_without_a_member_names_table_file_and_member() -> None:
+    known = {role: str(role) for role in Role if role is not Role.AD_WIZARD}
+    with pytest.raises(OntologyError, match=r"^SEATS of dorothie_gym/lab/seats\.py has no entry for Role\.AD_WIZARD;"):
+        complete(known, Role, "SEATS", "dorothie_gym.lab.seats")
+
+
+def test_complete_table_keeps_its_order_and_cannot_be_written() -> None:
+    table = complete({role: str(role) for role in reversed(Role)}, Role, "SEATS", "dorothie_gym.lab.seats")
+    assert list(table) == list(reversed(Role))
+    with pytest.raises(TypeError):
+        table[Role.AGENT] = ""  # type: ignore[index]

@@ -115,7 +115,7 @@ def test_copies_of_a_session_hear_the_same(tmp_path: Path) -> None:
     kept: list[tuple[SessionEngine, int]] = []
 
     def keep(running: SessionEngine) -> None:
-        if running.session.in_progress and running.session.world.time > 5.0 and not kept:
+        if running.session.dialogue.in_progress and running.session.world.time > 5.0 and not kept:
             kept.append((copy.deepcopy(running), running.session.decisions))
 
     play_session(engine, policies, seed=3, folder=tmp_path / "s", on_step=keep)

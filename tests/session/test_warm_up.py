@@ -56,7 +56,7 @@ from dorothie_gym.session.warm_up import is_warm, warm_up
 assert not is_warm()
 names = []
 warm_up(lambda name, done, planned: names.append((name, done <= planned)))
-assert "sim.batch.worlds.step_share" in [name for name, _ in names] and all(fits for _, fits in names)
+assert "sim.step.step_share" in [name for name, _ in names] and all(fits for _, fits in names)
 assert is_warm()
 """
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}

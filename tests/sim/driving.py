@@ -14,7 +14,7 @@ import pytest
 from dorothie_gym.maps import Town, load_town
 from dorothie_gym.ontology import PropKind
 from dorothie_gym.sim.config import FRAME_RATE, WorldConfig
-from dorothie_gym.sim.ego.planner import LocalPlanner
+from dorothie_gym.sim.ego.ego_controller import LocalPlanner
 from dorothie_gym.sim.ego.vehicle import Car
 from dorothie_gym.sim.infractions import WorldEvent
 from dorothie_gym.sim.network.network import TownNetwork, network_of

@@ -36,6 +36,7 @@ from dorothie_gym.session.camera_config import CameraConfig, CameraOutput
 from dorothie_gym.session.recording.events import EventType
 from dorothie_gym.session.recording.session import Session
 from dorothie_gym.sim.config import FRAME_RATE
+from dorothie_gym.sim.world import CLARITY
 from dorothie_gym.support.angles import wrap_radians
 from dorothie_gym.support.files import PART
 from dorothie_gym.support.input_files import MIB
@@ -66,7 +67,7 @@ BOX_DTYPE: Final = np.dtype(
 )
 """Number of the picture in its session, `ObjectClass`, limits behind the last pixel, visible pixels, box in space."""
 
-CAMERA_FAULTS: Final = (Sensor.BLUR, Sensor.VIEW)
+CAMERA_FAULTS: Final = tuple(sensor for sensor in Sensor if CLARITY[sensor] < 1.0)
 """Faults that show in pictures."""
 
 MOST_BYTES: Final = 8 * 1024 * MIB

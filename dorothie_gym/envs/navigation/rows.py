@@ -34,8 +34,7 @@ from dorothie_gym.session.scenario import Scenario
 from dorothie_gym.session.spaces.actions import Mental
 from dorothie_gym.session.spaces.limits import SpaceLimits
 from dorothie_gym.sim.batch.threads import turns_of
-from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL
-from dorothie_gym.sim.ego.planner import REASONS
+from dorothie_gym.sim.ego.ego_controller import CRUISE_REFUSAL, REASONS
 from dorothie_gym.sim.infractions import INFRACTION_KINDS
 from dorothie_gym.sim.network.network import network_of
 from dorothie_gym.sim.state.codes import Refusal

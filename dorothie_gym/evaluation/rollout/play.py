@@ -79,7 +79,7 @@ def play_session(
     engine = host.engine
     host.reset(seed=seed)
     states = {role: policies[role].initial_state(policy_seed(seed, role), engine.town) for role in AGENT_ROLES}
-    engine.session.give_voices(pitches_of(personas_of(policies, states)))
+    engine.session.dialogue.give_voices(pitches_of(personas_of(policies, states)))
     with ExitStack() as stack:
         writer = None
         if folder is not None:

@@ -128,7 +128,7 @@ def begin_replay(session: Session, town: Town, *, storyboard: StoryboardTemplate
     config = config_of(session.header)
     engine = SessionEngine(town, config=config, max_cycles=_cycles(session, config))
     engine.reset(scenario=_scenario(session, town, storyboard))
-    engine.session.give_voices(_voices(session))
+    engine.session.dialogue.give_voices(_voices(session))
     return engine
 
 

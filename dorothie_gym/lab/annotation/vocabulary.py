@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
-from types import MappingProxyType
 from typing import Any
 
 from dorothie_gym.evaluation.analysis.exception_attribution import Handled
@@ -18,8 +17,9 @@ from dorothie_gym.ontology.dialogue_acts import (
     path_to,
 )
 from dorothie_gym.ontology.slots import SLOT_VALUES, LandmarkName
+from dorothie_gym.ontology.vocabulary import complete
 
-MOVE_KEYS: Mapping[DialogueMove, str] = MappingProxyType(
+MOVE_KEYS: Mapping[DialogueMove, str] = complete(
     {
         DialogueMove.IRRELEVANT: "z",
         DialogueMove.INSTRUCT: "i",
@@ -36,7 +36,10 @@ MOVE_KEYS: Mapping[DialogueMove, str] = MappingProxyType(
         DialogueMove.REPLY_N: "n",
         DialogueMove.REPLY_U: "d",
         DialogueMove.REPLY_W: "v",
-    }
+    },
+    DialogueMove,
+    "MOVE_KEYS",
+    __name__,
 )
 """Key of each move: mostly a letter of its name, else of a typical word ("okay", "huh", "don't know")."""
 

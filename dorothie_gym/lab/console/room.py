@@ -324,7 +324,7 @@ class Room:
         for seat in self._roles():
             assert seat.role is not None
             if seat.role not in self._players:
-                seat.refused += engine.session.refused[seat.role]
+                seat.refused += engine.session.log.refused[seat.role]
         if engine.over:
             self._finish()
 
@@ -346,7 +346,7 @@ class Room:
                 seat.talk.hear(observations[seat.role.value])
             if seat.role in (None, Role.AD_WIZARD):
                 seat.talk.read_messages(session.messages)
-            seat.talk.read_own(session.said, session.world.time)
+            seat.talk.read_own(session.dialogue.said, session.world.time)
 
     # --- people -----------------------------------------------------------------------------------------------------
 

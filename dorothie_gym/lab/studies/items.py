@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Final, TypeAlias
+from typing import Annotated, Final, TypeAlias, get_args
 
 from msgspec import Meta, Struct
 
@@ -40,6 +40,14 @@ class _Item(Struct, tag_field="kind", forbid_unknown_fields=True, frozen=True, k
     text: Question
     required: bool = True
 
+    def accept(self, answer: Answer) -> Answer:
+        """Returns an answer, which is not empty, as it is stored.
+
+        Raises:
+            AnswerError: the item does not allow it.
+        """
+        raise NotImplementedError
+
 
 class Likert(_Item, tag="likert", frozen=True, kw_only=True):
     """Rating from 1 to `points`; `low` and `high` label the ends."""
@@ -48,12 +56,26 @@ class Likert(_Item, tag="likert", frozen=True, kw_only=True):
     low: Label = "strongly disagree"
     high: Label = "strongly agree"
 
+    def accept(self, answer: Answer) -> Answer:
+        """Returns the number of a point; see `_Item.accept`."""
+        if type(answer) is not int or not 1 <= answer <= self.points:
+            raise AnswerError(f"item {self.id!r} takes a whole number in 1..{self.points}")
+        return answer
+
 
 class Choice(_Item, tag="choice", frozen=True, kw_only=True):
     """One of the options, or any number of them if `several`."""
 
     options: Annotated[list[Label], Meta(min_length=2, max_length=40)]
     several: bool = False
+
+    def accept(self, answer: Answer) -> Answer:
+        """Returns the option, or the options in their order; see `_Item.accept`."""
+        chosen = answer if isinstance(answer, list) else [answer]
+        if isinstance(answer, list) is not self.several or any(each not in self.options for each in chosen):
+            expected = "a list of its options" if self.several else "one of its options"
+            raise AnswerError(f"item {self.id!r} takes {expected}")
+        return [option for option in self.options if option in chosen] if self.several else answer
 
 
 class Number(_Item, tag="number", frozen=True, kw_only=True):
@@ -63,6 +85,15 @@ class Number(_Item, tag="number", frozen=True, kw_only=True):
     max: float = 1e6
     whole: bool = True
 
+    def accept(self, answer: Answer) -> Answer:
+        """Returns the number; see `_Item.accept`."""
+        if isinstance(answer, str | list | bool) or answer is None or not math.isfinite(answer):
+            raise AnswerError(f"item {self.id!r} takes a number")
+        if not self.min <= answer <= self.max or (self.whole and answer != int(answer)):
+            kind = "a whole number" if self.whole else "a number"
+            raise AnswerError(f"item {self.id!r} takes {kind} in {self.min:g}..{self.max:g}")
+        return int(answer) if self.whole else float(answer)
+
 
 class Text(_Item, tag="text", frozen=True, kw_only=True):
     """Text of at most `max_length` characters; `long` gives several lines."""
@@ -70,9 +101,21 @@ class Text(_Item, tag="text", frozen=True, kw_only=True):
     max_length: Annotated[int, Meta(ge=1, le=MAX_TEXT)] = 1000
     long: bool = False
 
+    def accept(self, answer: Answer) -> Answer:
+        """Returns the text; see `_Item.accept`."""
+        if not isinstance(answer, str) or len(answer) > self.max_length:
+            raise AnswerError(f"item {self.id!r} takes a text of at most {self.max_length} characters")
+        return answer
+
 
 Item: TypeAlias = Likert | Choice | Number | Text
-"""All items."""
+"""All items; `static/forms.js` shows them."""
+
+for _kind in get_args(Item):
+    if _kind.accept is _Item.accept:
+        raise NotImplementedError(
+            f"{_kind.__name__} of {__name__.replace('.', '/')}.py lacks `accept`, which says what answers it allows"
+        )
 
 
 def check_answers(items: Sequence[Item], answers: Mapping[str, Answer]) -> dict[str, Answer]:
@@ -98,35 +141,4 @@ def _checked(item: Item, answer: Answer) -> Answer:
         if item.required:
             raise AnswerError(f"item {item.id!r} must be answered")
         return None
-    if isinstance(item, Likert):
-        return _rating(item, answer)
-    if isinstance(item, Choice):
-        return _chosen(item, answer)
-    if isinstance(item, Number):
-        return _number(item, answer)
-    if not isinstance(answer, str) or len(answer) > item.max_length:
-        raise AnswerError(f"item {item.id!r} takes a text of at most {item.max_length} characters")
-    return answer
-
-
-def _rating(item: Likert, answer: Answer) -> Answer:
-    if type(answer) is not int or not 1 <= answer <= item.points:
-        raise AnswerError(f"item {item.id!r} takes a whole number in 1..{item.points}")
-    return answer
-
-
-def _chosen(item: Choice, answer: Answer) -> Answer:
-    chosen = answer if isinstance(answer, list) else [answer]
-    if isinstance(answer, list) is not item.several or any(each not in item.options for each in chosen):
-        expected = "a list of its options" if item.several else "one of its options"
-        raise AnswerError(f"item {item.id!r} takes {expected}")
-    return [option for option in item.options if option in chosen] if item.several else answer
-
-
-def _number(item: Number, answer: Answer) -> Answer:
-    if isinstance(answer, str | list | bool) or answer is None or not math.isfinite(answer):
-        raise AnswerError(f"item {item.id!r} takes a number")
-    if not item.min <= answer <= item.max or (item.whole and answer != int(answer)):
-        kind = "a whole number" if item.whole else "a number"
-        raise AnswerError(f"item {item.id!r} takes {kind} in {item.min:g}..{item.max:g}")
-    return int(answer) if item.whole else float(answer)
+    return item.accept(answer)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dorothie_gym.maps.cache import compiler_digest, package_sources, remove_oldest
 from dorothie_gym.support.user_cache import cache_folder, discard, read_signed, write_signed
 
-_PACKAGES = ("dorothie_gym.pictures.camera", "dorothie_gym.pictures", "dorothie_gym.sim")
+_PACKAGES = ("dorothie_gym.pictures.camera", "dorothie_gym.pictures", "dorothie_gym.sim", "dorothie_gym.ontology")
 _log = logging.getLogger(__name__)
 
 Arrays: TypeAlias = Mapping[str, NDArray[Any]]

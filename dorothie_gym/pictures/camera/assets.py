@@ -12,6 +12,7 @@ from dorothie_gym.pictures.camera.array_cache import Arrays, columns, table_of, 
 from dorothie_gym.pictures.camera.atlas import AtlasArrays, street_atlas
 from dorothie_gym.pictures.camera.mesh import Mesh
 from dorothie_gym.pictures.camera.models.model_bank import ModelBank, model_bank
+from dorothie_gym.pictures.camera.models.props import warn_of_plain_props
 from dorothie_gym.pictures.camera.sky import sky_noise
 from dorothie_gym.support.copying import shared
 
@@ -38,6 +39,7 @@ class CameraAssets:
 @lru_cache(maxsize=1)
 def camera_assets() -> CameraAssets:
     """Returns the textures and models of every town, from memory or the user's cache, or made now."""
+    warn_of_plain_props()  # here, once in a process: models from the cache are not built
     return through_cache("assets", b"", ASSETS_KEPT, build=_build, pack=_pack, unpack=_unpack)
 
 

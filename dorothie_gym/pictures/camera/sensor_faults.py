@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dorothie_gym.ontology.vocabulary import complete
 from dorothie_gym.ontology.world_exceptions import Sensor
+from dorothie_gym.sim.world import CLARITY
 from dorothie_gym.support.compilation import concurrent
 
 _SHARE = 0.012  # radius of the blur as a share of the picture's width
@@ -15,20 +17,34 @@ _ROUNDS = 2  # of means; two make the weights fall off linearly
 
 
 def apply_faults(picture: NDArray[np.uint8], faults: Collection[Sensor], scratch: NDArray[np.uint8]) -> None:
-    """Changes a picture (h, w, 3) as faults do: `Sensor.VIEW` leaves nothing, `Sensor.BLUR` no details.
+    """Changes a picture (h, w, 3) as the fault does that leaves least of it.
 
     Args:
         picture: to be changed.
         faults: of any sensors.
         scratch: (max(h, w),) or longer.
     """
-    if Sensor.VIEW in faults:
-        picture[:] = 0
-    elif Sensor.BLUR in faults:
-        radius = max(1, round(_SHARE * picture.shape[1]))
-        for _ in range(_ROUNDS):
-            for channel in range(3):
-                blur(picture, channel, radius, scratch)
+    worst = min((sensor for sensor in faults if _CHANGES[sensor] is not None), key=CLARITY.__getitem__, default=None)
+    change = None if worst is None else _CHANGES[worst]
+    if change is not None:
+        change(picture, scratch)
+
+
+def _black_out(picture: NDArray[np.uint8], scratch: NDArray[np.uint8]) -> None:
+    picture[:] = 0
+
+
+def _take_details(picture: NDArray[np.uint8], scratch: NDArray[np.uint8]) -> None:
+    radius = max(1, round(_SHARE * picture.shape[1]))
+    for _ in range(_ROUNDS):
+        for channel in range(3):
+            blur(picture, channel, radius, scratch)
+
+
+_CHANGES: Mapping[Sensor, Callable[[NDArray[np.uint8], NDArray[np.uint8]], None] | None] = complete(
+    {Sensor.BLUR: _take_details, Sensor.GPS: None, Sensor.VIEW: _black_out}, Sensor, "_CHANGES", __name__
+)
+"""Change of the picture by each fault; None for sensors that the picture does not come from."""
 
 
 @concurrent

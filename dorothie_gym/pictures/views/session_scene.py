@@ -26,7 +26,7 @@ from dorothie_gym.session.live_session import LiveSession
 
 def utterances_of(session: LiveSession) -> list[SpokenLine]:
     """Returns the utterances that are over and the messages of the Ad-Wizard, by the time at which they were heard."""
-    lines = [_line(utterance, session) for utterance in session.said]
+    lines = [_line(utterance, session) for utterance in session.dialogue.said]
     lines += [SpokenLine(time=time, speaker=Role.AD_WIZARD, text=text) for time, text in session.messages]
     return sorted(lines, key=lambda line: line.time)
 
@@ -102,7 +102,7 @@ def scene_of(session: LiveSession, caption: str = "", heard: Sequence[SpokenLine
             ExceptionMark(time=time, text=exception_words(data), x=x, y=y) for time, (x, y), data in session.exceptions
         ],
         utterances=sorted((*utterances_of(session), *heard), key=lambda line: line.time),
-        speaking=[_line(utterance, session) for utterance in session.in_progress],
+        speaking=[_line(utterance, session) for utterance in session.dialogue.in_progress],
         notes=notes,
         weather={str(parameter): value for parameter, value in world.weather.values.items()},
         caption=caption or task.storyboard.name,

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dorothie_gym.maps.model import Array
-from dorothie_gym.sim.batch.threads import ThreadPool, take, turns_of
+from dorothie_gym.sim.batch.threads import ThreadPool, turns_of
 from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE
 from dorothie_gym.sim.state.town_arrays import TownArrays
-from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_room_of
-from dorothie_gym.sim.step import step
-from dorothie_gym.support.compilation import concurrent, direct
-from dorothie_gym.support.compilation.by_reference import gives_row
+from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened, with_room_of, world_of
+from dorothie_gym.sim.step import step_share
+from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.copying import CachedViews
 from dorothie_gym.support.processors import available_processors
 
@@ -47,48 +46,10 @@ def put(batch: WorldArrays, number: int, world: WorldArrays) -> None:
         np.copyto(row.view(np.uint8), array.view(np.uint8))
 
 
-@gives_row
-def world_of(batch: WorldArrays, number: int) -> WorldArrays:
-    """Returns a world of a batch: views of its arrays, of the same types as those of a single world."""
-    return WorldArrays._make(array[number] for array in batch)
-
-
 def alone(world: WorldArrays) -> WorldArrays:
     """Returns a world as a batch of one: views of its arrays."""
     arrays = (array.reshape(1, *array.shape) for array in world.plain())
     return WorldArrays._make(array.view(np.recarray) if array.dtype.names else array for array in arrays)
-
-
-@concurrent
-def step_share(
-    turns: NDArray[np.int64],
-    home: int,
-    town: TownArrays,
-    batch: WorldArrays,
-    substeps: int,
-    dt: float,
-    acceleration: Array,
-    steering: Array,
-    answers: NDArray[np.int64],
-) -> None:
-    """Steps worlds of a batch, until all of them have been taken.
-
-    Args:
-        turns: numbers of the worlds, see `threads.take`; shared by all threads that work on the batch.
-        home: number of the block that is this thread's own.
-        town: arrays of the town.
-        batch: arrays of all worlds.
-        substeps: how many.
-        dt: time of each [s].
-        acceleration: (worlds,) of each world's vehicles of the kind `Kind.EGO` [m/s^2].
-        steering: (worlds,) angle of their front wheels, positive to the right [rad].
-        answers: (worlds,) `Refusal.NO_SPACE` of those that are to be stepped; replaced by the answers of `step`.
-    """
-    number = take(turns, home)
-    while number >= 0:
-        if answers[number] == NO_SPACE:
-            answers[number] = step(town, world_of(batch, number), substeps, dt, acceleration[number], steering[number])
-        number = take(turns, home)
 
 
 _step_share = direct(step_share)

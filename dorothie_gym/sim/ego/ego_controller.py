@@ -1,22 +1,260 @@
-"""Ego controller: applies physical actions, and holds cruise speed, lights and goals of the ego."""
+"""Control of the ego: physical actions of the Co-Wizard change its path, cruise speed and lights.
+
+`EgoController.apply` is the one entry of a physical action. `LocalPlanner` turns navigation actions into a path (paper,
+section 3.1). By default the ego follows its lane, and continues where only one exit leads on. Where a lane ends at a
+junction with several exits and no turn is planned, the path ends and the ego waits. Path, speed and lights are kept in
+the plan of the world's arrays (`PlanRecord`), which the compiled driver follows (`motion_control.guide`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import ClassVar, Final
 
+import numpy as np
+
+from dorothie_gym.maps.model import Exit, LinkType
+from dorothie_gym.maps.town import Town
 from dorothie_gym.ontology.actions import SPEED_STEP, PhysicalAction
-from dorothie_gym.sim.ego.feasibility import may_change_cruise
+from dorothie_gym.sim.ego.feasibility import FeasibleManoeuvres, may_change_cruise
 from dorothie_gym.sim.ego.limits import MAX_CRUISE, MIN_CRUISE
-from dorothie_gym.sim.ego.planner import LocalPlanner
+from dorothie_gym.sim.ego.manoeuvres import find_feasible, request
+from dorothie_gym.sim.ego.path import Path
 from dorothie_gym.sim.ego.vehicle import Car
+from dorothie_gym.sim.state.codes import CARRIED_OUT, NO_SPACE, Feasible, Refusal
 from dorothie_gym.sim.state.ego_records import GoalRecord
 from dorothie_gym.sim.state.record_views import ArrayHolder
+from dorothie_gym.sim.state.town_arrays import TownArrays
+from dorothie_gym.sim.state.world_arrays import WorldArrays, lengthened
+from dorothie_gym.support.compilation import direct
 from dorothie_gym.support.compilation.records import filled_records, plain
-from dorothie_gym.support.copying import shared
+from dorothie_gym.support.copying import CachedViews, shared
 
 CRUISE_REFUSAL = f"the cruise speed stays within {MIN_CRUISE:.0f} and {MAX_CRUISE:.0f} km/h"
 """Reason of the refusal of a cruise speed."""
+
+REASONS: Final[Mapping[int, str]] = MappingProxyType(
+    {
+        Refusal.STOPPED: "the car is stopped already",
+        Refusal.NOT_STOPPED: "the car is not stopped",
+        Refusal.IN_MANOEUVRE: "the car is in the middle of a manoeuvre",
+        Refusal.FOLLOWING: "the car follows its lane already",
+        Refusal.COMMITTED: "the car cannot stop before the junction any more",
+        Refusal.NO_SIDE: "a lane switch needs a side: a positive angle is left, a negative one right",
+        Refusal.NO_LANE_LEFT: "there is no lane to the left",
+        Refusal.NO_LANE_RIGHT: "there is no lane to the right",
+        Refusal.NO_ROOM_LEFT: "there is no room left to switch to the left",
+        Refusal.NO_ROOM_RIGHT: "there is no room left to switch to the right",
+        Refusal.PROP_LEFT: "a roadblock is too close on the lane to the left",
+        Refusal.PROP_RIGHT: "a roadblock is too close on the lane to the right",
+        Refusal.NOT_LEFTMOST: "a U-turn begins on the leftmost lane",
+        Refusal.NO_ONCOMING: "there is no oncoming lane beside this one",
+        Refusal.PROP_AHEAD: "the car is too fast to turn round before the roadblock",
+        Refusal.NO_ROOM_TO_TURN: "there is no room left to turn round",
+        Refusal.PROP_ONCOMING: "a roadblock is too close on the oncoming lane",
+        Refusal.NO_CHOICE: "there is no junction with a choice ahead",
+        Refusal.SAME_TURN: "the car is about to take that turn already",
+        Refusal.TURN_TOO_CLOSE: "the car is too close to the junction to take another turn",
+    }
+)
+"""Reasons of refusals."""
+
+_FLAGS: Final = tuple(int(flag) for flag in Feasible)
+
+_find_feasible, _request = direct(find_feasible), direct(request)
+
+
+def request_path(
+    town: TownArrays, holder: ArrayHolder, action: int, *, angle: int = 0, speed: float = 0.0, lane: int = 0,
+    station: float = 0.0, offset: float = 0.0,
+) -> int:  # fmt: skip
+    """Calls `manoeuvres.request`, again with longer arrays where they have no room for the path; returns its answer."""
+    while True:
+        answer = _request(
+            town, holder.arrays, action, int(angle), float(speed), int(lane), float(station), float(offset)
+        )
+        if answer != NO_SPACE:
+            return answer
+        holder.arrays = lengthened(holder.arrays)
+
+
+class LocalPlanner(CachedViews):
+    """Path of the ego, changed by navigation actions: a view on the plan in the arrays of its world."""
+
+    CACHED_VIEWS: ClassVar[Sequence[str]] = ("_shown", "_row", "_car", "_course", "_laid", "_path")
+
+    _shown: WorldArrays | None = None
+    _laid = 0
+
+    def __init__(self, town: Town, arrays: TownArrays, holder: ArrayHolder) -> None:
+        """Shows the plan of a world that has started.
+
+        Args:
+            town: the map.
+            arrays: its arrays.
+            holder: owner of the arrays of the world; they are replaced where a path needs more room.
+        """
+        self._town, self._arrays, self._holder = town, arrays, holder
+
+    def _look_up(self) -> np.void:
+        """Returns the plan in the present arrays."""
+        arrays = self._holder.arrays
+        if arrays is not self._shown:
+            self._shown, self._row, self._car = arrays, plain(arrays.plan)[0], plain(arrays.car)[0]
+            self._course = plain(arrays.course)
+        row: np.void = self._row
+        return row
+
+    @property
+    def plan(self) -> np.void:
+        """Fields of the plan, see `PlanRecord`."""
+        return self._look_up()
+
+    @property
+    def state(self) -> tuple[object, ...]:
+        """What the feasibility of navigation actions depends on besides the speed: to be compared."""
+        plan = self._look_up()
+        props = self._holder.arrays.seen_props[: int(plan["props"])].tobytes()
+        return (
+            *(plan[name].item() for name in ("version", "held", "action", "connector")),
+            self.s,
+            self.roadblock,
+            props,
+        )
+
+    # --- Place on the path ------------------------------------------------------------------------------------------
+
+    @property
+    def path(self) -> Path:
+        """The present path, the same object until it is replaced; every manoeuvre replaces it."""
+        plan = self._look_up()
+        if plan["version"] != self._laid:
+            self._laid = int(plan["version"])
+            self._path = Path(self._course[: plan["points"]])
+        return self._path
+
+    @property
+    def s(self) -> float:
+        """Place of the ego along the path [m]."""
+        self._look_up()
+        return float(self._car["s"])
+
+    @property
+    def offset(self) -> float:
+        """Distance of the ego from the path, positive right [m]."""
+        self._look_up()
+        return float(self._car["offset"])
+
+    @property
+    def roadblock(self) -> float:
+        """Distance from the ego's middle to a roadblock on the path [m], or inf."""
+        self._look_up()
+        return float(self._car["roadblock"])
+
+    @property
+    def lane(self) -> int:
+        """Lane that the ego counts as being on."""
+        return int(self._look_up()["lane"])
+
+    @property
+    def station(self) -> float:
+        """Distance along that lane [m]."""
+        return float(self._look_up()["station"])
+
+    @property
+    def height(self) -> float:
+        """Height of the road under the ego [m]."""
+        return float(self._look_up()["height"])
+
+    @property
+    def held(self) -> bool:
+        """Whether the ego stands by the action Stop."""
+        return bool(self._look_up()["held"])
+
+    @property
+    def waits_at_end(self) -> bool:
+        """Whether the path ends where a turn has to be chosen, or at the end of the map."""
+        return bool(self._look_up()["open_end"])
+
+    @property
+    def room(self) -> float:
+        """Length of the path ahead of the ego's middle [m]."""
+        return float(self._look_up()["length"]) - self.s
+
+    @property
+    def manoeuvre(self) -> tuple[PhysicalAction | None, int]:
+        """Planned or present manoeuvre, and its angle [degrees]."""
+        plan = self._look_up()
+        action = int(plan["action"])
+        return (PhysicalAction(action) if action else None), int(plan["angle"])
+
+    @property
+    def in_manoeuvre(self) -> bool:
+        """Whether the ego is off the centre lines, in a lane switch or U-turn."""
+        return bool(self._look_up()["off_line"])
+
+    @property
+    def lanes_ahead(self) -> list[int]:
+        """Lanes of the path ahead, in order."""
+        lanes = self.path.lanes[int(self._look_up()["at"]) :]
+        change = np.concatenate(([True], lanes[1:] != lanes[:-1]))
+        return [int(lane) for lane in lanes[change]]
+
+    @property
+    def turn_ahead(self) -> int | None:
+        """Angle of the turn that is planned and has not begun [degrees], or None."""
+        plan = self._look_up()
+        return int(plan["angle"]) if plan["turning"] else None
+
+    @property
+    def choice(self) -> tuple[int, float]:
+        """Lane before the next junction with a choice, -1 if the path comes to none, and the distance to it [m]."""
+        plan = self._look_up()
+        lane = int(plan["choice"])
+        return lane, float(plan["choice_at"]) - self.s if lane >= 0 else 0.0
+
+    def exits(self) -> tuple[tuple[Exit, ...], float]:
+        """Returns the turn options at the next junction with a choice, and the distance to it along the path [m].
+
+        While a turn at that junction is planned, options and distance remain those of that junction until the ego
+        enters it.
+        """
+        lane, distance = self.choice
+        return (self._town.exits(lane) if lane >= 0 else ()), distance
+
+    # --- Navigation actions -----------------------------------------------------------------------------------------
+
+    def command(self, action: PhysicalAction, angle: int, speed: float) -> str | None:
+        """Applies a navigation action.
+
+        Args:
+            action: one of the six navigation actions.
+            angle: degrees, positive left; for JTurn and LaneSwitch.
+            speed: of the ego [m/s].
+
+        Returns:
+            None, or the reason of the refusal; then nothing has changed.
+        """
+        answer = request_path(self._arrays, self._holder, int(action), angle=angle, speed=speed)
+        if answer == CARRIED_OUT:
+            return None
+        return REASONS.get(answer, f"{action.label} is no navigation action")
+
+    def feasible(self, speed: float) -> FeasibleManoeuvres:
+        """Returns the navigation actions that would be carried out at a speed [m/s]."""
+        found = _find_feasible(self._arrays, self._holder.arrays, float(speed))
+        return FeasibleManoeuvres(*[bool(found & flag) for flag in _FLAGS])
+
+    def may_switch(self, side: LinkType, speed: float = 0.0) -> bool:
+        """Returns whether a lane switch would be carried out at a speed [m/s]; `side` is a lane-change type."""
+        feasible = self.feasible(speed)
+        return feasible.switch_left if side is LinkType.LANE_CHANGE_LEFT else feasible.switch_right
+
+    def may_turn_round(self, speed: float) -> bool:
+        """Returns whether a U-turn would be carried out at this speed [m/s]."""
+        return self.feasible(speed).u_turn
 
 
 @shared

@@ -42,7 +42,7 @@ from dorothie_gym.sim.state.town_arrays import TownArrays
 from dorothie_gym.sim.traffic.lane_index import rebuild
 from dorothie_gym.sim.traffic.parameters import COURSE, EVENTS, GOALS, MAX_SUBSTEPS, POINTS, STEPS
 from dorothie_gym.support.compilation import compiled, inlined
-from dorothie_gym.support.compilation.by_reference import by_reference
+from dorothie_gym.support.compilation.by_reference import by_reference, gives_row
 from dorothie_gym.support.compilation.records import Record, RecordArray, empty_records, plain, record_dtype
 
 PROPS = 16
@@ -154,6 +154,12 @@ class WorldArrays(NamedTuple):
     def tobytes(self) -> bytes:
         """Returns the state byte by byte, to compare worlds."""
         return b"".join(array.tobytes() for array in self)
+
+
+@gives_row
+def world_of(batch: WorldArrays, number: int) -> WorldArrays:
+    """Returns a world of a batch: views of its arrays, of the same types as those of a single world."""
+    return WorldArrays._make(array[number] for array in batch)
 
 
 def _copy_of(array: NDArray[np.generic]) -> NDArray[np.generic]:

@@ -96,7 +96,7 @@ def test_an_act_is_corrected_with_two_clicks(desk: Desk) -> None:
     participant.click(".popover .moves button:has-text('Confirm')")
     participant.press("#words", "Enter")
     co_wizard.wait_for_selector("text=Left at the corner.")
-    spoken = desk.served.room.engine.session.said[-1]
+    spoken = desk.served.room.engine.session.dialogue.said[-1]
     assert [act.move.label for act in spoken.acts] == ["Confirm"]
     participant.click(".line.own .chip")
     participant.click(".popover .moves button:has-text('ReplyW')")

@@ -93,7 +93,7 @@ def test_objects_are_those_of_the_symbolic_model_that_are_in_front_and_not_hidde
 def test_every_object_has_its_pixels_and_every_body_with_pixels_is_an_object() -> None:
     engine = SessionEngine(TOWN, config=CONFIG)
     for observations in played(engine, seed=5, decisions=40):
-        perception, world = engine.session.camera_perception, engine.session.world
+        perception, world = engine.session.observer.camera_perception, engine.session.world
         assert perception is not None
         expected = [row for row in world.seen().tolist() if perception.pixels(int(row[0])) >= BODY_PIXELS]
         table = used(observations["participant"]["objects"])
@@ -148,7 +148,7 @@ def test_a_hidden_landmark_is_observed_from_the_first_time_that_it_is_in_view() 
         for k, observations in enumerate(played(engine, seed=seed, decisions=56)):
             landmarks = engine.scenario.storyboard.landmarks
             hidden = [landmark for landmark in landmarks if landmark.hidden]
-            perception = engine.session.camera_perception
+            perception = engine.session.observer.camera_perception
             assert perception is not None
             enough = [
                 landmark.index

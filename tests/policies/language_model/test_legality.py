@@ -77,7 +77,7 @@ def test_drawn_answers_are_allowed_and_carried_out(role: Role, town: str) -> Non
         assert forbidden(action, inputs[role]["action_mask"]) == []
         engine.step(actions)
         made += any(action.get(name, 0) for name in ("physical", "mental", "exception"))
-        refused += [reason for reason in engine.session.refused[role] if "acts in this utterance" not in reason]
+        refused += [reason for reason in engine.session.log.refused[role] if "acts in this utterance" not in reason]
     assert model.calls >= 3
     assert role is Role.PARTICIPANT or made >= 3
     assert len(refused) <= 0.2 * made, refused  # masks hold for each field, not for all combinations

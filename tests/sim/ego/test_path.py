@@ -10,9 +10,9 @@ import pytest
 from dorothie_gym.maps import Town
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology import PhysicalAction
+from dorothie_gym.sim.ego.ego_controller import LocalPlanner
 from dorothie_gym.sim.ego.limits import HALF_LENGTH, LATERAL_ACCELERATION, PROFILE_BRAKING, U_TURN_SPEED
 from dorothie_gym.sim.ego.path import Path
-from dorothie_gym.sim.ego.planner import LocalPlanner
 from dorothie_gym.sim.state.world_arrays import WorldArrays
 from dorothie_gym.sim.world import World
 from dorothie_gym.support import portable_arrays as pn

@@ -2,6 +2,7 @@
 
 import { h } from '/static/dom.js';
 
+const KINDS = ['likert', 'choice', 'number', 'text'];
 let numbers = 0;
 
 /** Removes drafts of questionnaires from this browser: all, or all but one. */
@@ -43,6 +44,7 @@ export class Questionnaire {
 
 class Field {
   constructor(item) {
+    if (!KINDS.includes(item.kind)) throw new Error(`lab/studies/static/forms.js has no field for items of kind '${item.kind}'`);
     Object.assign(this, { item, name: `item-${++numbers}` });
     this.error = h('p', { class: 'wrong', id: `${this.name}-wrong`, hidden: true });
     const mark = item.required ? null : h('small', { text: ' (optional)' });

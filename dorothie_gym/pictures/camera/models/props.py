@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Callable, Mapping
 from itertools import pairwise
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 
@@ -18,23 +22,6 @@ _PALETTE: Palette = {
     Slot.ORANGE: (240, 98, 24), Slot.WHITE: (255, 255, 255), Slot.METAL: (122, 126, 128), Slot.TRIM: (44, 46, 48),
     Slot.PAINT: (44, 98, 66), Slot.EXTRA: (36, 40, 42), Slot.TROUSERS: (94, 76, 58), Slot.TOP: (84, 118, 52),
 }  # fmt: skip
-
-
-def prop_model(kind: PropKind) -> Mesh:
-    """Returns the model of a prop; barrier and sign show their picture to both sides."""
-    model = ModelBuilder(ObjectClass.STATIC)
-    match kind:
-        case PropKind.CONSTRUCTION_CONE | PropKind.TRAFFIC_CONE:
-            _cone(model, kind)
-        case PropKind.STREET_BARRIER:
-            _barrier(model, kind)
-        case PropKind.DUMPSTER:
-            _dumpster(model, kind)
-        case PropKind.TRAFFIC_SIGN:
-            _sign(model, kind)
-        case PropKind.TREE:
-            _tree(model, kind)
-    return dressed(model.build(), _PALETTE)
 
 
 def _cone(model: ModelBuilder, kind: PropKind) -> None:
@@ -114,3 +101,36 @@ def _tree(model: ModelBuilder, kind: PropKind) -> None:
         scale = 1.0 if shade == 1.0 else 0.9
         centre = (0.1 * (scale < 1.0) * pn.cos(heading), 0.1 * (scale < 1.0) * pn.sin(heading), high)
         model.ball(centre, (scale * radius, scale * radius, depth), Slot.TOP, sides=8, rings=3, shade=shade)
+
+
+_FORMS: Final[Mapping[PropKind, Callable[[ModelBuilder, PropKind], None]]] = MappingProxyType(
+    {
+        PropKind.TREE: _tree,
+        PropKind.CONSTRUCTION_CONE: _cone,
+        PropKind.DUMPSTER: _dumpster,
+        PropKind.STREET_BARRIER: _barrier,
+        PropKind.TRAFFIC_CONE: _cone,
+        PropKind.TRAFFIC_SIGN: _sign,
+    }
+)
+"""Builder of each prop's model."""
+
+
+def _plain_box(model: ModelBuilder, kind: PropKind) -> None:
+    half, side = kind.length / 2.0, kind.width / 2.0
+    model.box((-half, -side, 0.0), (half, side, kind.height), Slot.METAL)
+
+
+def prop_model(kind: PropKind) -> Mesh:
+    """Returns the model of a prop, or a plain box; barrier and sign show their picture to both sides."""
+    model = ModelBuilder(ObjectClass.STATIC)
+    _FORMS.get(kind, _plain_box)(model, kind)
+    return dressed(model.build(), _PALETTE)
+
+
+def warn_of_plain_props() -> None:
+    """Warns of each kind of prop that is drawn as a plain box because it has no model."""
+    for kind in PropKind:
+        if kind not in _FORMS:
+            path = f"{__name__.replace('.', '/')}.py"
+            warnings.warn(f"prop {kind}: drawn as a plain box; its model belongs in _FORMS of {path}", stacklevel=2)

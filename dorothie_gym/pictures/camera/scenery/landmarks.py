@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
 from dorothie_gym.maps.model import Array
 from dorothie_gym.ontology.slots import LandmarkName, ObjectClass
+from dorothie_gym.ontology.vocabulary import check_complete
+from dorothie_gym.pictures.camera import atlas
 from dorothie_gym.pictures.camera.atlas import BRAND_SIGNS, Texture
 from dorothie_gym.pictures.camera.mesh import PLAIN, Mesh, MeshBuilder, Surface, joined, oriented
 from dorothie_gym.pictures.camera.models.people import STANDING, Look, Outfit, person_form
@@ -18,6 +21,7 @@ from dorothie_gym.pictures.camera.scenery.lots import Lot
 from dorothie_gym.pictures.camera.scenery.placing import Heights, feet_on, stamped
 from dorothie_gym.pictures.maps.shapes import disc
 from dorothie_gym.support import portable_math as pm
+from dorothie_gym.tasks import landmark_designs
 from dorothie_gym.tasks.landmark_designs import COAT, HOUSE, MIDDLE_STRIPE, STORES, StoreDesign, Top
 from dorothie_gym.tasks.storyboard import Landmark
 
@@ -31,6 +35,8 @@ _WALL = 3.4  # [m] height of the glazed storey of a store
 _METAL: Rgb = (178, 180, 182)
 _ROOF: Rgb = (128, 126, 124)
 
+
+check_complete(BRAND_SIGNS, STORES, "BRAND_SIGNS", atlas.__name__)
 
 _LIT_SIGNS = {*(texture for texture, *_ in BRAND_SIGNS.values()), Texture.HOUSE_SIGN, Texture.PERSON_SIGN}
 
@@ -60,7 +66,7 @@ def build_landmarks(landmarks: Iterable[Landmark], lots: Sequence[Lot], ground: 
 
 @lru_cache(maxsize=64)  # sessions of a town repeat them
 def landmark_form(name: LandmarkName, lot: Lot, ground: Heights) -> Mesh:
-    """Returns the triangles of a landmark on a lot; none for a name without a building."""
+    """Returns the triangles of a landmark on a lot; a plain building for a name without a design."""
     works = _Works(lot, ground)
     if name in STORES:
         _store(works, STORES[name], BRAND_SIGNS[name][0])
@@ -68,7 +74,25 @@ def landmark_form(name: LandmarkName, lot: Lot, ground: Heights) -> Mesh:
         _house(works)
     elif name is LandmarkName.PERSON:
         return joined([_waiting_person(lot, ground), _person_sign(works)])
+    else:
+        _warn_of_plain_building(name)
+        _plain_building(works)
     return works.builder.build()
+
+
+@cache
+def _warn_of_plain_building(name: LandmarkName) -> None:
+    path = f"{landmark_designs.__name__.replace('.', '/')}.py"
+    warnings.warn(
+        f"landmark {name.label}: drawn as a plain building; its design belongs in STORES of {path}", stacklevel=2
+    )
+
+
+def _plain_building(works: _Works) -> None:
+    """Adds a building without a name."""
+    length, depth = min(works.lot.length, 11.0), min(works.lot.depth, 9.0)
+    works.foundation((0.0, depth), (-length / 2.0, length / 2.0))
+    works.box((0.0, depth), (-length / 2.0, length / 2.0), (0.0, _WALL), _METAL, top=_ROOF)
 
 
 class _Works:
