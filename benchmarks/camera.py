@@ -94,12 +94,12 @@ def measure(
     Args:
         town: name or file of a town.
         sizes: of the pictures.
-        outputs: parts of the pictures; RGB alone is measured without antialiasing, too.
+        outputs: parts of the pictures; RGB alone is also measured without antialiasing.
         vehicles: number of vehicles.
         pedestrians: number of pedestrians.
         seed: seed of the session.
         seconds: length of the drive [s].
-        cold: whether to measure the first picture with an empty cache, too, which compiles for minutes.
+        cold: whether to measure also the first picture with an empty cache, which compiles for minutes.
         repeats: number of pictures at a place, and of first pictures; the median counts.
         progress: callback for the progress.
 

@@ -1,7 +1,8 @@
 """Compares the two models of perception: what they show of the surroundings, and what comes of it in scripted sessions.
 
 Sessions with the symbolic model are looked at every four seconds: for each object that it shows, whether the picture
-shows it too, and if not, why. A reason is found by drawing again: the body alone, and all bodies without the town.
+    also shows it, and otherwise why not. A reason is found by drawing again: the body alone, and all bodies without the
+    town.
 """
 
 import json

@@ -119,7 +119,7 @@ ROWS: Final[tuple[ModelEntry, ...]] = (
     ModelEntry(name="Junction Reader (ours)", command="reader", change=reader_config, kind="reader"),
 )
 """Counterparts of the paper's rows, in its order; then TOTO with another clock, shallow models, policies, and the
-Junction Reader. TOTO without the current utterance stands beside the paper's row without its sound."""
+Junction Reader. TOTO without the current utterance is compared with the paper's row without its sound."""
 
 _SEEN: Final[Mapping[str, Objects]] = MappingProxyType({"oracle boxes": "boxes", "detections": "detections"})
 

@@ -17,7 +17,7 @@ SHORTEST_SPAN = 0.6
 
 
 INAUDIBLE = "..."
-"""Sign in a transcript for words that were not understood, and transcript of speech of which nothing was."""
+"""Sign in a transcript for words that were not understood, and transcript of speech without any recognised word."""
 
 
 def is_partly_inaudible(text: str) -> bool:
@@ -99,7 +99,7 @@ class Utterance:
 
 
 def _ended(utterance: Utterance) -> Utterance:
-    """Returns the utterance with a full stop for the comma of a speaker who meant to go on."""
+    """Returns the utterance with a full stop for the comma of a speaker who meant to continue."""
     last = utterance.spans[-1]
     if not last.text.endswith(",") or not last.text.strip(","):
         return utterance

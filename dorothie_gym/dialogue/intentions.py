@@ -25,7 +25,7 @@ class CommunicativeFunction(enum.StrEnum):
     REQUEST = "request"
     """Asks for an action, directly or indirectly: "turn left", "you should be turning left"."""
     INFORM = "inform"
-    """Says something that nobody has asked for."""
+    """Makes an unsolicited remark."""
     PROPOSITIONAL_QUESTION = "propositional_question"
     """Asks whether the proposition is true."""
     SET_QUESTION = "set_question"

@@ -121,7 +121,7 @@ class Predicate(enum.StrEnum):
     PURPOSE = "purpose"
     """What an errand is for and why, with the person and the item that it concerns."""
     GOAL = "goal"
-    """The landmark that the car is to go to now."""
+    """Current destination of the car."""
     TOLD = "told"
     """The other speaker has told the speaker to do something."""
     # reasons and feelings

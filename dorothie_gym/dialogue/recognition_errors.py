@@ -49,7 +49,7 @@ class WordClass(enum.StrEnum):
     COMMON = "common"
     """Word that stands more than `RARE` times in the phrases of the grammar, or a single letter."""
     RARE = "rare"
-    """Other word that is no name."""
+    """Other word that is not a name."""
     NAME = "name"
     """Word of the name of a landmark or street."""
 

@@ -60,7 +60,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     Attributes:
         num_envs: number of environments.
         possible_agents: names of the agents.
-        autoreset_mode: when sessions that are over begin anew, as `gymnasium.vector.SyncVectorEnv` has it.
+        autoreset_mode: when finished sessions are reset, as in `gymnasium.vector.SyncVectorEnv`.
         towns: town of each environment.
         config: settings of the sessions.
         limits: sizes of the spaces, which all towns of the batch share.
@@ -193,7 +193,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     ) -> tuple[
         dict[str, Stacked], dict[str, NDArray[np.float64]], dict[str, Flags], dict[str, Flags], dict[str, Infos]
     ]:
-        """Plays a decision in every environment; those that are over begin anew, as the autoreset mode says.
+        """Plays a decision in every environment; finished ones are reset according to the autoreset mode.
 
         Args:
             actions: by agent the fields of its action, each an array (num_envs, ...) or a sequence of `num_envs`
@@ -272,7 +272,7 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
     def _begin_at_once(
         self, last: Mapping[str, Stacked], outcomes: Mapping[int, StepOutcome]
     ) -> tuple[dict[str, Stacked], dict[str, Infos]]:
-        """Begins sessions anew that are over; returns observations and infos as in the mode `SAME_STEP`."""
+        """Resets finished sessions; returns observations and infos as in the mode `SAME_STEP`."""
         over = self._over.copy()
         ended = self._infos(over, outcomes)
         self._begin(over, [None] * self.num_envs, None)

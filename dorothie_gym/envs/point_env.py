@@ -226,7 +226,7 @@ class PointEnv(Restorable, gym.Env[Observation, ActionDict]):
 
     @abstractmethod
     def _info(self) -> StepInfo:
-        """Returns the entries of the infos besides the score."""
+        """Returns the entries of the infos except the score."""
 
     def _judge(self, action: ActionMapping, point: Point) -> None:  # most have nothing to note
         """Notes a prediction."""

@@ -52,7 +52,7 @@ class SingleRole(Restorable, TimeLimitedEnv[Observation, ActionDict]):
 
     ## Episode End
     Terminates when the destination is reached; truncates after `config.max_seconds` or `max_cycles` decisions.
-    `info["is_success"]` tells at the end whether every live subgoal was reached without a collision caused by the ego,
+    `info["is_success"]` states at the end whether every live subgoal was reached without a collision caused by the ego,
     and is False before.
 
     ## Arguments

@@ -290,7 +290,7 @@ def towns_folder() -> Path | None:
 
 @functools.cache
 def compiler_digest() -> str | None:
-    """Returns a digest of everything besides the source file that determines the compiled town.
+    """Returns a digest of everything except the source file that determines the compiled town.
 
     It covers the sources of this package and of the arithmetic that it uses (`angles`, `portable_math`,
     `portable_arrays` and their compilation), and the versions of numpy and scipy, which may round differently. None if

@@ -1,4 +1,4 @@
-"""Town: lanes, links and everything beside the roads, with the queries that the simulation asks."""
+"""Town: lanes, links and everything along the roads, with the queries of the simulation."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ QUESTIONS = frozenset({DialogueMove.QUERY_W, DialogueMove.QUERY_YN, DialogueMove
 
 
 def destination(place: LandmarkName | None, street: StreetName | None = None) -> Proposition:
-    """Returns that the car is to go to a place now, and on which street that lies, if the street is known."""
+    """Returns the proposition that the car should go to a place now, with the street of the place if it is known."""
     return Proposition.of(Predicate.GOAL, place=place, street=named(street))
 
 

@@ -185,7 +185,7 @@ def changes(observation: ObservationMapping, noted: frozenset[W]) -> Iterator[tu
 
 
 def crowds_among(near: Sequence[ObjectClass], usual: Sequence[float]) -> list[ObjectClass]:
-    """Returns those of pedestrians and vehicles of which conspicuously many are near, and more than usual."""
+    """Returns "pedestrians" or "vehicles", or both, if conspicuously many are near, and more than usual."""
     return [
         kind
         for (kind, least), mean in zip(CROWDS.items(), usual, strict=True)

@@ -42,7 +42,7 @@ class Persona:
     """Lasting traits of a speaker. Without a unit, a trait is in [0, 1], and its average is 0.5.
 
     Attributes:
-        talkativeness: how much is said beside what is needed.
+        talkativeness: amount of optional remarks.
         patience: how long standstills and silence are borne.
         politeness: from blunt to polite.
         certainty: how rarely the speaker hesitates, checks, and asks to repeat.

@@ -171,7 +171,7 @@ def next_choice(town: Town, lane: int, station: float) -> Choice | None:
 
 
 def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
-    """Returns the lanes of the same direction beside a lane, the nearest first."""
+    """Returns the adjacent lanes of the same direction, the nearest first."""
     found: list[int] = []
     for side in (LinkType.LANE_CHANGE_LEFT, LinkType.LANE_CHANGE_RIGHT):
         beside = town.neighbour(lane, side)
@@ -184,7 +184,7 @@ def lanes_beside(town: Town, lane: int) -> tuple[int, ...]:
 def find_exit(
     town: Town, choice: Choice, direction: Direction | None, streets: frozenset[int] = frozenset()
 ) -> Exit | None:
-    """Returns the exit meant by a direction and perhaps a street; lanes beside count where the own has no such exit.
+    """Returns the exit meant by a direction and perhaps a street, if necessary from an adjacent lane.
 
     Args:
         town: the map.
@@ -386,7 +386,7 @@ class RouteState:
         return counted.avoiding(town, start, way_in) if counted.misses > 1 and way_in is not None else counted
 
     def avoiding(self, town: Town, start: Place, place: Place) -> RouteState:
-        """Excludes a place, besides the `MOST_AVOIDED` - 1 latest ones, and plans another route."""
+        """Excludes a place, in addition to the `MOST_AVOIDED` - 1 latest ones, and plans another route."""
         return replace(self, avoided=(*self.avoided, place)[-MOST_AVOIDED:]).replanned(town, start)
 
     def knows_roadblock(self, place: Place) -> bool:

@@ -258,7 +258,7 @@ class SpeechState:
 
         Args:
             now: time [s].
-            speaking: remaining duration of the own utterance [s].
+            speaking: remaining duration of its own utterance [s].
             rng: random generator for the words.
             scene: context that the words may refer to; the latest acts are added.
             interval: time to the next decision [s].

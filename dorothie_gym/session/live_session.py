@@ -107,7 +107,7 @@ class LiveSession:
         limits: SpaceLimits,
         arrays: WorldArrays | None = None,
     ) -> None:
-        """Begins a session, or takes over one of which only the world has been played.
+        """Begins a session, or takes over a session of which only the world has been simulated.
 
         Args:
             town: the map.

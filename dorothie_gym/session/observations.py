@@ -220,7 +220,7 @@ def write_subgoals(table: Table, task: TaskState, *, permissions: bool) -> None:
     """Writes the subgoals as rows of `SubgoalColumn`.
 
     Args:
-        table: table of which all rows are written.
+        table: table, all rows of which are written.
         task: present state of the task.
         permissions: whether untriggered subgoals and the permitted changes of each subgoal are written.
     """

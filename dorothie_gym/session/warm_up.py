@@ -63,7 +63,7 @@ def warm_up(progress: Progress | None = None, *, everything: bool = False) -> No
 
     Args:
         progress: called when the compilation of a function begins, perhaps in another thread.
-        everything: whether to compile what `Town-v0` needs, too.
+        everything: whether to compile the functions of `Town-v0` as well.
     """
     with reporting(progress) as report, _helper(report) as wait:
         engine = SessionEngine(TOWN, config=EnvConfig(world=WorldConfig(vehicles=3, pedestrians=3)))

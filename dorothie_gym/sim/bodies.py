@@ -235,7 +235,7 @@ class Cyclist(TrafficVehicle):
 
 
 class _Thing(BodyView[Record_co]):
-    """A body that is no vehicle: it has no lane of its own, and highway-env never moves it."""
+    """Body other than a vehicle: it has no lane, and highway-env never moves it."""
 
     height: Field[float]
 

@@ -176,7 +176,7 @@ class Wind:
         """Returns the speed of the wind [m/s], never below 0.
 
         Args:
-            strength: in [0, 1]; 0 is no wind that matters.
+            strength: in [0, 1]; 0 means no wind of relevance.
             time: [s].
         """
         if strength <= 0.0:

@@ -130,7 +130,7 @@ class SpokenDialogue:
     def hear(self, utterance: Utterance, number: int, cabin: CabinState) -> Utterance:
         """Returns what is recognised of an utterance that is over, and keeps its audio in `recordings`.
 
-        The act of a span of which every word is right is that of the speaker; else it is read from the words.
+        A span without word errors has the speaker's act; otherwise the act is parsed from the words.
 
         Args:
             utterance: spoken utterance; calls follow the order of utterance ends.

@@ -222,7 +222,7 @@ def _tidy(clause: str) -> str:
 
 
 def _imperative(clause: str) -> str | None:
-    """Returns the clause from its verb on, "buy a newspaper at Ikea"; None if it is no instruction."""
+    """Returns the clause from its verb on, "buy a newspaper at Ikea"; None if it is not an instruction."""
     text = _tidy(clause)
     while found := _LEADS.match(text):
         text = text[found.end() :]
@@ -363,7 +363,7 @@ def _places() -> frozenset[str]:
 
 @functools.cache
 def _not_names() -> frozenset[str]:
-    """Returns words with a capital letter that are no names of people."""
+    """Returns capitalised words other than names of people."""
     places = {word for name in _places() for word in name.title().split()}
     labels = {word for kind in catalogue().values() for text in (kind.label, kind.name.label) for word in text.split()}
     labels |= {label for name in LandmarkName for label in name.label.split()}

@@ -109,7 +109,7 @@ def is_answer(remark: Remark, answer: Remark) -> bool:
 
 
 def said_again(utterance: Utterance | None, memory: Memory) -> Remark | None:
-    """Returns the last own remark, said again, if the participant has just not understood it."""
+    """Returns a repetition of the Co-Wizard's last remark if the participant has just not understood it."""
     if utterance is None or memory.last is None or not utterance.heard.acts:
         return None
     if utterance.heard.acts[0].move is not DialogueMove.CONFUSE:

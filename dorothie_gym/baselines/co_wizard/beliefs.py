@@ -38,7 +38,7 @@ _Evidence = Callable[[Memory, CoWizardView, Proposition], bool | None]
 
 
 def evidence(memory: Memory, view: CoWizardView, said: Proposition) -> bool | None:
-    """Returns whether a proposition seems true; None where nothing tells."""
+    """Returns whether a proposition seems true; None without evidence."""
     judge = _EVIDENCE.get(said.predicate)
     found = None if judge is None else judge(memory, view, said)
     return found if found is None else found is not said.negated

@@ -97,7 +97,7 @@ def perceive(observation: ObservationMapping, attention: Attention, last: Dialog
     Args:
         observation: observation of the Co-Wizard, with its action mask.
         attention: state before.
-        last: last own move, as context of what is heard.
+        last: the Co-Wizard's last move, as context for what is heard.
     """
     view = CoWizardView.read(observation, attention.memory.town)
     heard = heard_utterance(observation, Role.PARTICIPANT, last)
@@ -179,7 +179,7 @@ def remember(scene: Scene, update: Update) -> Memory:
 
 
 def noted(memory: Memory, remark: Remark, view: CoWizardView) -> Memory:
-    """Returns the memory after an own remark."""
+    """Returns the memory after a remark of the Co-Wizard."""
     asks = remark.act.move in QUESTIONS
     way = bool({ActionValue.QUERIED, ActionValue.J_TURN, ActionValue.LANE_FOLLOW} & set(remark.act.values(Slot.ACTION)))
     return memory.spoken(remark, topic_of(remark), view, asks=asks, asks_way=asks and way)

@@ -1,4 +1,4 @@
-"""Lessons: recorded sessions that are followed beside the teacher, and sessions that the player plays beside it."""
+"""Training examples from recorded sessions, and from sessions that player and teacher play together."""
 
 from __future__ import annotations
 

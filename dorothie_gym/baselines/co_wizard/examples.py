@@ -26,7 +26,7 @@ class Example:
         acting: inputs of the second step.
         before: values of the memory before (v,).
         values: values of the memory after (v,).
-        fresh: which variables are set anew.
+        fresh: which variables are set again.
         goal: `GoalEvent`, or their number + position of the place among `listening.rows`; `UNKNOWN` if it is missing.
         status: status given to an errand.
         command: index of the command; `UNKNOWN` if it could not be commanded.
@@ -92,9 +92,9 @@ def make_example(
 def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Memory, lesson: Lesson) -> Example | None:
     """Returns an example of how a memory that differs from the teacher's gets back to it; None if it does not differ.
 
-    Where the own goal is another place than the teacher's, and the utterance does not say which, the player is to
+    Where the own goal is another place than the teacher's, and the utterance does not say which, the player has to
     doubt it (a place of the same name) or to give it up: it cannot know the right one, but it no longer plans a route
-    against the directions that it is given.
+    against the directions that it gets.
 
     Args:
         scene: what the player perceived, with its own memory.

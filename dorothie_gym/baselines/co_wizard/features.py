@@ -69,7 +69,7 @@ def state_vector(
         view: observation.
         step: next step on the navigator's route.
         utterances: last utterances of the participant, the latest first.
-        queued: whether own remarks wait to be said.
+        queued: whether its remarks wait to be said.
     """
     return [
         *_road(memory, view),

@@ -57,7 +57,7 @@ U_TURN: Final = 1
 """Value of `manoeuvre` for a U-turn that was asked for."""
 
 FRESH: Final = ("order", "nudging", "creeping")
-"""Variables that can be set anew to the same value; for each there is a further, binary output."""
+"""Variables that can be set again to the same value, for each of which there is a binary output."""
 
 STATUSES: Final = (None, GoalStatus.PENDING, GoalStatus.COMPLETE, GoalStatus.ABANDONED)
 """Statuses that an utterance gives to an errand."""
@@ -94,7 +94,7 @@ class Update:
 
     Attributes:
         values: next value of each variable, in the order of `VARIABLES`.
-        fresh: whether each variable in `FRESH` is set anew.
+        fresh: whether each variable in `FRESH` is set again.
         goal: `GoalEvent`, or their number + row of the landmark.
         status: index in `STATUSES`, for the first place named, or for the goal.
     """
@@ -112,7 +112,7 @@ class Memory:
     Attributes:
         town: the map.
         values: value of each variable.
-        changed_at: time at which each variable was last changed or set anew [s].
+        changed_at: time at which each variable was last changed or set again [s].
         goal: name of the goal; None for none.
         goal_mark: its row among the landmarks; -1 if it is not on the map.
         goal_at: time of its last change [s].
@@ -131,15 +131,15 @@ class Memory:
         reason_since: since when it has stood for this reason [s].
         told_to_stop_at: time at which it halted because of an utterance [s].
         told_to_turn_round_at: last time at which it was to turn round because of one [s].
-        physical: last own physical action; None for none.
+        physical: its last physical action; None for none.
         physical_at: its time [s].
         junction_of_action: junction ahead at that time.
-        said_at: time of the last own remark by predicate or, without content, by move [s].
-        spoke_at: time of the last own remark [s].
-        asked_at: time of the last own question [s].
+        said_at: time of its last remark by predicate or, without content, by move [s].
+        spoke_at: time of its last remark [s].
+        asked_at: time of its last question [s].
         asked_lane: lane before the junction whose way was asked for; -1 for none.
         heard_at: time of the last utterance of the participant [s].
-        last: last own remark that can be said again; None at first.
+        last: its last remark that can be repeated; None at first.
         clock: time between decisions.
     """
 
@@ -326,13 +326,13 @@ class Memory:
         return memory._noting(mark.name, GoalStatus.ONGOING)
 
     def acted(self, physical: PhysicalAction | None, view: CoWizardView) -> Memory:
-        """Notes the own physical action."""
+        """Records a physical action of the Co-Wizard."""
         if physical is None:
             return self
         return replace(self, physical=physical, physical_at=view.time, junction_of_action=view.junction)
 
     def spoken(self, remark: Remark, topic: str, view: CoWizardView, *, asks: bool, asks_way: bool) -> Memory:
-        """Notes an own remark: what it is about, and whether it asks."""
+        """Records a remark of the Co-Wizard: its topic, and whether it asks."""
         last = remark if asks or remark.act.slots else self.last
         said = (*(pair for pair in self.said_at if pair[0] != topic), (topic, view.time))
         lane = view.choice.lane if asks_way and view.choice is not None else self.asked_lane

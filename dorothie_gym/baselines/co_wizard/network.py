@@ -48,7 +48,7 @@ class Layout:
 
 @dataclass(frozen=True, kw_only=True)
 class Heard:
-    """Outputs of listening: logits of the next values of the memory, of what is set anew, of goal and status."""
+    """Outputs of listening: logits of the next memory values, of variables that are set again, of goal and status."""
 
     values: tuple[Tensor, ...]
     fresh: Tensor

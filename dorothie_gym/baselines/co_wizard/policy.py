@@ -59,7 +59,7 @@ class LearnedState:
     Attributes:
         seed: seed of the draws.
         attention: memory and last utterances.
-        voice: own remarks, queued and said.
+        voice: its remarks, queued and said.
         count: number of decisions.
     """
 
@@ -78,7 +78,7 @@ class Turn:
         memory: memory after listening.
         action: the action.
         remarks: what was decided to say.
-        queued: whether own remarks waited before.
+        queued: whether its remarks waited before.
         silent: whether nothing new could be said.
         state: state after the decision.
     """

@@ -186,7 +186,7 @@ def _decoded(code: Sequence[Any], available: Sources) -> Any:
 
 
 def check_form(form: str) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is not a valid form of a remark."""
     if not isinstance(parse_json(form, "form"), dict):
         raise ValueError(form[:80])
     filled(form, {name: _example(name) for name in sources_of(form)})

@@ -1,7 +1,7 @@
-"""The scripted Co-Wizard as a teacher: run beside a session, it says what it would do, remember and say.
+"""The scripted Co-Wizard as a teacher: run alongside a session, it reports what it would do, remember and say.
 
 The teacher observes what the player observes. What the player did and said instead is put into its state (`drove`,
-`talked`), so that it goes on from the player's course, not from its own.
+`talked`), so that it continues from the player's situation, not from its own.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Lesson:
 
 
 class Teacher:
-    """Scripted Co-Wizard beside a session."""
+    """Scripted Co-Wizard that runs alongside a session."""
 
     def __init__(self, town: Town, limits: SpaceLimits, seed: int, style: CoWizardStyle | None = None) -> None:
         """Prepares the teacher.
@@ -130,7 +130,7 @@ class Teacher:
         player asks is.
 
         Args:
-            voice: own remarks of the player, queued and said.
+            voice: remarks of the player, queued and said.
             remarks: what the player has just decided to say.
             lesson: what the teacher did.
             view: observation.

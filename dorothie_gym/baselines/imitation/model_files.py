@@ -78,7 +78,7 @@ def load_model(
         kind: kind that the page must have.
         version: `format` that it must have.
         make: returns the network of a page, with any weights; None if its layout is that of another version.
-        check_form: raises an error for a text that is no form of a remark.
+        check_form: raises an error for a text that is not a valid form of a remark.
 
     Raises:
         ModelFileError: a file is missing, damaged, or of another version.

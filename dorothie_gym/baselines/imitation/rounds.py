@@ -1,8 +1,9 @@
-"""Rounds of training: imitation of a corpus, then rounds of practice beside the teacher (DAgger).
+"""Rounds of training: imitation of a corpus, then rounds of practice with the teacher (DAgger).
 
 A round plays sessions in which the player of the round before and the teacher act in turns, adds the teacher's
-decisions to the examples, and fits the network again (Ross, Gordon and Bagnell, AISTATS 2011). Each session is a file
-of lessons, and each fit a model, so that an interrupted training goes on where it was; all follow from the seed.
+decisions to the examples, and fits the network again (Ross, Gordon and Bagnell, AISTATS 2011). The examples of each
+session and the model of each fit are saved, so that an interrupted training can be resumed; all depend only on the
+seed.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class RoundSettings:
         share: share of the time in which the player acts in practice.
         max_seconds: time limit of a session of practice [s].
         first_epochs: passes of the fit to the corpus.
-        epochs: passes of the fit after each round, which goes on from the one before.
+        epochs: passes of the fit after each round, which continues the previous fit.
         last_epochs: passes of the last fit.
         least: number of times that a remark must occur in the corpus to be learnt.
     """
@@ -105,7 +106,7 @@ class FitPlan:
         folder: folder of its model.
         files: files of lessons.
         corpus_files: those of them that are of the corpus, from which the vocabulary is taken.
-        former: folder of the model to go on from; None for the first fit.
+        former: folder of the model to continue from; None for the first fit.
         epochs: number of passes.
         title: name of the stage.
     """

@@ -24,7 +24,7 @@ CHANGED_WEIGHT: Final = 3.0
 
 
 class Rows(Protocol):
-    """Examples of which some rows can be taken."""
+    """Examples from which some rows can be selected."""
 
     def __len__(self) -> int:
         """Returns the number of examples."""

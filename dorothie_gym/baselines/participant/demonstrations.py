@@ -1,4 +1,4 @@
-"""Lessons: recorded sessions that are followed beside the teacher, and sessions that the player plays beside it."""
+"""Training examples from recorded sessions, and from sessions that player and teacher play together."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ OnExample = Callable[[Example], None]
 
 
 class Pupil:
-    """Attention beside the teacher; the example of a decision is what the teacher does with the pupil's memory."""
+    """Attention that follows the teacher; examples are the teacher's decisions given the pupil's memory."""
 
     def __init__(self, town: Town, seed: int, teacher: Teacher) -> None:
         """Prepares the pupil of a teacher; the seed draws which examples are kept."""

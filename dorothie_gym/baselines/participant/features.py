@@ -278,7 +278,7 @@ def _said_other_side(memory: Memory, direction: Direction) -> bool:
 
 
 def answer_to(memory: Memory, view: ParticipantView, utterance: Utterance) -> bool | None:
-    """Returns whether the answer to a question is yes; None if it is no such question, or nothing tells."""
+    """Returns whether the answer to a question is yes; None for other questions, or without evidence."""
     asked, direction = utterance.asked, utterance.heard.words.direction
     if asked is None:
         return None
@@ -302,7 +302,7 @@ def _is_elsewhere(memory: Memory, view: ParticipantView) -> bool:
 
 
 def evidence(memory: Memory, view: ParticipantView, said: Proposition) -> bool | None:
-    """Returns whether a proposition is true by what the participant knows and sees; None where nothing tells."""
+    """Returns whether a proposition is true by what the participant knows and sees; None without evidence."""
     found = _holds(memory, view, said)
     return found if found is None else found is not said.negated
 

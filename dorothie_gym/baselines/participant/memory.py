@@ -1,7 +1,7 @@
 """Working memory of the learned participant: the target, the route to it, what was said, and what has happened.
 
-The target and whether the car is guided are chosen by the network. All else follows from the own observation and the
-own remarks, in the records that the scripted participant keeps as well (`ParticipantState`).
+The target and whether the car is guided are chosen by the network. Everything else is derived from its observation and
+remarks, in the records that the scripted participant keeps as well (`ParticipantState`).
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class Memory:
     Attributes:
         records: records of tasks, route, guidance, motion and talk; they are not changed.
         events: time [s] and place of the latest of each kind of event; places are None where none belongs to it.
-        said_at: time of the last own remark by predicate or, without content, by move [s].
+        said_at: time of its last remark by predicate or, without content, by move [s].
         message: the latest message.
     """
 

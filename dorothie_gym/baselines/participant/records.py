@@ -1,4 +1,4 @@
-"""Records of the learned participant about the way: the next step on the route, and what own remarks change in them."""
+"""Route records of the learned participant: the next step on the route, and the updates after its own remarks."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def topic_of(remark: Remark) -> str:
 
 
 def note_remark(records: ParticipantState, view: ParticipantView, remark: Remark) -> None:
-    """Enters an own remark into records: what is announced, described, asked for, or mentioned by it."""
+    """Enters a remark of the participant into the records: what it announces, describes, asks for, or mentions."""
     act, now, goal = remark.act, view.time, records.task.goal
     actions, statuses = act.values(Slot.ACTION), act.values(Slot.STATUS)
     later = {GoalStatus.PENDING, GoalStatus.ABANDONED, GoalStatus.COMPLETE} & set(statuses)

@@ -241,7 +241,7 @@ def _move_of(form: str) -> str | None:
 
 
 def check_form(form: str) -> None:
-    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is no form of a remark."""
+    """Raises `ValueError`, `LookupError` or `TypeError` if a text from a file is not a valid form of a remark."""
     if form == STOP_FORM:
         return
     if not isinstance(parse_json(form, "form"), dict):

@@ -1,7 +1,7 @@
-"""The scripted participant as a teacher: run beside a session, it says what it would choose and say.
+"""The scripted participant as a teacher: run alongside a session, it reports what it would choose and say.
 
 The teacher observes what the player observes. What the player said instead is put into its state (`settle`), so that it
-goes on from the player's course, not from its own.
+continues from the player's situation, not from its own.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Lesson:
 
 
 class Teacher:
-    """Scripted participant beside a session."""
+    """Scripted participant that runs alongside a session."""
 
     def __init__(self, town: Town, limits: SpaceLimits, seed: int, style: ParticipantStyle | None = None) -> None:
         """Prepares the teacher.

@@ -48,7 +48,7 @@ Network: TypeAlias = Any
 """Policy network of a `Model`, for the same reasons without a type."""
 
 TENSORS: Final = "model.safetensors"
-"""File of a model beside `model.json`."""
+"""File of a model next to `model.json`."""
 
 KIND: Final = "dorothie_gym-rl"
 """Kind of the models of `train-rl` in `model.json`; `policy_loader` selects the loader of a file by it."""

@@ -54,7 +54,7 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
 
     Args:
         name: id of the environment.
-        settings: its arguments; `partners` may name files of policies, too.
+        settings: its arguments; `partners` may also name files of policies.
 
     Raises:
         SettingsError: there is no such environment, or it does not accept these arguments.
@@ -73,7 +73,7 @@ def make_env(name: str, settings: Arguments | None = None) -> AnyEnv:
 
 
 def _with_partners(name: str, settings: Arguments) -> Arguments:
-    """Returns the arguments of an environment with the policies that play beside its agent, instead of their names.
+    """Returns the arguments of an environment with the policies of the other roles instead of their names.
 
     Raises:
         ValueError: there is no such policy, or it plays another role.

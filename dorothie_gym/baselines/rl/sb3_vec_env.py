@@ -20,7 +20,7 @@ def sb3_vec_env(env: VectorEnv[Any, Any, Any]) -> VecEnv:
     """Returns a vector environment as a `VecEnv`, which steps all of its environments in one call.
 
     An info is empty but at the end of an episode: there it holds the last observation, whether the episode was cut off
-    by the time limit, and what the environment itself tells of the end, such as `is_success`. `env_method` and
+    by the time limit, and the environment's own information on the end, such as `is_success`. `env_method` and
     `get_attr` know what the vector environment has, such as `action_masks` for `MaskablePPO`.
 
     Args:

@@ -26,7 +26,7 @@ MakeEnv: TypeAlias = Callable[[], AnyEnv]
 
 @runtime_checkable
 class MakeBatch(Protocol):
-    """Factory of environments that has a batch form, too."""
+    """Factory of environments that also have a batch form."""
 
     def batch(self, count: int) -> VecEnv:
         """Returns several environments as one."""

@@ -18,7 +18,7 @@ _SMALLEST_SPREAD: Final = 1e-6
 class Texts(nn.Module, ABC):
     """Turns indices of texts into vectors.
 
-    The texts themselves are no part of a model's weights: a model may be used on another corpus.
+    The texts themselves are not part of a model's weights: a model may be used on another corpus.
 
     Attributes:
         width: numbers of a vector.

@@ -1,7 +1,7 @@
 """Objects that a trained detector finds in the pictures of a recorded session, as rows of `ACTOR_DTYPE`.
 
-Nothing of the recorded actors gets in: place, heading and size are those of the box in space, numbers begin anew in
-each picture, and no speed is known, because nothing is followed from picture to picture.
+Nothing of the recorded actors gets in: place, heading and size are those of the box in space, numbers start again in
+    each picture, and no speed is known, because objects are not tracked from picture to picture.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from dorothie_gym.support.angles import wrap_radians
 from dorothie_gym.support.files import replacing
 
 CYCLIST_WIDTH: Final = 1.0
-"""Width below which a vehicle counts as a cyclist: the detector does not tell them apart [m]."""
+"""Width below which a vehicle counts as a cyclist: the detector does not distinguish them [m]."""
 
 OBJECTS_FOLDER: Final = "objects"
-"""Folder beside the weights of a detector, with what it found in sessions."""
+"""Folder next to the weights of a detector, with its detections in sessions."""
 
 _SPACING: Final = 4  # records
 _AT_ONCE: Final = 8  # pictures
@@ -60,11 +60,11 @@ _ACTORS: Final = {
 class DetectedBoxes:
     """Objects that a trained detector finds, which reads the classes and depths that its SegFormer predicts.
 
-    Detections count from the score on that had the best F1 in the validation pictures. What is found in a session is
-    kept in a folder beside the weights.
+    Detections count from the score on that had the best F1 in the validation pictures. The detections in a session are
+    stored in a folder next to the weights.
 
     Attributes:
-        detector: folder of its training, `OUT/detr/<size>/seed-<n>`; the SegFormer's is beside it in `OUT`.
+        detector: folder of its training, `OUT/detr/<size>/seed-<n>`; the SegFormer's is next to it in `OUT`.
 
     Raises:
         CheckpointError: a training is missing, or the detector reads true classes and depths or those of another
@@ -140,7 +140,7 @@ class DetectedBoxes:
 
         Raises:
             SessionError: the session has no frames of the car, or no surroundings.
-            OSError: the folder beside the weights cannot be written.
+            OSError: the folder next to the weights cannot be written.
         """
         frames = session.scene.actors.frames
         looks = looked_at(frames, _event_frames(session))

@@ -1,4 +1,4 @@
-"""Trainings of the vision models on a corpus, and the table of their figures beside the paper's."""
+"""Trainings of the vision models on a corpus, and the table of their figures next to the paper's."""
 
 from __future__ import annotations
 

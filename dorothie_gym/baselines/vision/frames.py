@@ -70,7 +70,7 @@ CAMERA_FAULTS: Final = (Sensor.BLUR, Sensor.VIEW)
 """Faults that show in pictures."""
 
 MOST_BYTES: Final = 8 * 1024 * MIB
-"""Limit of the pictures in the user's cache [bytes]; those of the running command stay beyond it, too."""
+"""Limit of the pictures in the user's cache [bytes]; those of the running command are kept even beyond it."""
 
 _NEAR: Final = 45.0  # [m] farther road users have few pixels
 _TRIED: Final = 2  # pictures that are looked at for one that is chosen
@@ -423,7 +423,7 @@ def _mapped(path: Path, name: str, town: str) -> SessionFrames:
 
 @functools.cache
 def _builder_digest() -> str:
-    """Returns a digest of everything besides the session that determines its pictures."""
+    """Returns a digest of everything except the session that determines its pictures."""
     scenes = builder_digest()
     if scenes is None:
         raise SessionError("the sources of the camera cannot be read; no pictures can be kept for the training")

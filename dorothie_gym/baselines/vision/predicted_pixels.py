@@ -1,4 +1,4 @@
-"""Classes and depths that a SegFormer predicts for pictures, computed once and kept beside its weights."""
+"""Classes and depths that a SegFormer predicts for pictures, computed once and stored next to its weights."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def spaces_of(solids: NDArray[np.floating], focals: Focals) -> NDArray[np.float6
 
 
 def solids_from(boxes: Tensor, raw: Tensor) -> Tensor:
-    """Returns the solids (..., 8) that a head predicts beside boxes in the picture.
+    """Returns the solids (..., 8) that a head predicts in addition to boxes in the picture.
 
     Args:
         boxes: (..., 4) middle, width and height, in shares of the picture.

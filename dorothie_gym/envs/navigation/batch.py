@@ -168,7 +168,7 @@ class DrivingBatch(DrivingRows):
                 state["told"][number] = False
 
     def _add_costs(self) -> None:
-        """Adds the costs to goals that roadblocks have changed; those that nobody needs any more are dropped."""
+        """Adds the costs to goals that roadblocks have changed; those that are no longer needed are dropped."""
         state = self._decisions
         used = set(state["costs"].tolist())
         self._cost_rows = {goal: row for goal, row in self._cost_rows.items() if not goal[1] or row in used}

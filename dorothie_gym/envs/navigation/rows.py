@@ -63,7 +63,7 @@ REFUSED: Final = ("mental", "physical")
 
 @dataclass
 class DrivingFace:
-    """What a session of a batch has besides its row.
+    """Objects of a session of a batch besides its row.
 
     Attributes:
         scenario: storyboard, street names and departure.

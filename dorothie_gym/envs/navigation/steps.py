@@ -1,8 +1,8 @@
 """Decisions of many navigation environments at once (compiled): from the driver's action to observation and reward.
 
 A decision has two halves, because rare events between them are Python's: `act` carries out the action and steps the
-physics; `guide` lets the instructor speak, judges the episode, and observes. Where a half cannot go on alone, it says
-so in `DriveRecord.stage`.
+physics; `guide` lets the instructor speak, judges the episode, and observes. If a half needs Python to continue, it
+sets `DriveRecord.stage`.
 """
 
 from __future__ import annotations

@@ -120,7 +120,7 @@ class DrivingVectorEnv(
     def step(
         self, actions: NDArray[np.generic]
     ) -> tuple[DriverObservation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
-        """Plays a decision in every environment; those that are over begin anew, as the autoreset mode says.
+        """Plays a decision in every environment; finished ones are reset according to the autoreset mode.
 
         Args:
             actions: (num_envs, ...) one for each.

@@ -1,4 +1,4 @@
-"""Misrecognised utterances of which the meaning was lost, and whether the speakers repaired it."""
+"""Misrecognised utterances whose meaning was lost, and whether the speakers repaired it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _EMPTY: Final = frozenset({"Unknown", "Queried"})
 
 @dataclass(frozen=True, kw_only=True)
 class LostMeaning:
-    """Utterance of which a detail was lost.
+    """Utterance that lost a detail in recognition.
 
     Attributes:
         utterance: the utterance.
@@ -58,7 +58,7 @@ class LostMeaning:
 
 
 def lost_meanings(session: Session) -> Iterator[LostMeaning]:
-    """Yields the utterances of which the recogniser lost a detail, in order.
+    """Yields, in order, the utterances that lost a detail in recognition.
 
     Both the spoken and the recognised words are read by the parser, and the speaker must have meant what is read; so
     neither errors of the parser nor missing marks count.

@@ -166,7 +166,7 @@ def alpha_of(annotators: Sequence[Sequence[LabelledUtterance | None]]) -> Alpha:
 
     Args:
         annotators: labelled utterances of each annotator, all in the same order; None for an utterance that was not
-            given to this annotator. Utterances that are not finished are missing, too.
+            given to this annotator. Unfinished utterances are also missing.
 
     Raises:
         SessionError: the package `krippendorff` is not installed.

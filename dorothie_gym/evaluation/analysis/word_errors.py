@@ -28,7 +28,7 @@ class WordErrors:
 
     Attributes:
         words: number of words that were spoken.
-        substitutions: spoken words of which the recogniser returned another one.
+        substitutions: spoken words that the recogniser replaced by another one.
         deletions: spoken words that it left out.
         insertions: words that it added.
     """

@@ -163,7 +163,7 @@ def cross_play(
     ray: str | None = None,
     on_session: Callable[[int, int], None] | None = None,
 ) -> CrossPlayResult:
-    """Plays all pairs; a started cross-play goes on. See `roll_out_all`.
+    """Plays all pairs; an interrupted cross-play is resumed. See `roll_out_all`.
 
     Args:
         settings: settings.

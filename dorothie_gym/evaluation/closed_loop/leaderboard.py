@@ -228,7 +228,7 @@ def leaderboard_page(
 
     Args:
         entries: the rollouts, in order.
-        picture: name of the picture beside the page, or None.
+        picture: name of the picture next to the page, or None.
         definitions: page with the definitions of the metrics, as seen from this page, or None.
     """
     where = (

@@ -59,7 +59,7 @@ class ClosedLoopMetric(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Success(ClosedLoopMetric):
-    """Whether all live subgoals were reached in an allowed order, the destination last, without own collisions."""
+    """Whether all live subgoals were reached in an allowed order, destination last, without an at-fault collision."""
 
     key: ClassVar[str] = "success"
     title: ClassVar[str] = "success"

@@ -116,7 +116,7 @@ class SubmissionCheck:
         resimulated: numbers of the sessions that were played again and found equal.
         sessions: number of sessions of the protocol.
         seed: seed of the sample; None if all sessions were to be played again.
-        played: whether the Co-Wizard's policy was played again, too.
+        played: whether the Co-Wizard's policy was also played again.
         claims: what the rollout states and nothing checks.
     """
 
@@ -143,8 +143,8 @@ def check_submission(
     Args:
         folder: folder of the rollout, with its sessions.
         sample: number of sessions to play again; None for all of them. The other ones are drawn, read and measured.
-        seed: seed of the sample, which also depends on the content of all sessions; None draws one, so that nobody can
-            know the sample beforehand.
+        seed: seed of the sample, which also depends on the content of all sessions; None draws one, so that the sample
+            cannot be known beforehand.
         protocol: the protocol.
         workers: number of processes; more than one needs an importable main module of the caller.
         on_session: called with the numbers of checks done and planned: one for each session, and one more for each
@@ -207,7 +207,7 @@ def differences_from(file: Path | str, submission: Mapping[str, object]) -> tupl
     model.
 
     Raises:
-        RolloutError: the file is no submission.
+        RolloutError: the file is not a submission.
     """
     with raising(RolloutError):
         page = read_json(Path(file), MAX_RESULT_JSON)
@@ -310,7 +310,7 @@ def _missing_and_surplus(root: Path, result: RolloutResult, plans: Sequence[Roll
 
 
 def _surplus_files(root: Path) -> Iterator[str]:
-    """Yields files that are no part of a rollout; the folder that a killed run leaves may be there, if it is empty."""
+    """Yields files that are not part of a rollout; an empty folder left by a killed run is allowed."""
     for path in sorted(root.iterdir()):
         if path.name not in _FILES and not (path.name == PARTS_FOLDER and path.is_dir() and not any(path.iterdir())):
             yield f"{path}: is no part of a rollout, and nothing checks it; remove it"

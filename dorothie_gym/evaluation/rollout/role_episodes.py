@@ -60,7 +60,7 @@ class RoleEpisode:
 
     @property
     def id(self) -> str:
-        """Opaque id: a digest of what the role saw and did, which whoever has the episode can compute, too."""
+        """Opaque id: a digest of the role's observations and actions, which can be computed from the episode."""
         content = [self.town, self.observations, self.masks, self.actions, self.rewards, self.terminated]
         return digest_of(content)[:_ID_LENGTH]
 

@@ -72,7 +72,7 @@ class UnitStarts:
 def adopted(text: SourceText, source: Annotation, id: UtteranceId) -> Change:
     """Returns the change that takes the marks of an utterance over into the final version.
 
-    Units are numbered by their first words; the marks of the units that begin in the utterance are taken over, too.
+    Units are numbered by their first words; the marks of the units that begin in the utterance are also copied.
     Suggestions count as accepted.
     """
     line, starts = text.by_id[id], UnitStarts(text, source)

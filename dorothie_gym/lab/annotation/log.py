@@ -1,6 +1,6 @@
-"""Log of an annotator's marks: an append-only file beside the session, from which marks, undo and redo are restored.
+"""Log of an annotator's marks: an append-only file next to the session, from which marks, undo and redo are restored.
 
-The first line says whose log it is and of which text. Every later line is an edit with the new marks of what it
+The first line names the annotator and identifies the text. Every later line is an edit with the new marks of what it
 changes; an undo is an edit that restores earlier marks. A line is on the disk before the edit is acknowledged, so that
 neither the death of the program nor a power failure loses it.
 """

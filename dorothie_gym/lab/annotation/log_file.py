@@ -1,4 +1,4 @@
-"""Files of annotators beside a session: inside its folder, appended whole or not at all, never more than is read."""
+"""Files of annotators in the folder of a session, with atomic appends and a limited size."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def appending(path: Path, whole: int) -> Iterator[BinaryIO]:
 
     Args:
         path: the file; it is created if it is missing, in a folder that exists.
-        whole: size of what remains if the block fails [bytes]; a file of which nothing remains is removed.
+        whole: size to which the file is cut if the block fails [bytes]; an empty file is removed.
 
     Raises:
         AnnotationError: the file or its folder is a link, or the file has a further name elsewhere.

@@ -147,7 +147,7 @@ class Workplace:
 
         Raises:
             AnnotationError: there is no session of this number.
-            SessionError: it cannot be read, or nobody speaks in it.
+            SessionError: it cannot be read, or has no utterances.
         """
         with self._lock:
             if not 0 <= number < len(self.entries):

@@ -10,16 +10,16 @@ from dorothie_gym.session.config import EnvConfig
 
 
 class WhileAway(enum.StrEnum):
-    """What a session does while a person who has a seat is away."""
+    """Behaviour of a session while a person with a seat is away."""
 
     PAUSE = "pause"
     """The clock stops."""
     CONTINUE = "continue"
-    """The clock goes on; the role does nothing."""
+    """The clock continues; the role does nothing."""
 
 
 class AfterAbsence(enum.StrEnum):
-    """What a session does when a person has been away for too long."""
+    """Behaviour of a session after a person has been away for too long."""
 
     END = "end"
     """The session ends with the reason "left"."""

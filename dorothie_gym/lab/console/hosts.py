@@ -23,8 +23,8 @@ class ForeignHosts:
     somebody else, so requests of pages with TLS are safe: they came through a proxy. Otherwise the name must be
     one of this machine, or the one at which it was told to listen (`app.state.host_names`).
 
-    Websockets and requests that change something have an `Origin`, which scripts cannot change. Programs that are no
-    browsers have none, and are not refused. A page is refused only to tell the person why.
+    Websockets and requests that change something have an `Origin`, which scripts cannot change. Programs other than
+    browsers send none, and are not refused. A page is refused only to tell the person why.
 
     Args:
         app: the application.

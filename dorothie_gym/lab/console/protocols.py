@@ -219,7 +219,7 @@ class GuardedSocket(WebSocketsSansIOProtocol):
         return message
 
     def take_turn(self) -> None:
-        """Reads a slice of what was received; refuses a stranger who has sent more than is needed to join."""
+        """Reads a slice of what was received; refuses a stranger who has sent more data than joining needs."""
         self._asked = False
         part = bytes(self._unread[:SLICE])
         del self._unread[:SLICE]

@@ -42,7 +42,7 @@ class SpanRecordings:
     def _take(self, role: Role, text: str) -> str | None:
         """Returns the recording of the first span with these words; forgets it, and those before, which were refused.
 
-        A span that nobody said here, as a policy said it, has none.
+        A span of a policy has none.
         """
         said = self._said.get(role, deque())
         if all(words != text for words, _ in said):

@@ -50,9 +50,9 @@ class Room:
         seed: seed of the first session; each further one has the next number.
         folder: folder in which each session is recorded in a folder of its own; None records nothing.
         name: name of the folder of a session; None names it by the town and a random number, since people at the seats
-            may see the name, and storyboard and seed would tell them the errands.
+            may see the name, and storyboard and seed would reveal the errands.
         extra: further fields of the header of the record (JSON types).
-        resumed: interrupted session that the first one goes on with; the engine is then one of `begin_replay`.
+        resumed: interrupted session that the first session resumes; the engine is then one of `begin_replay`.
 
     Attributes:
         engine: see above.
@@ -142,7 +142,7 @@ class Room:
 
     @property
     def is_quiet(self) -> bool:
-        """Whether nothing happens and nobody watches."""
+        """Whether the session is idle and no browser watches it."""
         return self.state is not RoomState.RUNNING and not self._calls and not any(s.present for s in self._all())
 
     # --- a tick -----------------------------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ class Room:
         return out
 
     def suspend(self) -> list[Outgoing]:
-        """Interrupts a session that is in progress because the program stops: a new program can go on with it."""
+        """Interrupts a session that is in progress because the program stops: a new program can resume it."""
         if self.record is not None:
             self.record.close()
         return [Outgoing(each, code=CloseCode.RESTART) for seat in self._all() for each in seat.connections]
@@ -210,7 +210,7 @@ class Room:
             self._catch_up(resumed)
 
     def _open_record(self) -> None:
-        """Begins the record: when the session starts, so that one that nobody came to leaves nothing."""
+        """Begins the record: when the session starts, so that a session without people leaves no files."""
         if self._folder is None or self.record is not None:
             return
         engine = self.engine

@@ -1,4 +1,4 @@
-"""Record of a session with people: the session itself as everywhere, and the log of the seats beside it."""
+"""Record of a session with people: the normal recording of the session, and the log of the seats."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class RoomRecord:
         return name
 
     def adopt_audio(self, audio: Mapping[str, Path]) -> None:
-        """Copies the recordings of an interrupted session, by name, with which this one goes on."""
+        """Copies the recordings of the interrupted session that this one resumes, by name."""
         with self._open:
             for name, path in audio.items():
                 self._add(name, path.read_bytes())

@@ -46,7 +46,7 @@ class Seat:
         token: secret of the link to the seat.
         connections: browsers at the seat; one for a role, any number for seats that watch.
         joined: whether a person has sat here.
-        away_since: clock at which the person left [s]; None if nobody has left.
+        away_since: clock at which the person left [s]; None if no person has left.
         taken_over: whether the policy plays for a person who is away.
         done: last command that was carried out.
         refused: reasons for refusals that were not sent yet.

@@ -182,7 +182,7 @@ class SeatFrames:
         return [Outgoing(connection, picture=picture) for connection in due]
 
     def _is_due(self, connection: Connection, advanced: bool) -> bool:
-        """Returns whether a browser is to get a picture: the first one, and then at its rate."""
+        """Returns whether to send a browser a picture: the first one, and then at its rate."""
         decision = self._engine.session.decisions
         if connection.pictured is None or connection.pictured > decision:
             return True

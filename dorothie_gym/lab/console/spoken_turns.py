@@ -42,7 +42,7 @@ Find: TypeAlias = Callable[[str], tuple[Room, Seat] | None]
 
 
 class SpokenTurns:
-    """Recognition and synthesis for the seats of a server, in one thread beside the event loop.
+    """Recognition and synthesis for the seats of a server, in one thread next to the event loop.
 
     Args:
         find: returns room and seat of a secret; None for an unknown one.

@@ -13,8 +13,9 @@ from dorothie_gym.ontology.slots import LandmarkName, StreetName
 from dorothie_gym.session.spaces.observations import ObservationMapping, heard_acts
 
 Entry = dict[str, Any]
-"""Line of the talk in JSON types: `t` [s], `who`, `text`; for own utterances also `utterance` (number) and `spans`,
-for heard ones that name landmarks `places` and `streets` (labels, as they were understood)."""
+"""Line of the talk in JSON types: `t` [s], `who`, `text`; for the role's utterances also `utterance` (number) and
+`spans`, for heard ones that name landmarks `places` and `streets` (labels, as they were understood).
+"""
 
 
 class TalkLog:

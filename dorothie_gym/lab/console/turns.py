@@ -12,7 +12,7 @@ TURNS_AT_ONCE: Final = 8
 """Turns between two passes of the event loop, in which seats are served: 10 ms of work."""
 
 PAUSE: Final = 0.002
-"""Shortest pause between two series of turns if somebody waits for one [s], for the threads of the sessions."""
+"""Shortest pause between two series of turns if a connection waits for one [s], for the threads of the sessions."""
 
 REST: Final = 1.0
 """Length of the pause after a series relative to the time that it took with what it set off: strangers get half of the

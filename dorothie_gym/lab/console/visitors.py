@@ -1,6 +1,6 @@
 """Connections of a web server: how many there are, and which of them give way when there are too many.
 
-Whoever holds a seat or another valid secret is known and keeps its connection. All others are strangers: they share
+A holder of a seat or another valid secret is known and keeps the connection. All others are strangers: they share
 a limited number of places, and have a limited time. When the places are taken, a new connection is still let in. Those
 that give way are of the address that has most strangers: first those that ask too often, then the oldest. So a browser
 that asks at once is served, also if the flood comes from its address.
@@ -54,7 +54,7 @@ def network_of(host: str | None) -> str:
         host: address of a connection, or what a proxy says about it.
 
     Returns:
-        A short text; an empty one for what is no address.
+        A short text; empty if it is not an address.
     """
     try:
         address = ipaddress.ip_address((host or "").partition("%")[0])
@@ -158,7 +158,7 @@ class Visitors:
             self._end(visitor)
 
     def close(self) -> None:
-        """Ends all strangers, and admits nobody from now on: the server stops."""
+        """Ends the connections of all strangers, and admits no more: the server stops."""
         self._closed = True
         for visitor in list(self._strangers):
             self._end(visitor)

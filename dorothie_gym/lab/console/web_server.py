@@ -67,7 +67,7 @@ class WebServer(Server):
             listener.listen(BACKLOG)  # asyncio has set it to the number of connections that it accepts at once
 
     async def on_tick(self, counter: int) -> bool:
-        """Ends connections whose time is over; returns whether the server is to stop."""
+        """Ends connections whose time is over; returns whether the server must stop."""
         if counter in FREEZES:
             gc.freeze()
         self._visitors.sweep()

@@ -120,7 +120,7 @@ class Database:
         return None if found is None else found[0]
 
     def compact(self) -> None:
-        """Writes the file anew without the remains of deleted rows; raises `StorageError` if that fails."""
+        """Rewrites the file without the remains of deleted rows; raises `StorageError` if that fails."""
         self.run("VACUUM")
 
     def close(self) -> None:

@@ -6,8 +6,8 @@ without one of them. What stays of a partner: answers, stages, and the fact that
 condition and the reason "withdrawn".
 
 The first step deletes the person from the pseudonymous data, and notes in the same transaction which sessions are to be
-removed. It is done or not done. From then on nothing is left to decide: `finish_erasures` does each further step, goes
-on after one that fails, and returns what is left. The next server or command does what is left.
+removed. It is done or not done. From then on the deletion cannot be undone: `finish_erasures` does each further step,
+continues after failures, and returns the remaining steps. The next server or command does what is left.
 """
 
 from __future__ import annotations

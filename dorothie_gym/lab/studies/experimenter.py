@@ -37,7 +37,7 @@ class Experimenter:
 
     Args:
         progress: participants of the study.
-        entrance: links with which people go on.
+        entrance: links with which people continue.
 
     Attributes:
         token: token of the link, which admits one browser; the next server has another one.
@@ -87,7 +87,7 @@ class Experimenter:
         return answer(self.overview()) if self.is_known(request) else refusal(401, "Open the link of the experimenter.")
 
     async def _readmit(self, request: Request) -> Response:
-        """Answers with the token of a link with which a person goes on in another browser, once."""
+        """Answers with the token of a single-use link with which a person continues in another browser."""
         body = r.read_body(request, r.Readmit)
         if not self.is_known(request):
             return refusal(401, "Open the link of the experimenter.")
@@ -99,7 +99,7 @@ class Experimenter:
     # --- content ------------------------------------------------------------------------------------------------------
 
     def overview(self) -> dict[str, Any]:
-        """Returns people who wait, people by stage, and open rooms with the token of the own seat there."""
+        """Returns people who wait, people by stage, and open rooms with the token of the experimenter's seat there."""
         progress, present = self._progress, set(self._progress.present())
         rooms = [self._row(place) for place in progress.rooms.all() if place.room is not None]
         return {

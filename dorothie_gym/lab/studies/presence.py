@@ -51,7 +51,7 @@ class Presence:
         return sorted({*self._asking, *(name for name, seen in self._seen.items() if now - seen <= within)})
 
     def tell(self) -> None:
-        """Wakes everybody who waits for news."""
+        """Wakes all requests that wait for news."""
         self._news.set()
         self._news = asyncio.Event()
 

@@ -231,7 +231,7 @@ class Progress:
     # --- withdrawal -------------------------------------------------------------------------------------------------
 
     async def withdraw(self, person: Participant) -> bool:
-        """Deletes everything of a person; a session in progress ends for everybody.
+        """Deletes everything of a person; a session in progress ends for all its people.
 
         Returns:
             Whether nothing is left; otherwise the server tries again.

@@ -232,13 +232,13 @@ class StudyRecords:
         self.data.run(f"UPDATE invitations SET used = 0 WHERE token = ({query})", name)
 
     def readmit(self, name: str) -> str:
-        """Returns a token with which a participant can go on in another browser; only its hash is stored."""
+        """Returns a token with which a participant can continue in another browser; only its hash is stored."""
         token = secrets.token_urlsafe(16)
         self.data.run("INSERT OR REPLACE INTO readmissions VALUES (?, ?, NULL)", name, digest(token))
         return token
 
     def is_unused_readmission(self, token: str) -> bool:
-        """Returns whether a token lets a participant go on in another browser."""
+        """Returns whether a token lets a participant continue in another browser."""
         query = "SELECT 1 FROM readmissions WHERE token = ? AND visit IS NULL"
         return self.data.row(query, digest(token)) is not None
 

@@ -71,7 +71,7 @@ class Proceed(Body, frozen=True):
 
 
 class Wait(Body, frozen=True):
-    """Choice of a person who has waited in vain: to wait on, or to finish."""
+    """Choice of a person for whom no partner was found: to continue waiting, or to finish."""
 
     on: bool
 
@@ -89,7 +89,7 @@ class Readmit(Body, frozen=True):
 
 
 class Overview(Body, frozen=True):
-    """Request of the experimenter for what goes on."""
+    """Request of the experimenter for the state of the study."""
 
 
 class Withdraw(Body, frozen=True):

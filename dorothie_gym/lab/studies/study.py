@@ -23,7 +23,7 @@ class Admission(enum.StrEnum):
     """People who may take part."""
 
     OPEN = "open"
-    """Everybody who has the link."""
+    """Admission of every person with the link."""
     INVITED = "invited"
     """People with an invitation, which holds a token that can be used once."""
 
@@ -94,7 +94,7 @@ class SessionSettings(_Part, frozen=True, kw_only=True):
     Attributes:
         max_seconds: simulated time after which a session ends [s].
         pictures: whether seats look through the windscreen.
-        speech: whether people can speak into a microphone and hear the others, besides typing; what they say is
+        speech: whether people can speak into a microphone and hear the others, in addition to typing; speech is
             recorded with the session.
     """
 
@@ -134,7 +134,7 @@ class WaitingRoom(_Part, frozen=True, kw_only=True):
 
 
 class Completion(_Part, frozen=True, kw_only=True):
-    """Code that people are shown at the end, and an address to go on to."""
+    """Code that people are shown at the end, and an address to continue to."""
 
     code: Annotated[str, Meta(min_length=1, max_length=80)] | None = None
     url: (
@@ -148,7 +148,7 @@ class Recruitment(_Part, frozen=True, kw_only=True):
     Attributes:
         admission: who may take part.
         parameters: names of the parameters of the link that are kept; the first one identifies a person.
-        required: whether nobody can take part without the first parameter, by which the platform pays.
+        required: whether people need the first parameter, by which the platform pays, to take part.
         completion: end of people who took part.
         no_partner: end of people who waited in vain.
     """

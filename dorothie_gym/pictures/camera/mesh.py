@@ -210,7 +210,7 @@ class MeshBuilder:
         instance: int = TOWN,
         two_sided: bool = False,
     ) -> None:
-        """Adds an upright rectangle with one repeat of a texture, to be read by somebody who looks along a heading."""
+        """Adds an upright rectangle with one repeat of a texture, to be read by a viewer who looks along a heading."""
         right = np.array([-pm.sin(heading), pm.cos(heading), 0.0]) * (width / 2.0)
         up, middle = np.array([0.0, 0.0, height / 2.0]), np.asarray(centre, dtype=np.float64)
         corners = [middle - right - up, middle - right + up, middle + right + up, middle + right - up]

@@ -61,8 +61,8 @@ _OWN_LOT = 6.0, 5.0  # [m] length and depth of the lot of a landmark that stands
 class RecordedPictures:
     """Pictures of the camera on the car of a recorded session, at any frame between its first and last.
 
-    Bodies are interpolated between records. They keep their keys, and so their looks; keys that are no positive 32-bit
-    numbers, of other corpora, are replaced by 1, 2, ... in their order. A picture depends on its frame only.
+    Bodies are interpolated between records. They keep their keys, and so their looks; keys of other corpora that are
+    not positive 32-bit numbers are replaced by 1, 2, ... in their order. A picture depends on its frame only.
 
     Attributes:
         camera: the camera.
@@ -355,7 +355,7 @@ def _last_switch(switches: Switches, frame: int) -> bool:
 def _placed_landmarks(rows: Sequence[LandmarkRow], town: Town, scene: TownScene) -> tuple[TownScene, list[Landmark]]:
     """Returns the landmarks of a header at the sites of the town.
 
-    Landmarks that stand at no site, of other corpora, get a lot of their own, which the returned scene has besides.
+    Landmarks that stand at no site, of other corpora, get additional lots in the returned scene.
     """
     lots, landmarks = list(scene.lots), []
     for index, row in enumerate(rows):

@@ -43,7 +43,7 @@ def draw_scene(
         placed: triangles of bodies. If it has too little room, they are not drawn.
         count: of the triangles in `placed`, negative if they are to be written first.
         shadows: maps of shadows.
-        casts_shadows: whether they are to be drawn for the picture, too.
+        casts_shadows: whether the picture also needs shadows.
     """
     clear(buffer)
     draw_cells(view, buffer, town, cells, order, 0)

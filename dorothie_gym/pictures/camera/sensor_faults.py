@@ -33,7 +33,7 @@ def apply_faults(picture: NDArray[np.uint8], faults: Collection[Sensor], scratch
 
 @concurrent
 def blur(picture: NDArray[np.uint8], channel: int, radius: int, scratch: NDArray[np.uint8]) -> None:
-    """Replaces a channel by its means over squares; rows and columns go on as they end."""
+    """Replaces a channel by its means over squares; rows and columns are extended by their last values."""
     height, width, _ = picture.shape
     for axis in range(2):
         lines, length = (height, width) if axis == 0 else (width, height)

@@ -38,7 +38,7 @@ SHADED = 120.0
 """Distance up to which bodies out of view are listed, for their shadows and head lights [m]."""
 
 LIGHTS_BELOW = 6.0
-"""Altitude of the sun below which cars drive with their lights on [degrees]; in rain and fog they do so, too."""
+"""Altitude of the sun below which cars drive with their lights on [degrees]; also in rain and fog."""
 
 _LIGHTS_IN_RAIN, _LIGHTS_IN_FOG = 25.0, 25.0  # precipitation and density of fog from which on [%]
 _COLOURS = {LightColour.GREEN: Colour.GREEN, LightColour.YELLOW: Colour.YELLOW, LightColour.RED: Colour.RED}

@@ -130,7 +130,7 @@ def _sample(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) 
 def _place_of(upper: NDArray[np.int32], lower: NDArray[np.int32], x: int, k: int) -> tuple[float, float, float]:
     """Returns the middle and the share of the samples of a pixel that see the triangle of sample k.
 
-    The share is 0 if an earlier sample sees it, too.
+    The share is 0 if an earlier sample already sees it.
     """
     number, across, down, count = _sample(upper, lower, x, k), 0, 0, 0
     for j in range(4):

@@ -72,7 +72,7 @@ class SessionScene:
 
     @cached_property
     def camera_scene(self) -> CameraScene:
-        """What a camera needs besides the overlay."""
+        """Data that a camera needs besides the overlay."""
         town, assets = self.town, camera_assets()
         blades = int(town.mesh.textures.max(initial=0)) + 1 - STREET_NAMES
         names = [*self.street_names, *[""] * (blades - len(self.street_names))]

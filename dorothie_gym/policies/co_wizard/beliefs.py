@@ -1,4 +1,4 @@
-"""Beliefs of the scripted Co-Wizard about destinations, and the updates that tell the environment of them."""
+"""Beliefs of the scripted Co-Wizard about destinations, and the updates that report them to the environment."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ class BeliefState:
         updates: belief updates (mental actions) to be sent, the next first.
         told: purposes of errands that the participant has told, the latest last.
         sent_goal: landmark of the last goal update with a guessed place.
-        owner: person whose house the goal is, as the participant has told; None if it is none, or nobody's by name.
+        owner: person whose house the goal is, as the participant has told; None if it is not a house, or a house
+            without a named owner.
     """
 
     goal: LandmarkName | None = None

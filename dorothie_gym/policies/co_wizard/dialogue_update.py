@@ -100,7 +100,7 @@ def listen(state: CoWizardState, view: CoWizardView, rng: np.random.Generator) -
 
 
 def _still_due(state: CoWizardState) -> tuple[Remark, ...]:
-    """Returns the queued remarks without own questions and plans, which what was heard may have settled."""
+    """Returns the queued remarks without the Co-Wizard's questions and plans, which the utterance may have settled."""
     kept: list[Remark] = []
     dropped = False
     for item in state.speech.queue:
@@ -137,7 +137,7 @@ def _is_plain_sign(item: Remark) -> bool:
 
 
 def _tells_plan(item: Remark) -> bool:
-    """Returns whether a remark tells a plan that nobody has asked for."""
+    """Returns whether a remark states a plan without being asked."""
     plan = any(said.predicate in _PLANS for said in item.meaning)
     return item.act.move is DialogueMove.EXPLAIN and plan and GoalStatus.UNKNOWN not in item.act.slots
 

@@ -1,4 +1,4 @@
-"""Memory of the Co-Wizard for the errands that the participant tells about, and remarks that come back to them."""
+"""Memory of the Co-Wizard for the errands that the participant mentions, and later remarks about them."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def note_owner(state: CoWizardState, heard: HeardUtterance) -> None:
 
 
 def _told(state: CoWizardState, heard: HeardUtterance) -> Proposition | None:
-    """Returns what an utterance tells about an errand: its thing, or its person; None if it tells neither."""
+    """Returns what an utterance says about an errand: its item, or its person; None if it mentions neither."""
     if not any(act.move in _TELLING for act in heard.acts) or any(_OVER & act.slots for act in heard.acts):
         return None
     named = [value for act in heard.acts for value in act.values(Slot.LANDMARK)]

@@ -181,7 +181,7 @@ _BELIEFS: Final[dict[Predicate, Belief]] = {
 
 
 def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | None:
-    """Returns why the car stands now, as the Co-Wizard knows from what it does; None if it cannot tell."""
+    """Returns why the car stands now, as the Co-Wizard knows from what it does; None if it does not know."""
     intentions, commands, goal = state.intentions, state.commands, state.beliefs.goal
     resting = view.time < commands.rest_until
     hazard = view.hazard if view.motion is Motion.HAZARD else commands.rest_for if resting else ObjectClass.UNLABELED
@@ -207,7 +207,7 @@ def reason_to_stand(state: CoWizardState, view: CoWizardView) -> Proposition | N
 
 
 def reason_to_turn_round(state: CoWizardState, view: CoWizardView) -> Proposition | None:
-    """Returns why the car turns round now; None if the Co-Wizard cannot tell."""
+    """Returns why the car turns round now; None if the Co-Wizard does not know."""
     goal = state.beliefs.goal
     told = view.time - state.dialogue.u_turn_instructed_at < state.config.wish_time + OBEYED_WITHIN
     if state.intentions.wish is Wish.U_TURN or told:

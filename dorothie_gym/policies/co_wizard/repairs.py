@@ -97,7 +97,7 @@ def note_contradiction(state: CoWizardState, view: CoWizardView, action: ActionV
 
 
 def check_goal(state: CoWizardState, view: CoWizardView) -> None:
-    """Checks a destination against whose route instructions were given; if they go on, gives up its place.
+    """Checks a destination against whose route instructions were given; if they continue, gives up its place.
 
     The name may be right and the place wrong: there are several houses.
     """

@@ -294,7 +294,7 @@ class Intentions:
         return replace(self, nudge=place, halted=False)
 
     def proceeding(self) -> Intentions:
-        """Carries out an instruction to go on along the lane."""
+        """Carries out an instruction to continue along the lane."""
         return replace(self, halted=False, arrived=False, creeping=False, wish=None)
 
     def creeping_up(self) -> Intentions:

@@ -31,7 +31,7 @@ class CoWizardView:
         speed: speed of the car [m/s].
         lane: lane of the car, corrected by the turn options.
         station: distance along the lane, corrected by the turn options [m].
-        speaking: remaining duration of the own utterance [s].
+        speaking: remaining duration of its own utterance [s].
         other_speaking: whether the other speaker is talking.
         motion: state of motion.
         hazard: class of what the car brakes or stands for; UNLABELED for nothing.

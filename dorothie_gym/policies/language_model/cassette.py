@@ -59,7 +59,7 @@ class Cassette:
         path: the file; created with the first call if it is missing.
 
     Raises:
-        PolicyLoadError: the file cannot be read, or a line is no recorded call.
+        PolicyLoadError: the file cannot be read, or a line is not a recorded call.
     """
 
     def __init__(self, path: Path) -> None:

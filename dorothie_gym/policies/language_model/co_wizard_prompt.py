@@ -41,7 +41,7 @@ SHOWN_OBJECTS = 6
 """Number of objects in sight that a prompt shows."""
 
 SHARED_NAMES = (LandmarkName.HOUSE, LandmarkName.PERSON)
-"""Names of several places, of which some may be missing from the map."""
+"""Names of several places, some of which may be missing from the map."""
 
 STRAIGHT_ANGLE = 180
 """Index of the angle 0 in the mask of angles."""

@@ -22,7 +22,7 @@ class SimulatedTime(enum.StrEnum):
     WAITS = "waits"
     """Simulated time stands still: an answer takes effect in the decision in which it was asked for."""
     CHARGED = "charged"
-    """The session goes on: an answer takes effect after as much simulated time as the call took."""
+    """The session continues: an answer takes effect after as much simulated time as the call took."""
 
 
 @shared
@@ -30,7 +30,7 @@ class SimulatedTime(enum.StrEnum):
 class LanguageModelConfig:
     """Settings of a language model as a policy.
 
-    The key is no setting: the environment variable `OPENAI_API_KEY` is read at each call, and never recorded.
+    The key is not a setting: the environment variable `OPENAI_API_KEY` is read at each call, and never recorded.
 
     Attributes:
         model: name of the model, as the endpoint knows it.

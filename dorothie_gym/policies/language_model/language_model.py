@@ -28,7 +28,7 @@ class Prompt:
         text: what the role observes now.
         schema: schema of the answer.
         picture: picture of the camera as the address of a PNG (`data:image/png;base64,...`); empty for none.
-        seed: seed of sampling, which also tells equal prompts apart.
+        seed: seed of sampling, which also distinguishes equal prompts.
     """
 
     system: str
@@ -131,7 +131,7 @@ def _added(first: tuple[int, int], second: tuple[int, int]) -> tuple[int, int]:
 
 
 def _with_error(request: Mapping[str, object], text: str, error: CallError) -> dict[str, object]:
-    """Returns the request of the second attempt: the conversation goes on with the answer and what is wrong with it."""
+    """Returns the request of the second attempt: the conversation is continued by the answer and its error."""
     messages = list(request["messages"])  # type: ignore[call-overload]
     if text:
         messages.append({"role": "assistant", "content": text[:2000]})

@@ -53,7 +53,7 @@ class RouteStep:
         angle: turn angle, or 90 and -90 for a lane switch [degrees, positive left].
         distance: distance to where it takes place [m].
         due: whether it is to be commanded now.
-        place: what tells steps of one kind apart: the lane.
+        place: lane, which distinguishes steps of one kind.
     """
 
     action: PhysicalAction

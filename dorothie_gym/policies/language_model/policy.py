@@ -75,8 +75,9 @@ class LanguageModelState:
 class LanguageModelPolicy(Policy[LanguageModelState]):
     """Plays a role by asking a language model when something has happened.
 
-    A call that brings no answer, for whatever reason, is a silent action with a name (`Fault`): the role goes on as
-    before, and is asked again at the next event. With equal replies, as from a cassette, equal sessions follow.
+    A call that brings no answer, for whatever reason, is a silent action with a name (`Fault`): the role continues as
+    before, and the model is asked again at the next event. With equal replies, as from a cassette, equal sessions
+    follow.
     """
 
     reads_mask = True

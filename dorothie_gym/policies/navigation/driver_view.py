@@ -1,4 +1,4 @@
-"""Inputs of a driver of `Navigation-v0` in records: what the car's sensors, map and instructions tell.
+"""Inputs of a driver of `Navigation-v0` in records: information from the car's sensors, map and instructions.
 
 The records are filled from the arrays of a world (`look`), or from an observation of the Co-Wizard (`read_view`).
 """
@@ -159,7 +159,7 @@ def look(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: Driver
         town: arrays of the town.
         exits: exits of its junctions.
         world: arrays of the world.
-        driver: arrays of the driver, of which the view is written.
+        driver: arrays of the driver, whose view is written.
     """
     car, control, frame, view = world.vehicles[0], world.car[0], world.clock[0].frame, driver.inputs[0]
     view.time, view.speed, view.hazard = frame / FRAME_RATE, car.speed, control.hazard
@@ -200,7 +200,7 @@ def look(town: TownArrays, exits: ExitArrays, world: WorldArrays, driver: Driver
 
 @compiled
 def believed_junction(exits: ExitArrays, before: int, lane: int) -> int:
-    """Returns the lane before the next junction with a choice, as its turn options and the estimated pose tell it.
+    """Returns the lane before the next junction with a choice, from its turn options and the estimated pose.
 
     Args:
         exits: exits of the town's junctions.
@@ -208,7 +208,7 @@ def believed_junction(exits: ExitArrays, before: int, lane: int) -> int:
         lane: lane at the estimated pose.
 
     Returns:
-        The lane, or -1 where more options than are observed do not tell it, and the pose does not either.
+        The lane, or -1 if neither the options, of which there are more than observed, nor the pose determine it.
     """
     first = exits.first[before]
     if exits.alone[before]:

@@ -12,7 +12,7 @@ from dorothie_gym.policies.persona import Directions, Persona, within
 from dorothie_gym.policies.policy import replace
 
 BACKSEAT = 0.22
-"""Knowledge times talkativeness above which a participant guides to known places, too; two in five do."""
+"""Knowledge times talkativeness above which a participant also guides to known places; two in five do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +152,7 @@ class ParticipantStyle:
         names_street: probability that a street is added to a place or a turn.
         hurries: probability that the next task follows in the same breath as the report of the last.
         patience: standstill after which the reason is asked for [s].
-        chat: mean time between remarks beside the task [s].
+        chat: mean time between remarks unrelated to the task [s].
         waits: probability that a turn is announced only if the car asks, or shortly before the junction.
         hints: probability that a step is phrased as an explanation instead of an instruction.
         reasons: probability that a reason is given with a place or a step.
@@ -160,7 +160,7 @@ class ParticipantStyle:
         nods: probability that explanations of the car are acknowledged.
         curious: probability of a question why the car does something unexpected.
         notices: probability that a conspicuous change of the weather, or a crowd, is mentioned.
-        puzzled: probability that words of the car said during an own utterance have to be repeated.
+        puzzled: probability that words of the car said during the participant's utterance have to be repeated.
         points_out: probability that a car is stopped by the statement that this is the place.
         thanks: probability that an answer of the car is acknowledged.
         verifies: probability that a destination is followed by the question whether the car knows it.

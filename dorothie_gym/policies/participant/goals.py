@@ -81,7 +81,7 @@ def _report_done(
 
 
 def _wording_of_meeting(view: ParticipantView, subgoal: SeenSubgoal) -> Wording:
-    """Returns the wording of the report that somebody was picked up, or only met."""
+    """Returns the wording of the report that a person was picked up, or only met."""
     purpose = purpose_of(view, subgoal.index)
     picks_up = purpose is not None and purpose.action is not None and purpose.action.startswith("pick up")
     return Wording(topic="picked_up" if picks_up else "met")
@@ -321,7 +321,7 @@ def announcement(state: ParticipantState, view: ParticipantView, rng: np.random.
 
 
 _SPOKEN_OF = 15.0
-"""Time for which who was spoken of is understood as "she" [s]."""
+"""Time for which "she" refers to the person mentioned last [s]."""
 
 
 PURPOSES = 0.75
@@ -329,7 +329,7 @@ PURPOSES = 0.75
 
 
 def story_remark(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns what the target is for, or why it matters, as the story tells; nothing where the story does not."""
+    """Returns the purpose of the target, or its reason, from the story; nothing if the story gives none."""
     told, goal = purpose_of_target(state, view), state.task.goal
     if told is None or goal is None:
         return ()
@@ -374,12 +374,12 @@ def _as_afterthought(item: Remark) -> Remark:
 
 
 def purpose_of_target(state: ParticipantState, view: ParticipantView) -> Purpose | None:
-    """Returns the purpose of the target; None without a target, or if the list does not tell."""
+    """Returns the purpose of the target; None without a target, or if the list does not name it."""
     return None if state.task.target is None else purpose_of(view, state.task.target)
 
 
 def purpose_of(view: ParticipantView, index: int) -> Purpose | None:
-    """Returns the purpose of a subgoal, by its index; None if the list does not tell."""
+    """Returns the purpose of a subgoal, by its index; None if the list does not name it."""
     live = [subgoal.index for subgoal in view.subgoals if subgoal.live]
     return dict(zip(live, read_purposes(str(view.raw["tasks"])), strict=False)).get(index)
 

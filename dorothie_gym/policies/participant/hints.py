@@ -51,7 +51,7 @@ _FEELINGS = 0.25
 
 
 def hint(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> tuple[Remark, ...]:
-    """Returns a remark that helps to find the target or tells a feeling; nothing where all of it has been said."""
+    """Returns a remark that helps to find the target or expresses a feeling; nothing if all has been said."""
     felt = _feeling(state, view)
     if felt is not None and rng.random() < _FEELINGS:
         return (_said(state, felt),)
@@ -77,7 +77,7 @@ def is_in_mind(state: ParticipantState, view: ParticipantView) -> bool:
 
 
 def _can_name(fact: Proposition) -> bool:
-    """Returns whether a fact can be said with the name of the place: not with that of another one besides."""
+    """Returns whether a fact can be said together with the name of the place: not if it names another place."""
     return fact.get("landmark") is None
 
 

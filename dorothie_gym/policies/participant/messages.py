@@ -43,7 +43,7 @@ def seconds_to_take_in(view: ParticipantView) -> float:
 def message_remark(
     state: ParticipantState, view: ParticipantView, landmark: SeenLandmark, rng: np.random.Generator
 ) -> tuple[Remark, ...]:
-    """Returns who has just sent a message about an errand, and why; nothing without a reason, or by chance."""
+    """Returns remarks on sender and reason of the last message about an errand; none without a reason, or by chance."""
     read = _message(view)
     if read is None or read.reason is None or len(read.reason) > LONGEST_REASON:
         return ()

@@ -1,4 +1,4 @@
-"""Orders of the participant: what the car is to do, asked for, answered, or said again."""
+"""Orders of the participant: actions and destinations that it requests, gives as answers, or repeats."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def order(
     place: LandmarkName | None = None,
     urgent: bool = False,
 ) -> Remark:
-    """Returns the remark that the car is to carry out an action.
+    """Returns the remark that instructs the car to carry out an action.
 
     Args:
         move: an instruction, an answer to an open question, or a clarification.

@@ -1,4 +1,4 @@
-"""Remarks of the participant about weather, obstacles, standstills, and beside the task."""
+"""Remarks of the participant about weather, obstacles, standstills, and subjects unrelated to the task."""
 
 from __future__ import annotations
 
@@ -257,7 +257,7 @@ def _wonder(state: ParticipantState, view: ParticipantView, rng: np.random.Gener
 
 
 def _chat(state: ParticipantState, view: ParticipantView, rng: np.random.Generator) -> None:
-    """Says something beside the task when no step of the guidance is near."""
+    """Makes a remark unrelated to the task when no step of the guidance is near."""
     progress = state.route.progress
     if view.time < state.conversation.chat_at or view.standing or progress is None or state.task.goal is None:
         return

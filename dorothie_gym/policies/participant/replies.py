@@ -67,7 +67,7 @@ _AT_ONCE = frozenset({ActionValue.STOP, ActionValue.START, ActionValue.SPEED_CHA
 """Actions that are wanted at once and are not steps of the way."""
 
 _GARBLED_WHERE = re.compile(r"(so|and|now|well|okay|,| )*where\b")
-"""Beginning of a question for the destination of which no more was understood."""
+"""Beginning of a question for the destination, the rest of which was not understood."""
 
 _CLAIMS_ARRIVAL = re.compile(r"\b(here|here's|arrived|reached|this is|that's|we're at|we are at)\b")
 """Words by which the car says that it has come to a place."""

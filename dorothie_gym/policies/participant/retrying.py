@@ -86,7 +86,7 @@ def stop_circling(state: ParticipantState, view: ParticipantView) -> None:
 
 
 def why_standing(state: ParticipantState, view: ParticipantView) -> Remark:
-    """Returns the question why the car stands although it was told to drive on, instead of telling it a third time."""
+    """Returns the question why the car stands, instead of a third instruction to drive on."""
     stands = Proposition.of(Predicate.STANDS, action=ActionValue.STOP)
     state.conversation = state.conversation.after_asking_why(view.time)
     return intend(CommunicativeFunction.SET_QUESTION, stands)

@@ -25,14 +25,14 @@ StepKey: TypeAlias = tuple[str, int, int]
 
 @dataclass(frozen=True, kw_only=True)
 class ConversationState:
-    """Course of the conversation beside the guidance.
+    """Course of the conversation apart from the guidance.
 
     Attributes:
         heard_at: time of the last utterance of the car [s].
         puzzled_by: utterance of the car that was not understood and has to be repeated.
         asked_at: time of the last question why the car stands [s].
         wondered_at: time at which unexpected behaviour was last asked about or ignored [s].
-        chat_at: time of the next remark beside the task [s].
+        chat_at: time of the next remark unrelated to the task [s].
         lights_at: time at which the head lights were last mentioned [s].
         slowed: whether a lower speed for the weather has been requested or was not needed.
         bad_weather_since: start of the present bad weather [s]; infinite in good weather.
@@ -72,7 +72,7 @@ class ConversationState:
         return replace(self, wondered_at=now)
 
     def with_next_chat(self, at: float) -> ConversationState:
-        """Sets the time of the next remark beside the task [s]."""
+        """Sets the time of the next remark unrelated to the task [s]."""
         return replace(self, chat_at=at)
 
     def after_mentioning_lights(self, now: float) -> ConversationState:
@@ -109,7 +109,7 @@ class ConversationState:
 
 @dataclass(frozen=True, kw_only=True)
 class TaskProgress:
-    """Subgoals, and the target: the subgoal that the car is to do now.
+    """Subgoals, and the target: the car's current subgoal.
 
     Attributes:
         subgoals: subgoals at the last decision.

@@ -216,7 +216,7 @@ def go_first(name: LandmarkName) -> Remark:
 
 
 def _answer_street(state: ParticipantState, view: ParticipantView, act: DialogueAct) -> None:
-    """Accepts a detour that is the participant's own, and insists on the own one otherwise."""
+    """Accepts a detour that is the participant's own; otherwise insists on the participant's."""
     own = first_new_street(view.raw, state.town, view.lane, state.route.progress)
     proposed = act_builders.action(None, street=next(v for v in act.values(Slot.STREET) if isinstance(v, StreetName)))
     if own is None or own in act.values(Slot.STREET):

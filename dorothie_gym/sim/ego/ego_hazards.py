@@ -46,7 +46,7 @@ REACHED = 0.2
 """Overlap with the new lane from which on a switching ego is in the way there [m]."""
 
 BESIDE_EGO = 7.0
-"""Distance ahead and behind within which vehicles are beside the ego [m]; those within a second behind, too."""
+"""Distance ahead and behind within which vehicles are beside the ego [m]; as are those within a second behind."""
 
 BEFORE_IT = 0.5
 """Distance before the beginning of a manoeuvre at which the ego waits [m]."""

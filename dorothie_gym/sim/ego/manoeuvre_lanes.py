@@ -26,7 +26,7 @@ LAID = 180.0
 """Length of path that is laid ahead [m]: more than `LEAST_PATH`, so that it is seldom laid again."""
 
 SWITCH_COST = 20.0
-"""Misfit by which an exit of the own lane is preferred to that of a lane beside it [degrees]."""
+"""Misfit by which an exit of the car's lane is preferred to that of an adjacent lane [degrees]."""
 
 SETTLE = 15.0
 """Way along a newly entered lane before it is changed, where there is room [m]."""

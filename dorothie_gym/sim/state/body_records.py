@@ -39,7 +39,7 @@ class PlacedBody(Protocol):
 
 
 class SizedBody(PlacedBody, Protocol):
-    """A record of a vehicle, prop or perceived body: its outline, too."""
+    """For a vehicle, prop or perceived body, also its outline."""
 
     length: float
     width: float

@@ -73,7 +73,7 @@ class LineMarkRecord:
 
 
 class WatchRecord:
-    """Watch over the rules: breaches so far by `codes.Breach`, and the last frame of those that go on for a while."""
+    """Watch over the rules: breaches so far by `codes.Breach`, and the last frame of lasting ones."""
 
     counts: Annotated[NDArray[np.int64], "i8", (len(Breach),)]
     last: Annotated[NDArray[np.int64], "i8", (len(Breach),)]

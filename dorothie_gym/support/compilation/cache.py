@@ -166,7 +166,7 @@ class ContentCache(FunctionCache):  # type: ignore[misc]  # numba has no type in
         return f"{module}.{self._py_func.__qualname__}-".replace("<", "").replace(">", "")
 
     def _delete_others(self) -> None:
-        """Deletes files of other versions of the function, and parts of files, that nobody has used for `KEPT`."""
+        """Deletes files of other versions of the function, and parts of files, that were not used for `KEPT`."""
         assert self._folder is not None
         for file in self._folder.glob(f"{self._stem()}*"):
             if file.suffix in (ENDING, _OLD_ENDING, PART) and not self._is_current(file):

@@ -55,7 +55,7 @@ SHARES: Final[Mapping[str, str]] = MappingProxyType(
         "loops": "sessions without an order given three times at one place, unremarked",
     }
 )
-"""Titles of the figures besides those of the exceptions."""
+"""Titles of the figures except those of the exceptions."""
 
 _EXCEPTIONS: Final = "exceptions/"
 
@@ -67,7 +67,7 @@ class TalkChecks:
     Attributes:
         right: number of cases that are right, by figure; exceptions as "exceptions/KIND".
         cases: number of cases that can be decided.
-        unperceived: number of exceptions that nobody could perceive, by kind.
+        unperceived: number of exceptions that no role could perceive, by kind.
     """
 
     right: Counter[str] = field(default_factory=Counter)
@@ -212,7 +212,7 @@ def _check_exceptions(checks: TalkChecks, session: Session, world: SessionWorld 
 
 
 def mentions_story(session: Session) -> bool | None:
-    """Returns whether somebody says a name or a thing of the story; None if the story has neither."""
+    """Returns whether a speaker mentions a name or a thing from the story; None if the story has neither."""
     texts = (session.header.story, *(str(row["description"]) for row in session.header.subgoals))
     things = (item for text in texts for item in find_items(text))
     wanted = {words.casefold() for words in (*read_people(*texts), *things)}

@@ -66,7 +66,7 @@ class _Order(NamedTuple):
 
 
 def has_loop(session: Session) -> bool:
-    """Returns whether a speaker gives an order `SAME_ORDERS` times at one place, and nobody remarks on it.
+    """Returns whether a speaker gives an order `SAME_ORDERS` times at one place without a remark on it.
 
     Indirect orders count ("we should be turning left"). A remark about the repetition, or another errand, begins a new
     count. Where no place is recorded, all orders about one errand count as given at one place.

@@ -28,7 +28,7 @@ TIME_FACTOR: Final = 1.5
 """Largest ratio of a claimed and an actual time that agree; times up to `SHORT_TIME` agree in any case."""
 
 SHORT_TIME: Final = 15.0
-"""Differences of times that nobody minds [s]."""
+"""Largest irrelevant difference of times [s]."""
 
 _POOR, _GOOD = 50.0, 65.0  # ranges of sight that are poor and good [m]
 _SIGHT_ERROR: Final = 10.0  # error of a range of sight that agrees [m]
@@ -49,7 +49,7 @@ Evaluator = Callable[[SessionWorld, Proposition, float, Role], bool | None]
 
 
 def is_true(world: SessionWorld, said: Proposition, time: float, speaker: Role) -> bool | None:
-    """Returns whether a proposition is true; None if the record cannot tell.
+    """Returns whether a proposition is true; None if the recording does not determine it.
 
     Args:
         world: the recorded world.
@@ -63,7 +63,7 @@ def is_true(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
 
 
 def is_right_cause(world: SessionWorld, cause: Proposition, effect: Proposition | None, time: float) -> bool | None:
-    """Returns whether a cause held when its effect did, at a time [s]; None if the record cannot tell."""
+    """Returns whether a cause held when its effect did, at a time [s]; None if the recording does not determine it."""
     evaluator = _CAUSES.get(cause.predicate)
     if evaluator is None:
         return None

@@ -294,7 +294,7 @@ def _now(columns: Columns, table: PointTable, chosen: NDArray[np.int64], size: i
 
 
 def _objects(columns: Columns, look: Ints, size: int) -> tuple[Ints, Reals, Flags]:
-    """Returns kind, values and mask of the nearest objects of looks of any shape; -1 is no look."""
+    """Returns kind, values and mask of the nearest objects of looks of any shape; -1 means no look."""
     starts = columns.looks.start
     none = look < 0
     safe = np.where(none, 0, look)

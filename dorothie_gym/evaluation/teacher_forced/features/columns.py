@@ -262,7 +262,7 @@ class Columns:
         texts: every distinct text: utterances, recognised words, names of streets and landmarks.
         towns: towns of the sessions, by name.
         unreadable: sessions that could not be read, (name, reason) each.
-        unpointed: flagged events that are no point, (session, event, reason) each.
+        unpointed: flagged events that are not points, (session, event, reason) each.
     """
 
     key: str

@@ -160,7 +160,7 @@ def pedestrian_model(walker: PedestrianRecord, distance: float) -> int:
 
 @compiled
 def prop_model_index(prop: PropRecord) -> int:
-    """Returns the model of a prop, which its size tells."""
+    """Returns the model of a prop, which is determined by its size."""
     for k in range(_PROPS):
         if _PROP_SIZES[k, 0] == prop.length and _PROP_SIZES[k, 1] == prop.width:
             return FIRST_PROP + k

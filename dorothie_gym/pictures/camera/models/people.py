@@ -18,7 +18,7 @@ PHASES = 8
 """Phases of a walking cycle of two steps."""
 
 STANDING = PHASES
-"""Pose of somebody who stands, after the phases."""
+"""Pose of a standing person, after the phases."""
 
 POSES = PHASES + 1
 

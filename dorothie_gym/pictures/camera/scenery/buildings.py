@@ -104,7 +104,7 @@ class Building:
 
     Attributes:
         centre: (x, y) [m].
-        heading: direction of somebody who looks at its front from the street [rad].
+        heading: viewing direction of a person who looks at its front from the street [rad].
         length: along the street [m].
         depth: away from it [m].
         storeys: number of storeys.

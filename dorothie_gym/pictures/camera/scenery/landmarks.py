@@ -113,7 +113,7 @@ class _Works:
         colour: Rgb = (255, 255, 255), turned: float = 0.0, kind: ObjectClass = ObjectClass.BUILDING,
         surface: Surface = Surface.NONE,
     ) -> None:  # fmt: skip
-        """Adds an upright panel around a place, read from the street, or by somebody turned from there [rad].
+        """Adds an upright panel around a place, read from the street, or by a viewer turned from there [rad].
 
         Panels with names and pictograms are lit signs.
         """
