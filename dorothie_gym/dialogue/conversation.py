@@ -1,4 +1,4 @@
-"""Utterances and their timing: spoken while they are in the air, delivered when the last word is over."""
+"""Utterances and their timing: in progress while they are spoken, delivered after the last word."""
 
 from __future__ import annotations
 

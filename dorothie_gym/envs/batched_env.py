@@ -100,7 +100,7 @@ class BatchedEnv(Restorable, Generic[C, B]):
     # --- States -------------------------------------------------------------------------------------------------------
 
     def mutable_values(self) -> dict[str, object]:
-        """Returns what changes in the environments."""
+        """Returns the changing values of the environments."""
         return {**super().mutable_values(), "batches": [batch.mutable_values() for batch in self.batches]}
 
     def apply_values(self, values: dict[str, object]) -> None:

@@ -47,7 +47,7 @@ def check_extent(town: Town, source: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class TownIdentity:
-    """What distinguishes a town from others.
+    """Identity of a town.
 
     Attributes:
         name: its name.

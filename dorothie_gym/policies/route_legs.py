@@ -118,8 +118,8 @@ def needs_switch(
 ) -> bool:
     """Returns whether a lane change before a junction has to be commanded apart from the turn.
 
-    Without it the car would reach another junction, run into what blocks its lane, or cross the junction in its
-    own lane and come out beside a goal that is right behind it.
+    Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its own
+    lane and end up next to a goal right behind the junction.
 
     Args:
         tables: lanes and exits.

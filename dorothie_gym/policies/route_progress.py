@@ -314,8 +314,8 @@ class RouteProgress:
     def needs_switch(self, town: Town, lane: int, station: float, crossing: RouteJunction) -> bool:
         """Returns whether a lane change before a junction has to be commanded apart from the turn.
 
-        Without it the car would reach another junction, run into what blocks its lane, or cross the junction in its
-        own lane and come out beside a goal that is right behind it.
+        Without it the car would reach another junction, run into an obstacle on its lane, or cross the junction in its
+        own lane and end up next to a goal right behind the junction.
         """
         tables = route_tables(town)
         wanted = int(tables.rows[crossing.lane]) + town.exits(crossing.lane).index(crossing.exit)
@@ -342,7 +342,7 @@ MOST_AVOIDED = 3
 
 @dataclass(frozen=True, kw_only=True)
 class RouteState:
-    """Route of an agent, and what it knows about places that the planner must not use.
+    """Route of an agent, and known places that the planner must not use.
 
     Attributes:
         progress: route to the goal and the progress on it; None without a place to go to.
@@ -375,7 +375,7 @@ class RouteState:
         return replace(self, progress=self.progress.replanned(town, start, self.closed))
 
     def has_missed(self, before: float, station: float) -> bool:
-        """Returns whether the goal, `before` metres ahead on the former route, now needs a long way round."""
+        """Returns whether the goal, `before` metres ahead on the former route, now needs a long detour."""
         assert self.progress is not None
         return before < NEAR_MISS and self.progress.left(station) > before + WAY_ROUND
 

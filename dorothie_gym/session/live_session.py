@@ -65,7 +65,7 @@ def world_seed_of(scenario: Scenario) -> np.random.SeedSequence:
 
 
 class StepBegun(NamedTuple):
-    """What the end of a decision needs to know of its beginning.
+    """State from the beginning of a decision that its end needs.
 
     Attributes:
         message: message of the Ad-Wizard.
@@ -95,7 +95,7 @@ class LiveSession:
         trail: positions of the ego [m], one for each decision.
         decisions: decisions played so far.
         over: whether the session is closed.
-        camera_perception: what the picture shows, if the roles see by the camera.
+        camera_perception: objects in the picture, with perception by the camera.
     """
 
     def __init__(
@@ -198,12 +198,12 @@ class LiveSession:
         )
 
     def share_views(self, arrays: RoleArrays, row: int) -> None:
-        """Makes the session, which has not been observed yet, write observations and masks into a row of arrays."""
+        """Redirects observations and masks of a session that has not been observed yet to a row of arrays."""
         self._views = SessionViews(self.world, arrays, row)
         self.write_views()
 
     def write_views(self) -> None:
-        """Writes all of the session's observations and masks that the compiled code does not, and what it reads."""
+        """Writes the observations and masks that the compiled code does not write, and the inputs of that code."""
         self.world.write_weather()
         self._observations.write(self._delivered)
         self.masks.write()
@@ -214,7 +214,7 @@ class LiveSession:
         self._views.write(EVERYTHING)
 
     def observations(self, roles: Sequence[Role] = AGENT_ROLES) -> dict[str, Observation]:
-        """Builds the observations of some roles, by agent; what several of them need is computed once."""
+        """Builds the observations of some roles, by agent; shared values are computed once."""
         observations = self._observations.build(self._delivered, roles)
         if self.camera_perception is not None:
             self.camera_perception.add_to(observations)
@@ -268,12 +268,12 @@ class LiveSession:
         return self._dialogue.in_progress
 
     def give_voices(self, pitches: Mapping[Role, float]) -> None:
-        """Gives speakers a pitch of their own, by role, before the first of them speaks."""
+        """Sets the pitch of speakers by role, before the first of them speaks."""
         self._dialogue.give_voices(pitches)
 
     @property
     def recordings(self) -> Mapping[str, Samples]:
-        """Audio of the spans that were over at the last decision, at 16 kHz, by file name; none without speech."""
+        """Audio of the spans that were over at the last decision, at 16 kHz, by file name; empty without speech."""
         return self._dialogue.recordings
 
     @property
@@ -354,7 +354,7 @@ class LiveSession:
     # --- consequences -----------------------------------------------------------------------------------------------
 
     def note_place(self) -> None:
-        """Notes the place of the ego at a decision."""
+        """Records the place of the ego at a decision."""
         self.trail.append(self._ego_position())
 
     def note_arrivals(self) -> None:
@@ -378,7 +378,7 @@ class LiveSession:
         return DeliveredMessages(said=said, heard=heard, message=message, speaking=self._dialogue.speaking(now))
 
     def _cabin(self) -> CabinState:
-        """Returns what makes noise in the car."""
+        """Returns the noise sources in the car."""
         weather = self.world.weather.values
         return CabinState(
             speed=abs(float(self.world.car.speed)),

@@ -113,7 +113,7 @@ class SessionEngine(Restorable):
         """Begins a session.
 
         Args:
-            seed: seed of the scenario; None takes the next number of the series that the last given seed began.
+            seed: seed of the scenario; None takes the next number after the seed of the previous session.
             scenario: played in place of a drawn one; its seed is then the session's.
 
         Raises:
@@ -266,7 +266,7 @@ class SessionEngine(Restorable):
 
     @property
     def last_recordings(self) -> Mapping[str, Samples]:
-        """Audio of the spans that were over at the last decision, at 16 kHz, by file name; none without speech."""
+        """Audio of the spans that were over at the last decision, at 16 kHz, by file name; empty without speech."""
         return self.session.recordings
 
     @property

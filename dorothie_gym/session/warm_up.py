@@ -59,7 +59,7 @@ def is_warm() -> bool:
 
 
 def warm_up(progress: Progress | None = None, *, everything: bool = False) -> None:
-    """Compiles what sessions need and is not yet in the cache.
+    """Compiles the functions of sessions that are not yet in the cache.
 
     Args:
         progress: called when the compilation of a function begins, perhaps in another thread.

@@ -203,7 +203,7 @@ def add_prop(
         network: of the town.
         town: its arrays.
         world: arrays of the world.
-        kind: what it is.
+        kind: kind of the prop.
         lane: id of the lane.
         station: along it [m].
 

@@ -110,7 +110,7 @@ class TownRoad(CachedViews, Road):
                 things[i].handle_collisions(things[j], dt)
 
     def _near_pairs(self, things: Sequence[RoadObject], dt: float) -> list[tuple[int, int]]:
-        """Pairs of a vehicle and what comes after it in `things` that may touch within `dt`, in highway-env's order."""
+        """Pairs of a vehicle and a later element of `things` that may touch within `dt`, in highway-env's order."""
         count = len(self.vehicles)
         if not count:
             return []

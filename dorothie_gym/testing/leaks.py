@@ -84,7 +84,7 @@ class Compared(NamedTuple):
 
 
 def check_hidden_landmarks(env: ParallelSession, play: Play, seed: int, decisions: int) -> Compared:
-    """Checks that hidden landmarks at other sites change nothing that the Co-Wizard observes.
+    """Checks that the Co-Wizard's observations do not depend on the sites of hidden landmarks.
 
     Args:
         env: see `check_observations_do_not_leak`.
@@ -122,7 +122,7 @@ _Played = TypeVar("_Played")
 
 
 def _with_views(env: ParallelSession, playing: Iterator[_Played]) -> tuple[list[_Played], list[bool]]:
-    """Returns what a session yields, and at each decision whether a sample of a picture is one of a hidden landmark."""
+    """Returns the results of a session, and for each decision whether a picture has a sample of a hidden landmark."""
     played, views, cameras = list[_Played](), list[bool](), list[SessionCamera]()
     for decision in playing:
         session = env.unwrapped.session

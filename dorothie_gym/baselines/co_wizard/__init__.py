@@ -2,7 +2,7 @@
 
 Rules read the words, plan the route, answer questions from evidence, and word the remarks.
 
-`memory` is what it remembers, `hearing` what it hears, `features` what it sees, `remarks` what it can say, `network`
-the network, `teacher` the scripted Co-Wizard whose decisions it imitates, `demonstrations`, `fitting` and `training`
-the training, and `policy` the player.
+`memory` holds its memory, `hearing` its inputs from speech, `features` its other inputs, `remarks` its possible
+remarks, `network` the network, `teacher` the scripted Co-Wizard whose decisions it imitates, `demonstrations`,
+`fitting` and `training` the training, and `policy` the player.
 """

@@ -78,7 +78,7 @@ def answer_to(utterance: Utterance | None, memory: Memory, view: CoWizardView) -
 
 
 def _verified(utterance: Utterance, memory: Memory) -> Proposition | None:
-    """Returns what a yes/no question asks; a check that names no more is about the present goal."""
+    """Returns the proposition of a yes/no question; a check that names no more is about the present goal."""
     if utterance.asks is not DialogueMove.CHECK:
         return utterance.asked
     if utterance.places:

@@ -77,7 +77,7 @@ class Pupil:
     def decide(
         self, observation: ObservationMapping, on_example: OnExample, turn: Turn | None = None
     ) -> tuple[Scene, Memory, Lesson]:
-        """Lets the teacher decide, and hands on the example; returns scene, memory after listening, and lesson.
+        """Lets the teacher decide, and passes on the example; returns scene, memory after listening, and lesson.
 
         Args:
             observation: observation of the Co-Wizard, with its action mask.
@@ -107,7 +107,7 @@ class Pupil:
 
 
 def follow(session: Session, town: Town, on_example: OnExample) -> None:
-    """Simulates a recorded session of scripted roles again, and hands on the examples of its Co-Wizard.
+    """Simulates a recorded session of scripted roles again, and passes on the examples of its Co-Wizard.
 
     Args:
         session: recorded session.
@@ -126,7 +126,7 @@ def follow(session: Session, town: Town, on_example: OnExample) -> None:
 def practise(
     player: LearnedCoWizard, engine: SessionEngine, seed: int, on_example: OnExample, *, share: float, talking: float
 ) -> None:
-    """Plays a session in which teacher and player take turns; hands on the teacher's decisions as examples.
+    """Plays a session in which teacher and player take turns; passes on the teacher's decisions as examples.
 
     Args:
         player: the player.
@@ -198,7 +198,7 @@ class _Practice:
         return replace(turn.action, speech=speech)
 
     def _correct(self, turn: Turn, memory: Memory, lesson: Lesson, on_example: OnExample) -> None:
-        """Hands on an example of how the player's memory gets back to the teacher's, if something was just heard.
+        """Passes on an example of how the player's memory gets back to the teacher's, if something was just heard.
 
         Without anything new, the network would learn to change a memory for no reason.
         """

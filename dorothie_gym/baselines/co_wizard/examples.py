@@ -30,7 +30,7 @@ class Example:
         goal: `GoalEvent`, or their number + position of the place among `listening.rows`; `UNKNOWN` if it is missing.
         status: status given to an errand.
         command: index of the command; `UNKNOWN` if it could not be commanded.
-        remarks: forms of the first two remarks; "" for none, None if it is not learnt from.
+        remarks: forms of the first two remarks; "" for none, None if it is not trained.
         weight: number of decisions that it stands for.
     """
 

@@ -194,7 +194,7 @@ class Memory:
         return memory._standing(view)._carrying_on(view)
 
     def _standing(self, view: CoWizardView) -> Memory:
-        """Brings the standstill and the reason for it up to date; a reason that cannot be told any more stays."""
+        """Brings the standstill and the reason for it up to date; a reason that can no longer be determined is kept."""
         if not view.standing:
             ended = self.stood_until if self.standing_since is None else view.time
             return replace(self, standing_since=None, stood_until=ended)

@@ -118,7 +118,7 @@ class _Scorer(nn.Module):
         self.last = nn.Linear(OPTION_WIDTH, 1)
 
     def forward(self, hidden: Tensor, options: Tensor, count: Tensor) -> Tensor:
-        """Returns the score of each option (b, k), minus infinity for those that are only filled in."""
+        """Returns the score of each option (b, k), minus infinity for padding."""
         both = torch.relu(self.hidden(hidden)[:, None, :] + self.option(options))
         scores = self.last(both).squeeze(2)
         missing = torch.arange(options.shape[1])[None, :] >= count[:, None]

@@ -1,4 +1,4 @@
-"""Remarks of the learned Co-Wizard: those of the corpus without their names, and where it takes the names from.
+"""Remarks of the learned Co-Wizard: those of the corpus without their names, and the sources of the names.
 
 A remark is an act with the propositions that it states or asks and the particulars of its words. In a form (`form_of`),
 each name of a place or street and each number is replaced by its source: the goal, a place just named, the street of an

@@ -1,7 +1,7 @@
 """The scripted Co-Wizard as a teacher: run alongside a session, it reports what it would do, remember and say.
 
-The teacher observes what the player observes. What the player did and said instead is put into its state (`drove`,
-`talked`), so that it continues from the player's situation, not from its own.
+The teacher has the player's observations. The player's actions and remarks are copied into its state instead of its own
+(`drove`, `talked`), so that it continues from the player's situation, not from its own.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from torch import nn
 from dorothie_gym.envs.navigation.dashboard import rows_of_dashboard
 
 STREET: Final = 256
-"""Numbers that describe what the camera sees."""
+"""Number of features of the camera picture."""
 
 DASHBOARD: Final = 64
 """Numbers that describe the dashboard."""

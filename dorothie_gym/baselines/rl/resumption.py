@@ -155,7 +155,7 @@ def state_of(model: Model) -> tuple[Page, Tensors]:
 
 
 def restore_state(model: Model, checkpoint: Checkpoint) -> None:
-    """Restores what `state_of` has returned in a model with new environments and a logger.
+    """Restores the state returned by `state_of` in a model with new environments and a logger.
 
     Raises:
         ModelFileError: the checkpoint does not fit the model, or an environment does not repeat its episode exactly.

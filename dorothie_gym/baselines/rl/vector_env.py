@@ -114,7 +114,7 @@ class WorkerVecEnv(VecEnv, ABC):
         return [by_number[k] for k in numbers]
 
     def _answers(self, workers: Iterable[int]) -> list[Answer]:
-        """Returns the answers of workers; waits for all of them before it raises the error of one."""
+        """Returns the answers of workers; waits for all of them before raising an error of any."""
         received = [self._receive(worker) for worker in workers]
         for succeeded, answer in received:
             if not succeeded:

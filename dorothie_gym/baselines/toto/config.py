@@ -46,7 +46,7 @@ ABLATIONS: Final[Mapping[str, tuple[Channel, ...]]] = MappingProxyType(
         "Map Knowledge": (Channel.MAP, Channel.TRAJECTORY),
     }
 )
-"""Inputs that ablations of TOTO remove, by what their rows are called; the object history includes the present."""
+"""Inputs that ablations of TOTO remove, named after their rows; the object history includes the present."""
 
 TextTraining = Literal["frozen", "trained"]
 
@@ -239,7 +239,7 @@ class TOTOConfig(HistorySizes):
 
     @classmethod
     def from_json(cls, fields: Mapping[str, Any]) -> Self:
-        """Reads what `to_json` returned.
+        """Reads the output of `to_json`.
 
         Raises:
             InputFileError: a field is unknown, missing, of another type or out of its range.

@@ -114,7 +114,7 @@ class DetectedBoxes:
 
     @functools.cached_property
     def digest(self) -> str:
-        """Digest of the weights and of the sources that draw pictures.
+        """Digest of the weights and of the source code that draws pictures.
 
         Raises:
             SessionError: the sources cannot be read.
@@ -133,7 +133,7 @@ class DetectedBoxes:
         return config.queries, config.size
 
     def actors(self, session: Session, town: Town) -> SceneTable:
-        """Returns what is found in pictures at the session's records of actors, as far as they are looked at.
+        """Returns the detections in pictures at those of the session's records of actors that are examined.
 
         That is the last record before each event, which models read at their points, and every fourth of the others,
         for the window before a point. Records outside the frames of the car get no objects.
@@ -160,7 +160,7 @@ class DetectedBoxes:
         return frames[before_events(frames, _event_frames(session))], self._recall(session, town)[1]
 
     def _recall(self, session: Session, town: Town) -> tuple[Rows, NDArray[np.float16]]:
-        """Returns what was found in a session, of `_KEPT_DTYPE`, and its queries; found now where none are kept."""
+        """Returns the detections in a session, of `_KEPT_DTYPE`, and its queries; computes them if necessary."""
         name = hashlib.sha256(f"{self.digest} {session.digest} {town.name}".encode()).hexdigest()
         paths = [self.detector / OBJECTS_FOLDER / f"{name}-{part}.npy" for part in ("objects", "queries")]
         rows, queries = (_read(path) for path in paths)
@@ -177,7 +177,7 @@ class DetectedBoxes:
     def _look(
         self, session: Session, town: Town, queried: NDArray[np.int64]
     ) -> tuple[NDArray[np.void], NDArray[np.float16]]:
-        """Returns what is found in a session, and the queries at some of its records, rising."""
+        """Returns the detections in a session, and the queries at some of its records, in rising order."""
         config = self._models[1].config
         camera = CameraConfig(width=config.width, height=config.height, outputs=(CameraOutput.RGB,))
         pictures = RecordedPictures(session, town, camera)
@@ -201,7 +201,7 @@ class DetectedBoxes:
     def _found_at(
         self, records: Sequence[int], pictures: RecordedPictures, frames: NDArray[np.int64]
     ) -> tuple[list[Rows], NDArray[np.float16]]:
-        """Returns what is found in the pictures of some records, each of `_KEPT_DTYPE`, and the queries (n, q, d)."""
+        """Returns the detections in the pictures of some records, each of `_KEPT_DTYPE`, and the queries (n, q, d)."""
         reader, detector = self._models
         drawn, views = [], []
         for record in records:

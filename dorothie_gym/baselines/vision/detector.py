@@ -143,7 +143,7 @@ class Targets:
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """What is found in B pictures.
+    """Detections in B pictures.
 
     Attributes:
         boxes: (B, q, 4) middle x and y, width and height, in widths and heights of the picture.
@@ -219,7 +219,7 @@ class Detector(nn.Module):
             last.bias.copy_(torch.tensor(_FIRST_SOLID))
 
     def forward(self, rgb: Tensor, depth: Tensor, semantic: Tensor) -> Detections:
-        """Returns what is found in pictures (B, 3, h, w) in [-1, 1], depths [m] and classes (B, h, w)."""
+        """Returns the detections in pictures (B, 3, h, w) in [-1, 1], depths [m] and classes (B, h, w)."""
         found = self.detr(pixel_values=self.encoded(rgb, depth, semantic))
         solids = solids_from(found.pred_boxes, self.solid_head(found.last_hidden_state))
         return Detections(found.pred_boxes, found.logits.sigmoid(), solids, found.last_hidden_state)

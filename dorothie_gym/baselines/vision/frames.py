@@ -198,7 +198,7 @@ class SessionFrames:
     Attributes:
         name: name of the session.
         town: name of its town.
-        key: hash of what determines the pictures.
+        key: hash of everything that determines the pictures.
         rgb: (n, h, w, 3) uint8.
         semantic: (n, h, w) uint8 `ObjectClass`.
         depth: (n, h, w) float16 distance along the axis of the camera [m], infinite for the sky.
@@ -282,7 +282,7 @@ class FrameSet:
 
     @property
     def key(self) -> str:
-        """Hash of what determines the pictures."""
+        """Hash of everything that determines the pictures."""
         return hashlib.sha256(" ".join(session.key for session in self.sessions).encode()).hexdigest()
 
 

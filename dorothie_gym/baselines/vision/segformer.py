@@ -18,7 +18,7 @@ from dorothie_gym.baselines.vision.frames import CLASSES
 from dorothie_gym.baselines.vision.libraries import transformers
 
 NEAREST, FARTHEST = 1.0, 200.0
-"""Range of the bins of depth [m]; what is farther falls into the last bin."""
+"""Range of the bins of depth [m]; larger depths fall into the last bin."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -48,11 +48,11 @@ class Event(enum.IntFlag):
     LOST = 4
     """The stage is `LOST`."""
     TOLD = 8
-    """An instruction changes what the Co-Wizard believes."""
+    """An instruction changes the Co-Wizard's beliefs."""
 
 
 EVENTS: Final = 2
-"""Column of `threads.turns_of` in which a thread notes the events of its environments."""
+"""Column of `threads.turns_of` in which a thread records the events of its environments."""
 
 
 class DriveRecord:

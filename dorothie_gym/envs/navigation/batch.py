@@ -1,4 +1,4 @@
-"""Batch of navigation sessions in one town: compiled decisions, with Python for what happens rarely."""
+"""Batch of navigation sessions in one town: compiled decisions, with Python for rare events."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _act_share, _guide_share = direct(act_share), direct(guide_share)
 class DrivingBatch(DrivingRows):
     """Sessions of one town in which only driving is left to the agents.
 
-    Compiled code plays the rows. Python handles what happens rarely: belief updates, exceptions of the Ad-Wizard,
+    Compiled code plays the rows. Python handles rare events: belief updates, exceptions of the Ad-Wizard,
     arrivals, new sessions.
     """
 
@@ -196,7 +196,7 @@ class DrivingBatch(DrivingRows):
     # --- Rare events --------------------------------------------------------------------------------------------------
 
     def _look(self, number: int) -> None:
-        """Updates what the ego sees after a change of weather or faults."""
+        """Updates the ego's view after a change of weather or faults."""
         world = self.catch_up(number).world
         world.write_weather()
         self._decisions["faulty"][number] = bool(world.faults)
@@ -269,7 +269,7 @@ class DrivingBatch(DrivingRows):
         self._live[number] = len(task.live)
 
     def _note_goal(self, number: int) -> None:
-        """Queues the belief updates for a goal: a place on the map, or one as far ahead as was said."""
+        """Queues the belief updates for a goal: a place on the map, or a place at the stated distance ahead."""
         face, state = self._face(number), self._decisions[number]
         said = plain(self._guidances.said)[number, 0]
         if state["fresh"]:

@@ -178,7 +178,7 @@ class DrivingVectorEnv(
         """Returns actions as an array; raises `ValueError` if they are none of the action space."""
 
     def _play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
-        """Plays a decision in the environments of a mask, and notes its outcome."""
+        """Plays a decision in the environments of a mask, and records its outcome."""
         for batch, members in zip(self.batches, self._members, strict=True):
             if playing[members].any():
                 batch.play(actions[members], playing[members])
@@ -187,7 +187,7 @@ class DrivingVectorEnv(
                     self._views[number].note(*self._places[number])
 
     def _start(self, seeds: Mapping[int, int], scenario: Scenario | None) -> None:
-        """Begins sessions of environments by their seeds, and notes observations and outcomes."""
+        """Begins sessions of environments by their seeds, and records observations and outcomes."""
         for batch, members in zip(self.batches, self._members, strict=True):
             own = {place: seeds[number] for place, number in enumerate(members.tolist()) if number in seeds}
             if own:
@@ -253,7 +253,7 @@ class DrivingVectorEnv(
         return {**infos, "final_obs": final, "_final_obs": over, "final_info": ended, "_final_info": over.copy()}
 
     def _infos(self, mask: NDArray[np.bool_]) -> Infos:
-        """Returns the infos of the environments of a mask; what belongs to the end of an episode is "" or 0 before."""
+        """Returns the infos of the environments of a mask; entries about the end are "" or 0 until then."""
         terms = {name: self._terms[:, k] for k, name in enumerate(TERMS)}
         infractions = {name: self._infractions[:, k] for k, name in enumerate(INFRACTIONS)}
         over = self._terminations | self._truncations

@@ -16,7 +16,7 @@ For an object on the road, the window starts again when the car comes near. A qu
 exchange that handles an object on the road belongs to it if it names no landmark; after an exchange that handles a task
 exception, a question for status or destination does. If several exceptions fit, the latest counts.
 
-Where people have marked what an exchange handles, their mark counts.
+If annotators have marked what an exchange handles, their mark counts.
 """
 
 from __future__ import annotations

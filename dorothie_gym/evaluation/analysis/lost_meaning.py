@@ -15,7 +15,7 @@ from dorothie_gym.speech.spoken_form import spoken_words
 from dorothie_gym.speech.spoken_understanding import readable
 
 REPAIRED_WITHIN: Final = 30.0
-"""Time after an utterance within which its meaning is repaired [s]; the car drives some 250 m meanwhile."""
+"""Time after an utterance within which its meaning is repaired [s]; the car drives about 250 m in this time."""
 
 ASKS: Final = frozenset(
     {
@@ -26,7 +26,7 @@ ASKS: Final = frozenset(
         DialogueMove.QUERY_YN,
     }
 )
-"""Moves by which a listener asks about what was said."""
+"""Moves by which a listener asks about an utterance."""
 
 _EMPTY: Final = frozenset({"Unknown", "Queried"})
 
@@ -60,8 +60,8 @@ class LostMeaning:
 def lost_meanings(session: Session) -> Iterator[LostMeaning]:
     """Yields, in order, the utterances that lost a detail in recognition.
 
-    Both the spoken and the recognised words are read by the parser, and the speaker must have meant what is read; so
-    neither errors of the parser nor missing marks count.
+    Both the spoken and the recognised words are read by the parser, and the speaker must have meant the result; so
+    neither parser errors nor missing marks count.
     """
     said = sorted(session.utterances(), key=lambda each: each.end)
     for place, utterance in enumerate(said):

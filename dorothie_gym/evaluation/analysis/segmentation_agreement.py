@@ -1,6 +1,6 @@
 """Agreement of annotators on the borders of units: exchanges, or transactions.
 
-Numbers of units are arbitrary, so what is compared are borders. A *site* is the place between two neighbouring spans of
+Numbers of units are arbitrary, so borders are compared. A *site* is the place between two neighbouring spans of
 a session; where annotators split an utterance differently, each of their borders is a site. A site is a border if the
 spans on its two sides belong to different units, or one of them to none. Kappa of such sites is the usual measure for
 the segmentation of dialogues (Carletta et al., Computational Linguistics 23(1), 1997).

@@ -1,7 +1,7 @@
-"""Cross-play: each of some Co-Wizards with each of some participants, over the same sessions.
+"""Cross-play: each of several Co-Wizards with each of several participants, over the same sessions.
 
-Self-play measures a pair that may have agreed on ways of its own; cross-play shows how a policy gets on with others
-(Carroll et al., NeurIPS 2019; Strouse et al., NeurIPS 2021).
+Self-play measures a pair that may have developed its own conventions; cross-play shows how a policy cooperates with
+others (Carroll et al., NeurIPS 2019; Strouse et al., NeurIPS 2021).
 """
 
 from __future__ import annotations

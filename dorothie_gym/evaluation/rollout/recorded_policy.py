@@ -17,7 +17,7 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 
 
 class RecordedPolicy(Policy[int]):
-    """Takes the actions that a role took in a recorded session, whatever it observes; its state is the frame.
+    """Takes the actions of a role in a recorded session, independently of its observations; its state is the frame.
 
     Args:
         session: session with recorded decisions.

@@ -72,7 +72,7 @@ def read_predictions(*paths: Path | str) -> tuple[TaskPredictions, ...]:
 
     Raises:
         PredictionError: a file is not a Parquet file, lacks a column, a column has another type, a value is not in the
-            vocabulary, or a point has two rows; the message names file and row (counted from 0) and what to do.
+            vocabulary, or a point has two rows; the message names file, row (counted from 0) and remedy.
         OSError: a file cannot be read.
     """
     found: dict[tuple[str, int, Task], list[TaskPredictions]] = {}

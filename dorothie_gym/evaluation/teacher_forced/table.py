@@ -116,7 +116,7 @@ class ResultsTable:
         return {name: estimate for name, estimate in found.items() if estimate.seeds}
 
     def findings(self) -> tuple[ModelFinding, ...]:
-        """Returns how the paper's findings come out here, and whether TOTO is above the floors and below others.
+        """Returns the outcomes of the paper's findings, and of those on TOTO, trivial baselines and other models.
 
         Others are the models that are neither the paper's nor floors nor ablations of TOTO.
         """

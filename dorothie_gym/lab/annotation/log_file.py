@@ -52,7 +52,7 @@ class Extent:
 
 
 def check_place(path: Path) -> None:
-    """Raises `AnnotationError` if a file or its folder is a link: what is written there would leave the session."""
+    """Raises `AnnotationError` if a file or its folder is a link, which may lead outside the session."""
     for place, kind in ((path.parent, "folder"), (path, "file")):
         if place.is_symlink():
             raise AnnotationError(
@@ -62,7 +62,7 @@ def check_place(path: Path) -> None:
 
 @contextmanager
 def appending(path: Path, whole: int) -> Iterator[BinaryIO]:
-    """Yields a file to append to; if that fails, what was appended is removed again.
+    """Yields a file to append to; if that fails, the appended part is removed again.
 
     Args:
         path: the file; it is created if it is missing, in a folder that exists.

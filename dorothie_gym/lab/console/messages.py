@@ -26,7 +26,7 @@ _Typed: TypeAlias = Annotated[str, Meta(max_length=MAX_TYPED)]
 
 
 class MessageError(DorothieGymError, ValueError):
-    """A message of a browser is malformed, or asks for what its seat does not offer."""
+    """A message of a browser is malformed, or asks for something that its seat does not offer."""
 
 
 class _Message(Struct, tag_field="k", tag=str.lower, forbid_unknown_fields=True, frozen=True):

@@ -37,7 +37,7 @@ def pin_rows(
     The columns are landmark, x, y [m], name on the map, x and y of the stopping place [m], and index of the street.
 
     Args:
-        pins: landmarks that the role knows; nothing else decides the names, so that they give no other one away.
+        pins: landmarks that the role knows; the names depend on nothing else, so they reveal no other landmarks.
         streets: name of each street.
         places: lanes of the town.
     """

@@ -13,15 +13,15 @@ from dorothie_gym.session.recording.events import Event, EventType
 class SpanRecordings:
     """Names of the recordings of the spans that people have said and that are not over yet.
 
-    The engine knows nothing of recordings. A span is found again by its speaker and words when its utterance is over;
-    spans of the same words are over in the order in which they were said.
+    The engine does not know about recordings. A span is found again by its speaker and words when its utterance is
+    over; spans of the same words are over in the order in which they were said.
     """
 
     def __init__(self) -> None:
         self._said: dict[Role, deque[tuple[str, str | None]]] = {}
 
     def say(self, role: Role, text: str, audio: str | None) -> None:
-        """Notes a span.
+        """Records a span.
 
         Args:
             role: speaker.

@@ -1,4 +1,4 @@
-"""Room of one session: seats, people who come and go, the session's clock, and what each seat is sent."""
+"""Room of one session: seats, arrivals and departures of people, the session's clock, and the messages to each seat."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Room:
         self._calls.append(Arrival(seat, connection))
 
     def leave(self, seat: Seat, connection: Connection) -> None:
-        """Notes at the next tick that a connection has ended."""
+        """Records at the next tick that a connection has ended."""
         self._calls.append(Departure(seat, connection))
 
     def receive(self, seat: Seat, connection: Connection, message: m.Incoming) -> None:
@@ -148,7 +148,7 @@ class Room:
     # --- a tick -----------------------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> list[Outgoing]:
-        """Handles what has come in, plays a decision if the session runs, and returns what is to be sent.
+        """Handles incoming messages, plays a decision if the session runs, and returns outgoing messages.
 
         Args:
             now: clock that does not jump [s].
@@ -166,7 +166,7 @@ class Room:
         return out
 
     def fail(self) -> list[Outgoing]:
-        """Gives the session up after an error of the program; its record stays as it was at the last decision."""
+        """Aborts the session after an internal error; its recording stays as it was at the last decision."""
         self.state, self.failed = RoomState.OVER, True
         if self.record is not None:
             try:

@@ -17,7 +17,7 @@ from dorothie_gym.session.spaces.actions import ActionMapping
 
 
 class RoomRecord:
-    """Record of a session in progress; what was recorded survives the death of the process.
+    """Recording of a session in progress; recorded data survive a crash of the process.
 
     Args:
         engine: an engine that has just been reset.
@@ -43,7 +43,7 @@ class RoomRecord:
         self._closed = False
 
     def say(self, role: Role, text: str, audio: str | None) -> None:
-        """Notes that a person says a span at the present decision.
+        """Records that a person says a span at the current decision.
 
         Args:
             role: speaker.

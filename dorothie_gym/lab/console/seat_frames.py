@@ -1,4 +1,4 @@
-"""Messages to the seats: everything to a browser that has just come, then what has changed, and pictures."""
+"""Messages to the seats: the full state to a new browser, then changes, and pictures."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class SeatFrames:
         self.events: list[dict[str, Any]] = []
 
     def of(self, status: RoomStatus) -> Iterator[Outgoing]:
-        """Yields what each browser is to be sent at a tick; nothing where nothing has changed."""
+        """Yields the message to each browser at a tick; none if nothing has changed."""
         for seat in self._seats.values():
             if not seat.connections:
                 continue

@@ -1,4 +1,4 @@
-"""Plan of the seats of a session: which roles people may or must play, and who plays them otherwise."""
+"""Plan of the seats of a session: the roles that people may or must play, and the policies that play them otherwise."""
 
 from __future__ import annotations
 

@@ -206,7 +206,7 @@ class SecurityHeaders:
 
 
 def protection() -> list[Middleware]:
-    """Returns what protects the pages of every server: headers, and the refusal of foreign host names."""
+    """Returns the middleware that protects the pages of every server: headers, and refusal of foreign host names."""
     return [Middleware(SecurityHeaders), Middleware(ForeignHosts)]
 
 
@@ -320,7 +320,7 @@ async def _receive(room: Room, seat: Seat, connection: Connection, socket: WebSo
 
 
 async def _send(connection: Connection, socket: WebSocket) -> None:
-    """Sends what a connection has, until it is closed."""
+    """Sends the queued messages of a connection until it is closed."""
     while True:
         item = await connection.next()
         try:

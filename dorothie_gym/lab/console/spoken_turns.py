@@ -1,4 +1,4 @@
-"""Speech at the seats: what people say into a microphone becomes text, and what they hear is spoken.
+"""Speech at the seats: recognition of people's speech, and synthesis of the utterances that they hear.
 
 The browser asks by HTTP with the secret of its seat; the websocket carries the talk itself, as typed text.
 """

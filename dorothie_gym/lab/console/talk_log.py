@@ -1,4 +1,4 @@
-"""Talk as one seat knows it: what its role said, and what it heard."""
+"""Conversation as one seat knows it: utterances of its role, and heard utterances."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class TalkLog:
         self._read = self._messages = 0
 
     def hear(self, observation: ObservationMapping) -> None:
-        """Appends what an observation of the role holds: utterances of others, and a message of the Ad-Wizard."""
+        """Appends the content of an observation of the role: utterances of others, and a message of the Ad-Wizard."""
         time = round(float(observation["time"][0]), 1)
         for speaker in (Role.PARTICIPANT, Role.CO_WIZARD):
             text = observation.get(f"{speaker}_text", "")

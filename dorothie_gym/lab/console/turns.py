@@ -15,8 +15,9 @@ PAUSE: Final = 0.002
 """Shortest pause between two series of turns if a connection waits for one [s], for the threads of the sessions."""
 
 REST: Final = 1.0
-"""Length of the pause after a series relative to the time that it took with what it set off: strangers get half of the
-time of the event loop, however much a turn costs. A new websocket costs 1.5 ms, ten times as much as a page."""
+"""Length of the pause after a series relative to the time that the series and its consequences took: strangers get half
+of the event loop's time, whatever a turn costs. A new websocket costs 1.5 ms, ten times as much as a page.
+"""
 
 
 class Reader(Protocol):
@@ -65,7 +66,7 @@ class Turns:
         self._due = False
 
     def ask(self, reader: Reader) -> None:
-        """Asks for a turn; each connection waits for one at most."""
+        """Requests a turn; each connection has at most one pending request."""
         loop = asyncio.get_running_loop()
         visitor = reader.visitor
         visitor.heavy = not visitor.requests.admits(loop.time())

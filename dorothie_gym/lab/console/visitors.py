@@ -1,9 +1,9 @@
 """Connections of a web server: how many there are, and which of them give way when there are too many.
 
-A holder of a seat or another valid secret is known and keeps the connection. All others are strangers: they share
-a limited number of places, and have a limited time. When the places are taken, a new connection is still let in. Those
-that give way are of the address that has most strangers: first those that ask too often, then the oldest. So a browser
-that asks at once is served, also if the flood comes from its address.
+A holder of a seat or another valid secret is known and keeps the connection. All others are strangers: they share a
+limited number of slots, and have a limited time. When all slots are in use, a new connection is still accepted. Those
+that give way are of the address that has most strangers: first those that ask too often, then the oldest. A browser
+    that sends its request immediately is therefore served even if the flood comes from its address.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def network_of(host: str | None) -> str:
     """Returns the address by which visitors are counted: one of IPv4, or the /64 network of one of IPv6.
 
     Args:
-        host: address of a connection, or what a proxy says about it.
+        host: address of a connection, or the address reported by a proxy.
 
     Returns:
         A short text; empty if it is not an address.
@@ -144,7 +144,7 @@ class Visitors:
                 del self._addresses[visitor.address]
 
     def recognise(self, visitor: Visitor) -> None:
-        """Notes that a connection has shown a valid secret."""
+        """Records that a connection has presented a valid secret."""
         if visitor in self._strangers and len(self._known) < self._most_known:
             self.leave(visitor)
             self._known.add(visitor)

@@ -35,7 +35,7 @@ _PRAGMAS: Final = (
 
 
 class StorageError(SessionError):
-    """Something cannot be stored or read at the moment: the disk is full or fails, or a database is locked."""
+    """A database cannot be read or written at the moment: the disk is full or fails, or the database is locked."""
 
 
 class Database:

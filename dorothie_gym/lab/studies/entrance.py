@@ -1,4 +1,4 @@
-"""Entrance of a study: links, invitations, ids of the recruiting platform, and the way back into a lost place."""
+"""Entrance of a study: links, invitations, ids of the recruiting platform, and readmission after a lost cookie."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Entrance:
         Args:
             parameters: parameters of the link; unknown names and placeholders are left out.
             token: token of an invitation, or of a link for readmission; None for none.
-            visit: random text of the browser's tab. If an answer is lost on its way, the same tab gets the same place.
+            visit: random text of the browser's tab. If an answer is lost in transit, the same tab gets the same place.
 
         Raises:
             RefusedError: the person takes part already, or the link lacks what the study needs.

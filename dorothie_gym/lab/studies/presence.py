@@ -37,7 +37,7 @@ class Presence:
                 del self._asking[name]
 
     def see(self, name: str) -> None:
-        """Notes that a participant has just sent something."""
+        """Records that a participant has just sent a request."""
         self._seen[name] = time.monotonic()
 
     def present(self, within: float = PRESENT_SECONDS) -> list[str]:

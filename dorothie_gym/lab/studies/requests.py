@@ -51,7 +51,7 @@ class News(Body, frozen=True):
 
 
 class Consent(Body, frozen=True):
-    """Consent: what was agreed to, by statement; None declines."""
+    """Consent: the accepted statements; None declines."""
 
     agreed: Annotated[list[bool], Meta(max_length=20)] | None
 

@@ -1,4 +1,4 @@
-"""Roles, and the waiting room: pairing of people who are present, later sessions of a group, waiting in vain."""
+"""Roles, and the waiting room: pairing of people who are present, later sessions of a group, and expired waits."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class WaitingRoom:
         return True
 
     def _there(self) -> list[Candidate]:
-        """Returns the people with a role who are there and play no session yet, the nearest to a session first."""
+        """Returns the people present who have a role and play no session yet, the nearest to a session first."""
         people = [self._records.participant(name) for name in self._presence.present(GONE_SECONDS)]
         found = [each for each in people if each is not None and each.position == 0 and each.stage in CERTAINTY]
         now, order = time.monotonic(), list(CERTAINTY)

@@ -37,7 +37,7 @@ def through_cache(
     pack: Callable[[Kept], Arrays],
     unpack: Callable[[Arrays], Kept],
 ) -> Kept:
-    """Returns what the user's cache holds under a key, or builds it and adds it to the cache.
+    """Returns the entry of the user's cache under a key, or builds it and adds it to the cache.
 
     A damaged entry is replaced (`user_cache.read_signed`). A cache that cannot be written is logged at level DEBUG and
     otherwise ignored.

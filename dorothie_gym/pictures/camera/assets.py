@@ -22,7 +22,7 @@ ASSETS_KEPT = 4
 @shared
 @dataclass(frozen=True, eq=False)
 class CameraAssets:
-    """What all towns share.
+    """Camera data that all towns share.
 
     Attributes:
         atlas: textures, with the blades of all street names of the ontology.

@@ -41,7 +41,7 @@ class Texture(enum.IntEnum):
     HOUSE = 7
     """Clapboard with windows."""
     SHOPS = 8
-    """Shop windows, doors and awnings: four shops beside each other, one storey."""
+    """Shop windows, doors and awnings: four adjacent shops, one storey."""
     ROOF_TILES = 9
     LEAVES = 10
     CONCRETE = 11

@@ -229,7 +229,7 @@ def _find_line(
     g: NDArray[np.float32],
     h: NDArray[np.float32],
 ) -> None:
-    """Writes the smallest value in each column of `TILE` rows; written so that the compiler makes vectors of it."""
+    """Writes the smallest value in each column of `TILE` rows; written so that the compiler vectorises it."""
     for k in range(len(a)):
         line[k] = min(min(min(a[k], b[k]), min(c[k], d[k])), min(min(e[k], f[k]), min(g[k], h[k])))
 

@@ -1,4 +1,4 @@
-"""Light and air of a picture: what the weather parameters mean for sun, sky, clouds, fog, rain and wet roads.
+"""Light and air of a picture: effects of the weather parameters on sun, sky, clouds, fog, rain and wet roads.
 
 Colours are RGB in 0..255 as displays show them; light multiplies them. Extinctions are those of the simulator's
 perception (`sim/sensing/visibility.py`), so that contrast in the picture falls off as the perceived signal does.

@@ -1,4 +1,4 @@
-"""Light of the head lights of other vehicles on the road before them and on what stands there.
+"""Light of the head lights of other vehicles on the road and the objects in front of them.
 
 For each picture in the dark, the beams are drawn from above into a map of squares of 1 m, with the height of the road.
 Buildings and vehicles do not stop a beam: it reaches few metres.

@@ -92,7 +92,7 @@ def head_light(optics: Optics, x: float, y: float, z: float, slant: float) -> fl
         x: of the surface relative to the camera [m].
         y: of the surface relative to the camera [m].
         z: of the surface relative to the camera [m].
-        slant: cosine between the surface's normal and the way to the camera.
+        slant: cosine between the surface's normal and the direction to the camera.
     """
     ahead = x * optics.right_y - y * optics.right_x
     aside = abs(x * optics.right_x + y * optics.right_y)

@@ -33,7 +33,7 @@ _FLAT = 1e-9  # [m2]; smaller triangles are left out
 
 
 class Surface(enum.IntFlag):
-    """Kinds of surfaces, which are shaded in ways of their own."""
+    """Kinds of surfaces, which are shaded differently."""
 
     NONE = 0
     GROUND = 1

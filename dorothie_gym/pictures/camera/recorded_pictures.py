@@ -61,8 +61,8 @@ _OWN_LOT = 6.0, 5.0  # [m] length and depth of the lot of a landmark that stands
 class RecordedPictures:
     """Pictures of the camera on the car of a recorded session, at any frame between its first and last.
 
-    Bodies are interpolated between records. They keep their keys, and so their looks; keys of other corpora that are
-    not positive 32-bit numbers are replaced by 1, 2, ... in their order. A picture depends on its frame only.
+    Bodies are interpolated between records. They keep their keys, and thus their appearance; keys of other corpora that
+    are not positive 32-bit numbers are replaced by 1, 2, ... in their order. A picture depends on its frame only.
 
     Attributes:
         camera: the camera.
@@ -151,7 +151,7 @@ class RecordedPictures:
         return self.camera.pose_on(x, y, height, heading)
 
     def weather(self, frame: int) -> Weather:
-        """Returns the last recorded weather at a frame; a clear noon where there is none."""
+        """Returns the last recorded weather at a frame; a clear noon if there is none."""
         record = self._session.scene.weather.at(frame)
         if record is None or not len(record):
             return Weather()
@@ -270,7 +270,7 @@ def _accelerations_of(tracks: ActorTracks) -> Array:
 def _moved_before(tracks: ActorTracks) -> Array:
     """Returns the time for which the actor of each row has probably moved since it appeared (m,) [s].
 
-    Those of the first record have been there since frame 0, where pedestrians take their first steps in turn.
+    Actors of the first record have been there since frame 0, where pedestrians take their first steps in turn.
     """
     first = slice(int(tracks.table.offsets[0]), int(tracks.table.offsets[1]))
     walking = tracks.table.rows["kind"][first] == int(ActorKind.PEDESTRIAN)
@@ -348,7 +348,7 @@ def _fault_switches(session: Session) -> dict[Sensor, list[tuple[int, bool]]]:
 
 
 def _last_switch(switches: Switches, frame: int) -> bool:
-    """Returns what the last switch before a frame has set; False without one."""
+    """Returns the state set by the last switch before a frame; False without one."""
     return next((on for at, on in reversed(switches) if at < frame), False)
 
 

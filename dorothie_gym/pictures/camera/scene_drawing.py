@@ -1,4 +1,4 @@
-"""All triangles of a scene in one call: town, what stands in the session, and bodies."""
+"""All triangles of a scene in one call: town, static objects of the session, and bodies."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def draw_scene(
     Args:
         view: projection.
         buffer: to be drawn to.
-        town: what stands in every session, sorted by cell.
+        town: objects of every session, sorted by cell.
         cells: of the town.
         order: scratch space for them.
-        overlay: what stands in the session, sorted by cell.
+        overlay: static objects of the session, sorted by cell.
         overlay_cells: of the overlay.
         overlay_order: scratch space for them.
         bank: triangles of all models.

@@ -15,7 +15,7 @@ _ROUNDS = 2  # of means; two make the weights fall off linearly
 
 
 def apply_faults(picture: NDArray[np.uint8], faults: Collection[Sensor], scratch: NDArray[np.uint8]) -> None:
-    """Changes a picture (h, w, 3) as faults do: `Sensor.VIEW` leaves nothing, `Sensor.BLUR` no details.
+    """Applies sensor faults to a picture (h, w, 3): `Sensor.VIEW` blackens it, `Sensor.BLUR` removes details.
 
     Args:
         picture: to be changed.

@@ -34,10 +34,7 @@ def windscreen_camera(town: Town, scenario: Scenario, config: EnvConfig, size: t
 
 
 class SessionPictures(CachedViews):
-    """Pictures of a session; each is drawn when it is first asked for.
-
-    Pictures follow from the state of the world: copies of a session draw their own.
-    """
+    """Pictures of a session, each drawn at its first use from the world's state; copies of a session draw their own."""
 
     CACHED_VIEWS: ClassVar[Sequence[str]] = ("_camera", "_taken")
 

@@ -43,9 +43,9 @@ def shade(
         optics: numbers of the picture.
         buffer: triangles, with `side` x `side` samples in a pixel.
         side: 1 or 2.
-        town: what stands in every session.
-        overlay: what stands in this session.
-        bodies: what moves.
+        town: objects of every session.
+        overlay: static objects of this session.
+        bodies: moving bodies.
         ground: materials and colours of the ground.
         textures: of the walls.
         light: light and air.
@@ -158,7 +158,7 @@ def _is_uniform(
 
 @compiled
 def _is_same_surface(town: Mesh, overlay: Mesh, bodies: Mesh, first: int, second: int) -> bool:
-    """Returns whether two triangles lie in a plane and look the same, as the halves of a wall do."""
+    """Returns whether two triangles lie in one plane and look the same, like the halves of a wall."""
     if first == SKY or second == SKY:
         return False
     one, two = mesh_of(town, overlay, bodies, first), mesh_of(town, overlay, bodies, second)

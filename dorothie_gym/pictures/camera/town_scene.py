@@ -1,4 +1,4 @@
-"""Scenes: what stands in a town in every session, and what a session adds to it."""
+"""Scenes: objects of a town in every session, and the objects that a session adds."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from dorothie_gym.tasks.storyboard import Landmark
 @shared
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TownScene:
-    """What stands in a town in every session.
+    """Objects of a town in every session.
 
     Attributes:
         ground: lookups of heights, materials and colours of the ground.
@@ -58,10 +58,10 @@ class TownScene:
 
 @dataclass(frozen=True, eq=False)
 class SessionScene:
-    """What a session adds to the scene of its town: the names of its streets, and its landmarks.
+    """Objects that a session adds to the scene of its town: street names and landmarks.
 
     Attributes:
-        town: what stands in every session.
+        town: objects of every session.
         street_names: on the blades, by the indices of the streets; blades without a name are empty.
         landmarks: of the session.
     """

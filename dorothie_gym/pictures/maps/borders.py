@@ -33,7 +33,7 @@ _Run: TypeAlias = tuple[int, int, int]  # first sample, the one after the last, 
 
 
 class BorderKind(enum.IntEnum):
-    """Kind of what lies beyond the side of a lane."""
+    """Kind of the area beyond the side of a lane."""
 
     NONE = 0
     LANE = 1
@@ -47,7 +47,7 @@ class Border:
     """Line along the sides of successive lanes.
 
     Attributes:
-        kind: kind of what lies beyond it.
+        kind: kind of the area beyond it.
         sign: side of the lanes: -1 left, +1 right.
         lanes: ids of the lanes, in driving direction.
         street: street of the first lane, or -1.

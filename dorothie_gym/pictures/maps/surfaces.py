@@ -83,8 +83,8 @@ def tunnel_floors(
     Args:
         town: whose lanes.
         parts: the tunnels.
-        lines: what lies beside the lanes.
-        covered: what lies in the tunnels.
+        lines: borders of the lanes.
+        covered: lookup of the parts in tunnels.
     """
     for line in lines:
         if line.kind is BorderKind.MEDIAN:
@@ -389,7 +389,7 @@ def _beside(line: Border, reach: Array) -> Iterator[Array]:
 
 
 def _open_pieces(town: Town, tunnels: Sequence[LevelStretch]) -> Iterator[tuple[Lane, float, float]]:
-    """Lanes, or what of them lies not in tunnels."""
+    """Lanes, or their parts outside tunnels."""
     hidden: dict[int, list[LevelStretch]] = defaultdict(list)
     for part in tunnels:
         hidden[part.lane].append(part)

@@ -33,7 +33,7 @@ _HANDLED = frozenset(
 """Parameters of the weather that have a reaction of their own."""
 
 HAZARD_EXPIRES = 4.0
-"""Time within which what the car stands for is mentioned [s]."""
+"""Time within which the reason for a standstill is mentioned [s]."""
 
 _CAUTION = 5  # by which a gentle driver is slower than the sight allows [km/h]
 

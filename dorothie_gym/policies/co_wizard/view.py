@@ -34,7 +34,7 @@ class CoWizardView:
         speaking: remaining duration of its own utterance [s].
         other_speaking: whether the other speaker is talking.
         motion: state of motion.
-        hazard: class of what the car brakes or stands for; UNLABELED for nothing.
+        hazard: class of the object that the car brakes or stands for; UNLABELED for nothing.
         manoeuvre: manoeuvre prepared or under way.
         angle: its angle [degrees].
         cruise: cruise speed [km/h].

@@ -33,7 +33,7 @@ class Reply:
     Attributes:
         answer: text of the answer; None after a fault.
         fault: the fault; None for an answer.
-        reason: what was wrong; empty for an answer.
+        reason: fault; empty for an answer.
         tokens: number of tokens of prompts and answers, of both attempts.
         retried: whether a second attempt was made.
         latency: time of the call [s].

@@ -24,8 +24,8 @@ class Prompt:
     """Prompt for one answer.
 
     Attributes:
-        system: who the model is and what the fields of the answer mean; the same in all calls of a role.
-        text: what the role observes now.
+        system: role of the model and meanings of the answer's fields; the same in all calls of a role.
+        text: current observation of the role.
         schema: schema of the answer.
         picture: picture of the camera as the address of a PNG (`data:image/png;base64,...`); empty for none.
         seed: seed of sampling, which also distinguishes equal prompts.
@@ -96,7 +96,7 @@ class LanguageModel:
         return reply
 
     def _call(self, request: Mapping[str, object], schema: AnswerSchema) -> Reply:
-        """Makes a call of at most two attempts; the second after what the server asks for or with the model's error."""
+        """Makes a call of at most two attempts, the second after a requested delay or with the model's error."""
         endpoint, begun = ChatEndpoint(self._config.url), self._clock()
         tokens, retried = (0, 0), False
         while True:

@@ -43,7 +43,7 @@ _SECTORS, _PARAMETERS = len(SECTORS), len(WeatherParameter)
 
 
 class DriverView:
-    """What a driver knows of the car and its surroundings at a decision."""
+    """Knowledge of a driver about the car and its surroundings at a decision."""
 
     time: Float  # [s]
     speed: Float  # [m/s]
@@ -111,7 +111,7 @@ class DriverArrays(NamedTuple):
     """Inputs and observation of a driver; each is one record, or one row in a batch.
 
     Attributes:
-        inputs: (1,) what the driver knows of the car and its surroundings.
+        inputs: (1,) knowledge about the car and its surroundings.
         heard: (1,) the last instruction.
         costs: (1,) costs of routes to the goal, if one is known.
         streets: (s,) names of the town's streets in the session: ids of `StreetName`.

@@ -72,7 +72,7 @@ Step: TypeAlias = tuple[int, int, int, int, int, int, int, float]
 
 @compiled
 def attend(world: WorldArrays, guide: InstructorArrays) -> None:
-    """Reads what the instructor sees now from the arrays of a world.
+    """Reads the instructor's view from the arrays of a world.
 
     Args:
         world: arrays of the world.

@@ -133,7 +133,7 @@ def _turn_step(state: CoWizardState, view: CoWizardView, exits: JunctionExits) -
 
 
 def note_driving(state: CoWizardState, view: CoWizardView) -> None:
-    """Updates the intentions of the Co-Wizard from what the car does, independently of the driver's commands.
+    """Updates the intentions of the Co-Wizard from the car's motion, independently of the driver's commands.
 
     Args:
         state: working copy of the state.

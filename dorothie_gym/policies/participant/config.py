@@ -44,7 +44,7 @@ class ParticipantConfig(GuidanceConfig):
         corner_distance: distance to a junction within which a goal right behind it is easily missed [m].
         behind_corner: distance from the junction to such a goal [m].
         careful_speeds: speeds asked for where the goal is easily missed [km/h].
-        manoeuvre_cost: extra cost of each lane change and U-turn on a way that is to be described in words [m].
+        manoeuvre_cost: extra cost of each lane change and U-turn on a route that has to be described in words [m].
         run_up: least distance from a U-turn to the goal [m].
         run_up_per_lane: additional distance for each lane change in between [m].
         lane_return_time: time after which a repeated lane change counts as a return to the lane [s].
@@ -70,7 +70,7 @@ class ParticipantConfig(GuidanceConfig):
         arrival_distance: distance to the goal within which other remarks are dropped [m].
         elsewhere_distance: distance to the goal beyond which a standing car is elsewhere [m].
         explains_order: probability that the order of two tasks is explained by naming the first one.
-        nods_first: probability that a remark begins with an acknowledgement of what was heard meanwhile.
+        nods_first: probability that a remark begins with an acknowledgement of utterances heard meanwhile.
         just_said: time after an answer within which the same question needs no other one [s].
         unsure: probability that a yes is preceded by hesitation.
         checked_within: time within which a question refers to the last instruction [s].
@@ -186,7 +186,7 @@ class ParticipantStyle:
 
     @classmethod
     def of(cls, persona: Persona, rng: np.random.Generator) -> ParticipantStyle:
-        """Returns the style of a persona; the random generator adds what is the speaker's own."""
+        """Returns the style of a persona; the random generator adds individual variation."""
         precise, vague = persona.directions is Directions.TURNS, persona.directions is Directions.VAGUE
         landmarks = persona.directions is Directions.LANDMARKS
         by_turns = persona.knowledge * persona.talkativeness > BACKSEAT

@@ -19,7 +19,7 @@ _FUNCTIONS: Final = MappingProxyType(
         DialogueMove.CLARIFY: CommunicativeFunction.CORRECTION,
     }
 )
-"""What is done with an order, by the move."""
+"""Communicative function of an order, by move."""
 
 
 def order(
@@ -37,8 +37,8 @@ def order(
         move: an instruction, an answer to an open question, or a clarification.
         action: the action.
         wording: further particulars; direction and speed are part of the content.
-        street: street on which, or onto which.
-        place: place at which.
+        street: street of the action, or street to enter.
+        place: place of the action.
         urgent: whether it may be said without leaving the car time to answer.
 
     Raises:

@@ -99,7 +99,7 @@ class ConversationState:
         return replace(self, slowed=slowed)
 
     def with_noticed(self, noticed: Noticed) -> ConversationState:
-        """Sets what has been noticed of weather and crowds."""
+        """Sets the noticed weather and crowds."""
         return self if noticed is self.noticed else replace(self, noticed=noticed)
 
     def after_hurrying(self) -> ConversationState:
@@ -123,7 +123,7 @@ class TaskProgress:
         next_at: time before which the next task is not named unless the car asks [s].
         resume_at: time at which a car that was asked to wait is sent on [s]; infinite where it does not wait.
         put_off: subgoals that were interrupted and are to be resumed.
-        told: what has been said about the way to the target, its place, and what the speaker feels about it.
+        told: statements made about the route to the target, its place, and the speaker's feelings about it.
         finished: landmark of the last errand that is done, and when it was done [s].
     """
 
@@ -154,7 +154,7 @@ class TaskProgress:
         return replace(self, target=None, goal=None, announced=False, described=False, told=frozenset())
 
     def after_telling(self, said: Proposition) -> TaskProgress:
-        """Records what has been said about the target."""
+        """Records a statement about the target."""
         return replace(self, told=self.told | {said})
 
     def after_announcement(self, now: float) -> TaskProgress:

@@ -62,7 +62,7 @@ TRAFFIC_LIGHT, TRAFFIC_SIGN = int(ObjectClass.TRAFFIC_LIGHT.value), int(ObjectCl
 
 @inlined
 def look(town: TownArrays, world: WorldArrays, seen: int) -> None:
-    """Finds what limits the ego's speed most, requests junctions, and notes the limit in the record `car`.
+    """Finds the strictest limit of the ego's speed, requests junctions, and writes the limit to the record `car`.
 
     Args:
         town: arrays of the town.

@@ -105,7 +105,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def state(self) -> tuple[object, ...]:
-        """What the feasibility of navigation actions depends on besides the speed: to be compared."""
+        """State that determines the feasibility of navigation actions, except the speed; for comparisons."""
         plan = self._look_up()
         props = self._holder.arrays.seen_props[: int(plan["props"])].tobytes()
         return (

@@ -1,4 +1,4 @@
-"""Records of what moves or lies in a world, of its clock and of its lights; protocols of what they have in common."""
+"""Records of the bodies of a world, its clock and its lights; protocols of their common fields."""
 
 from __future__ import annotations
 

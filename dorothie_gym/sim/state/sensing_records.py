@@ -1,4 +1,4 @@
-"""Records of what the ego perceives, of its pose estimate, and of the watch over its driving."""
+"""Records of the ego's perception, its pose estimate, and the monitoring of its driving."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Machine code on disk, named by content: the fingerprint of a function is part of the name of its files.
 
 An update of the package compiles only functions that are different, or that call different ones; copies of the package
-share what is equal in them. The folder is `compiled` in the user's cache folder, or `NUMBA_CACHE_DIR`.
+share equal functions. The folder is `compiled` in the user's cache folder, or `NUMBA_CACHE_DIR`.
 
 A file holds the machine code for one signature and processor. It is signed under its name, by a key in the same folder:
 damaged machine code would end the process without a message.
@@ -77,7 +77,7 @@ class _Files:
 
     Args:
         folder: folder of the files and of their key.
-        base: what their names begin with.
+        base: prefix of their names.
     """
 
     def __init__(self, folder: Path, base: str) -> None:

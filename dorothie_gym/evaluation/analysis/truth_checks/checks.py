@@ -1,4 +1,4 @@
-"""Figures of what is said in a corpus: each a share of the cases that the records can decide, with their number."""
+"""Figures of the content of a corpus: shares of the cases that the recordings can decide, with their numbers."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def check_session(checks: TalkChecks, session: Session, town: Town | None) -> No
 
 
 def _check_claims(checks: TalkChecks, world: SessionWorld) -> None:
-    """Holds what is stated against the world."""
+    """Compares statements with the world."""
     for move in world.session.moves():
         for said in move.meaning if move.act.move in _FACTUAL else ():
             right = is_true(world, said, move.start, move.speaker)
@@ -154,7 +154,7 @@ def _check_time(checks: TalkChecks, world: SessionWorld, move: MoveRecord, said:
 
 
 def _check_answers(checks: TalkChecks, session: Session) -> None:
-    """Checks whether answers are about what was asked."""
+    """Checks whether answers are about the question."""
     asked: MoveRecord | None = None
     for move in session.moves():
         if move.act.move in _QUESTIONS and move.meaning:

@@ -19,7 +19,9 @@ from dorothie_gym.session.recording.header import LandmarkRow
 from dorothie_gym.tasks.landmark_designs import features_of
 
 CLOSE, FAR = 130.0, 200.0
-"""Ways up to the first length count as short, and from the second on as long [m]; in between, both may be said."""
+"""Routes up to the first length count as short, and from the second on as long [m]; in between, both statements are
+true.
+"""
 
 PLAIN_SIGHT, SIGHT = 20.0, 120.0
 """An actor within the first distance is seen, one beyond the second is not [m]; in between it may be hidden."""
@@ -54,8 +56,8 @@ def is_true(world: SessionWorld, said: Proposition, time: float, speaker: Role) 
     Args:
         world: the recorded world.
         said: the proposition.
-        time: when it is said [s].
-        speaker: who says it.
+        time: time of the statement [s].
+        speaker: speaker of the statement.
     """
     evaluator = _EVALUATORS.get(said.predicate)
     held = None if evaluator is None or said.asks else evaluator(world, said, time, speaker)

@@ -100,7 +100,7 @@ class Batch:
         move_time: (B, M) when its utterance was over [s]; the time of the point for an utterance in progress.
         move_text: (B, M) words of the move.
         move_mask: (B, M).
-        utterance_text, utterance_recognised: (B, U) its words; what was recognised.
+        utterance_text, utterance_recognised: (B, U) its words; the recognised words.
         utterance_speaker: (B, U).
         utterance_time: (B, U) [s].
         utterance_mask: (B, U).

@@ -283,7 +283,7 @@ class Columns:
 
     @functools.cached_property
     def times(self) -> RecordTimes:
-        """Times that decide what is visible at a point, in tenths."""
+        """Times that determine visibility at a point, in tenths of a second."""
         said, moves = self.utterances, self.moves
         first = np.searchsorted(moves.utterance, np.arange(len(said.tenth) + 1))  # moves lie in the order of utterances
         return RecordTimes(

@@ -1,6 +1,6 @@
 """Lookup of the material of the ground at a point: the top-most polygon of the map that contains it, exactly.
 
-A grid of square cells says for most points what lies there. In a cell with several materials, the polygons that have an
+A grid of square cells gives the material at most points. In a cell with several materials, the polygons that have an
 edge in it are tried from the top: a path from the corner of the cell to the point, first along y and then along x, is
 crossed an odd number of times by the edges of a polygon if one end is inside and the other outside.
 """

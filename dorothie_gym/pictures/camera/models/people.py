@@ -23,7 +23,7 @@ STANDING = PHASES
 POSES = PHASES + 1
 
 CYCLE = 1.4
-"""Way that a person walks in one cycle [m] (two steps of 0.7 m, Knoblauch et al. 1996)."""
+"""Distance that a person walks in one cycle [m] (two steps of 0.7 m, Knoblauch et al. 1996)."""
 
 _THIGH, _SHANK, _SOLE = 0.43, 0.42, 0.07  # [m]
 _SWING, _ARM_SWING = 0.42, 0.42  # [rad] largest angles of thighs and arms

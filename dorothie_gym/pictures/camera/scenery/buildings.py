@@ -60,7 +60,7 @@ class Style(enum.IntEnum):
 
 @dataclass(frozen=True)
 class _Manner:
-    """How a quarter is built.
+    """Style of the buildings of a quarter.
 
     Attributes:
         styles: shares of the styles.

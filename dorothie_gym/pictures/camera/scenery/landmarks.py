@@ -1,4 +1,4 @@
-"""Landmarks of a session as buildings that one recognises: brands by colours, form and totem, others by a pictogram."""
+"""Landmarks of a session as recognisable buildings: brands by colours, form and totem, others by a pictogram."""
 
 from __future__ import annotations
 
