@@ -31,7 +31,7 @@ class History:
     """Observations, utterances and actions of a Co-Wizard; every change returns a new object.
 
     Attributes:
-        encoded: what a benchmark model can still be shown of them, as columns.
+        encoded: the part of them that a benchmark model can still be shown, as columns.
         events: number of dialogue moves and physical actions so far.
         utterances: number of utterances so far.
         landmark: label of the landmark that was named last, by either speaker.

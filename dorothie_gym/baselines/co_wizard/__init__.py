@@ -1,4 +1,4 @@
-"""Learned Co-Wizard: one network that writes a working memory of the talk, and chooses commands and remarks.
+"""Learned Co-Wizard: one network that writes a working memory of the dialogue, and chooses commands and remarks.
 
 Rules read the words, plan the route, answer questions from evidence, and word the remarks.
 

@@ -45,7 +45,7 @@ def evidence(memory: Memory, view: CoWizardView, said: Proposition) -> bool | No
 
 
 def goal_left(memory: Memory, view: CoWizardView) -> float | None:
-    """Returns the way to a goal on the map [m]; None without one."""
+    """Returns the route length to a goal on the map [m]; None without a goal."""
     return memory.navigator.left(view) if memory.goal_mark >= 0 else None
 
 

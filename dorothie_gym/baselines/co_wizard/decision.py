@@ -55,7 +55,7 @@ class Attention:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What is perceived at a decision.
+    """Perception at a decision.
 
     Attributes:
         view: observation.
@@ -115,7 +115,7 @@ class Inputs:
     Attributes:
         state: state and utterances (n,).
         words: rows of the words of the latest utterance.
-        options: vectors of what is chosen among, places or commands (k, m), filled with 0.
+        options: vectors of the options, places or commands, padded with 0 (k, m).
         rows: number of each option: row of the landmark, or index of the command.
     """
 
@@ -191,10 +191,10 @@ def finished(
     """Returns the belief update to send, and the state after a decision.
 
     Args:
-        scene: what was perceived.
+        scene: perception.
         memory: memory after listening.
         physical: command that is given.
-        remarks: what was decided to say.
+        remarks: chosen remarks.
     """
     for remark in remarks:
         memory = noted(memory, remark, scene.view)

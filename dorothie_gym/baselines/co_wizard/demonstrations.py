@@ -100,7 +100,7 @@ class Pupil:
         return scene, memory, lesson
 
     def did(self, scene: Scene, memory: Memory, physical: Physical | None, remarks: Sequence[Remark]) -> None:
-        """Notes the command that was given, and what was decided to say."""
+        """Records the command that was given, and the chosen remarks."""
         self.attention = finished(scene, memory, physical, remarks)[1]
         if remarks:
             self.last = remarks[-1].act.move
@@ -170,7 +170,7 @@ class _Practice:
         self.disagreements = 0
 
     def take_over(self) -> None:
-        """Gives the player the memory that the teacher has led to, and what was said."""
+        """Gives the player the memory that results from the teacher's decisions, and its remarks."""
         voice = replace(self._teacher.speech, queue=())
         self._state = replace(self._state, attention=self._pupil.attention, voice=voice)
         self.disagreements = 0

@@ -1,4 +1,4 @@
-"""Examples to learn from: the inputs of decisions, and what the teacher did."""
+"""Training examples: inputs of decisions, and the teacher's decisions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Example:
         status: status given to an errand.
         command: index of the command; `UNKNOWN` if it could not be commanded.
         remarks: forms of the first two remarks; "" for none, None if it is not trained.
-        weight: number of decisions that it stands for.
+        weight: number of decisions that it represents.
     """
 
     listening: Inputs
@@ -53,11 +53,11 @@ def make_example(
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
-        scene: what was perceived.
+        scene: perception.
         listening: inputs of the first step.
         acting: inputs of the second step.
         commands: possible commands.
-        lesson: what the teacher did.
+        lesson: decision of the teacher.
         available: names and numbers that could be said.
         rng: draws which idle decisions are kept.
         talks: whether the remarks, or silence, are learnt.
@@ -97,11 +97,11 @@ def correcting_example(scene: Scene, listening: Inputs, acting: Inputs, led: Mem
     against the directions that it gets.
 
     Args:
-        scene: what the player perceived, with its own memory.
+        scene: the player's perception, with its own memory.
         listening: inputs of the first step.
         acting: inputs of the second step, from which nothing is learnt.
         led: memory that the teacher has led to.
-        lesson: what the teacher did.
+        lesson: decision of the teacher.
     """
     own, update = scene.memory, lesson.update
     same_goal = own.goal is led.goal and own.goal_mark == led.goal_mark

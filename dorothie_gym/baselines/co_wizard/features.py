@@ -48,7 +48,7 @@ HAZARDS: Final = (
 )
 PHYSICAL: Final = tuple(PhysicalAction)
 TOPICS: Final = (*(str(predicate) for predicate in Predicate), *(move.label for move in DialogueMove))
-"""What remarks are about: their predicate or, without content, their move."""
+"""Topics of remarks: their predicate or, without content, their move."""
 
 _SILENCES: Final = (4.0, 7.0, 8.0, 10.0)  # silences after which the scripted Co-Wizard asks [s]
 

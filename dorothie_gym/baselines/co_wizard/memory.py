@@ -1,8 +1,8 @@
-"""Working memory of the learned Co-Wizard: what it has committed itself to, written by its own network.
+"""Working memory of the learned Co-Wizard: its commitments, written by its own network.
 
 At each decision the network predicts the next value of each variable in `VARIABLES`, and an event of the goal
-(`GoalEvent`, or a place on the map). `Memory.updated` stores both. What is kept besides follows from them and from the
-own observation: times, the navigator's route, and where a slow approach ends.
+(`GoalEvent`, or a place on the map). `Memory.updated` stores both. All other content is derived from them and from the
+observation: times, the navigator's route, and the end of a slow approach.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ STATUSES: Final = (None, GoalStatus.PENDING, GoalStatus.COMPLETE, GoalStatus.ABA
 
 
 class GoalEvent(enum.IntEnum):
-    """What happens to the goal, besides the choice of a place on the map: those are numbered behind."""
+    """Events of the goal, besides the choice of a place on the map, which has the numbers after these."""
 
     KEEP = 0
     CLEAR = 1
@@ -82,7 +82,7 @@ PLACE_SIGHT: Final = 80.0
 """Distance along the default lanes within which a place is looked for [m]; as that of the scripted Co-Wizard."""
 
 REACTION: Final = 3.0
-"""Time within which the memory is changed because of what was heard [s]."""
+"""Time within which an utterance may change the memory [s]."""
 
 AWAY: Final = 300.0
 """Time that stands for "never" or "long ago" [s]."""
@@ -127,10 +127,10 @@ class Memory:
         plan: junctions of the route as sent last.
         standing_since: start of the standstill [s]; None while the car moves.
         stood_until: end of the last standstill [s].
-        reason: why the car stands, or stood last, as far as that could be told.
-        reason_since: since when it has stood for this reason [s].
+        reason: why the car stands, or stood last, if known.
+        reason_since: time since which it has stood for this reason [s].
         told_to_stop_at: time at which it halted because of an utterance [s].
-        told_to_turn_round_at: last time at which it was to turn round because of one [s].
+        told_to_turn_round_at: last time at which an utterance told it to turn round [s].
         physical: its last physical action; None for none.
         physical_at: its time [s].
         junction_of_action: junction ahead at that time.
@@ -245,7 +245,7 @@ class Memory:
         return memory._with_goal(update.goal, view, named)
 
     def _carrying_on(self, view: CoWizardView) -> Memory:
-        """Carries the place of a slow approach along, and sends the plan if the route has changed."""
+        """Moves the place of a slow approach along with the car, and sends the plan if the route has changed."""
         memory = self
         if self.value("creeping") and not self.value("halted") and view.manoeuvre is not PhysicalAction.U_TURN:
             left = self.distance_to(self.target, view)

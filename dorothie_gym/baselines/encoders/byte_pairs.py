@@ -25,7 +25,8 @@ _WORD: Final = re.compile(r"\w+|[^\w\s]")
 class BytePairs:
     """Splits texts into pieces.
 
-    Id 0 is padding, 1 + b is the byte b, and what follows are the merged pairs in the order in which they were learnt.
+    Id 0 is padding, 1 + b is the byte b, and the following ids are the merged pairs in the order in which they were
+    learnt.
 
     Attributes:
         merges: pairs of ids that became one, most frequent first.

@@ -35,7 +35,7 @@ class Attention:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """What is perceived at a decision.
+    """Perception at a decision.
 
     Attributes:
         view: observation.

@@ -1,4 +1,4 @@
-"""Examples to learn from: the inputs of decisions, and what the teacher did."""
+"""Training examples: inputs of decisions, and the teacher's decisions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Example:
         target: 0 for no change, or 1 + position of the errand; `UNKNOWN` if it is missing.
         guiding: whether the car is guided after.
         remarks: forms of the remarks, then ""; None if it is not trained.
-        weight: number of decisions that it stands for.
+        weight: number of decisions that it represents.
     """
 
     choosing: Inputs
@@ -53,7 +53,7 @@ def make_example(
     """Returns the example of a decision; None if it is one of those left out because nothing happens.
 
     Args:
-        scene: what was perceived.
+        scene: perception.
         choosing: inputs of the first step.
         speaking: inputs of the second step.
         choice: the teacher's choice.

@@ -146,9 +146,9 @@ def finished(scene: Scene, memory: Memory, remarks: Sequence[Remark]) -> tuple[S
     """Returns the speech of a decision, and the state after it.
 
     Args:
-        scene: what was perceived.
+        scene: perception.
         memory: memory after the choice of the target.
-        remarks: what was decided to say.
+        remarks: chosen remarks.
     """
     view = scene.view
     memory = memory.decided(remarks, view, scene.rng)

@@ -96,7 +96,7 @@ _STEPS: Final = (ActionValue.J_TURN, ActionValue.U_TURN, ActionValue.LANE_SWITCH
 
 
 def topic_of(remark: Remark) -> str:
-    """Returns what a remark is about: its predicate or, without content, its move."""
+    """Returns the topic of a remark: its predicate or, without content, its move."""
     return str(remark.meaning[0].predicate) if remark.meaning else remark.act.move.label
 
 

@@ -268,7 +268,7 @@ _STREETS: Final = ("goal_street", "street0", "street1", "onto", "here", "new_str
 
 
 def _example(source: str) -> object:
-    """Returns what a source can be."""
+    """Returns an example of a source."""
     if source.startswith(_MARK):
         return "text"
     if source in _VALUES:

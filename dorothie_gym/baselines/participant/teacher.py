@@ -23,12 +23,12 @@ from dorothie_gym.session.spaces.observations import ObservationMapping
 
 @dataclass(frozen=True, kw_only=True)
 class Lesson:
-    """What the teacher does in a decision.
+    """Decision of the teacher.
 
     Attributes:
         target: number of the subgoal that is its target; None for none.
         guiding: whether it guides the car.
-        remarks: what it decides to say now, in one breath or the next.
+        remarks: remarks that it chooses now, in one breath or the next.
         action: its action.
     """
 

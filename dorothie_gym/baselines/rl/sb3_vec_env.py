@@ -79,7 +79,7 @@ class NativeVecEnv(VecEnv):
         return np.asarray(observations)
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Notes the actions."""
+        """Records the actions."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:

@@ -352,7 +352,7 @@ class CommandState:
     Attributes:
         standing_since: start of the present standstill [s]; None while the car moves.
         reason: why the car stands, or stood last, as far as the Co-Wizard knows.
-        reason_since: since when it has stood for this reason [s].
+        reason_since: time since which it has stood for this reason [s].
         stood_until: end of the last standstill [s].
         turn_sent: lane and angle of the last turn commanded [-, degrees].
         turn_sent_at: time of that command [s].
