@@ -62,7 +62,7 @@ class Shot:
     """Content of a picture.
 
     Attributes:
-        pose: of the camera.
+        pose: pose of the camera.
         arrays: bodies.
         weather: weather and light.
         time: simulated time [s].
@@ -93,7 +93,7 @@ def measure(
 
     Args:
         town: name or file of a town.
-        sizes: of the pictures.
+        sizes: sizes of the pictures.
         outputs: parts of the pictures; RGB alone is also measured without antialiasing.
         vehicles: number of vehicles.
         pedestrians: number of pedestrians.

@@ -20,7 +20,7 @@ def draw_loss_curves(epochs: Sequence[Epoch], title: str, path: Path) -> None:
     """Draws training and validation loss into a PNG file; the epoch that is kept is marked.
 
     Args:
-        epochs: at least one.
+        epochs: at least one epoch.
         title: name of the model.
         path: file to write, whole or not at all.
 

@@ -80,7 +80,7 @@ class Examples:
 
     Attributes:
         inputs: fields (N, ...).
-        labels: of the N points.
+        labels: labels of the N points.
     """
 
     inputs: Inputs

@@ -170,8 +170,8 @@ class DuoWizardVectorEnv(BatchedEnv[EnvConfig, SessionBatch]):
         """Begins new sessions.
 
         Args:
-            seed: of the first environment; the others have the numbers that follow. Or one for each. By default, the
-                next number after the environment's previous seed.
+            seed: seed of the first environment; the others have the numbers that follow. A sequence has one for each.
+                By default, the next number after the environment's previous seed.
             options: `reset_mask`, a bool array (num_envs,): which environments, by default all; `scenario` as in
                 `DuoWizardEnv`, for all of them; other options are ignored.
 

@@ -181,7 +181,7 @@ class Restorable:
         """Restores a state, any number of times; the state does not change.
 
         Args:
-            state: of this object, or of another one that was made with the same arguments.
+            state: state of this object, or of another one that was made with the same arguments.
 
         Raises:
             StateError: the state is of another town or other settings, or not a state.

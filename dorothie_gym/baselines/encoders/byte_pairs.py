@@ -40,7 +40,7 @@ class BytePairs:
         """Learns pieces from texts by merging the most frequent pair of adjacent pieces repeatedly.
 
         Args:
-            texts: of the training sessions only.
+            texts: texts of the training sessions only.
             vocabulary: how many ids there are at most, padding and bytes included.
 
         Raises:

@@ -177,7 +177,7 @@ def load_pretrained(kind: Any, source: str | Path, name: str) -> Any:
     Args:
         kind: class of transformers that has `from_pretrained`.
         source: name of the model, or a folder.
-        name: of the encoder, for the message.
+        name: name of the encoder, for the message.
 
     Raises:
         EncoderError: it is neither here nor reachable.

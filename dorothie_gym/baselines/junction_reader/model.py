@@ -263,7 +263,7 @@ class JunctionReader(TOTO):
         """Returns whether the participant's last words name each exit's side, any side, and their age (B, X, 3).
 
         Args:
-            inputs: of the points.
+            inputs: inputs of the points.
             sides: (B, X, 3) whether each exit leads to the left, to the right, straight on.
         """
         human = inputs["utterance_mask"] & (inputs["utterance_speaker"] == PARTICIPANT)  # (B, U)

@@ -30,8 +30,9 @@ class PictureFeatures(BaseFeaturesExtractor):
         """Makes the layers.
 
         Args:
-            observation_space: of pictures (channels, h, w) in 0..255, which the policy scales to 0..1.
-            channels: of each convolution.
+            observation_space: space of pictures (channels, h, w) in 0..255, which the policy scales to
+                0..1.
+            channels: channels of each convolution.
         """
         super().__init__(observation_space, STREET + DASHBOARD)
         first, second, third = channels

@@ -70,7 +70,7 @@ class TrainedTexts(Texts):
     Args:
         tokens: (n, length) int64 pieces of each text of the corpus, padding at the end.
         reader: module from pieces (u, length) to vectors (u, width).
-        width: of the reader's vectors.
+        width: width of the reader's vectors.
     """
 
     tokens: Tensor

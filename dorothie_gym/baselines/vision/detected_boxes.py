@@ -269,7 +269,7 @@ def actors_at(scores: NDArray[np.floating], spaces: NDArray[np.float64], view: V
         scores: (n, k) sureness of the kinds of each.
         spaces: (n, 7) boxes in space, `SPACE_COLUMNS`.
         view: projection of the picture.
-        heading: of the camera [rad].
+        heading: heading of the camera [rad].
     """
     aside, down, ahead, length, width, _, turned = spaces.T
     places = view.origin + np.stack((aside, -down, ahead), axis=1) @ view.axes

@@ -35,14 +35,14 @@ class DetectorConfig:
     """Sizes and learning of a Deformable DETR.
 
     Attributes:
-        width: of the pictures [pixels].
-        height: of the pictures [pixels].
-        queries: of objects, the most that are found in a picture.
-        encoder_layers: of the transformer.
-        decoder_layers: of the transformer.
+        width: width of the pictures [pixels].
+        height: height of the pictures [pixels].
+        queries: number of object queries, and thus the most objects found in a picture.
+        encoder_layers: number of encoder layers of the transformer.
+        decoder_layers: number of decoder layers of the transformer.
         size: numbers of a query.
         feed_forward: width of the feed-forward layers.
-        heads: of the attention.
+        heads: number of attention heads.
         levels: resolutions of the backbone that are looked at, from 1/8 on.
         encoded: channels into which the five are encoded.
         backbone_sizes: channels of the four stages of the backbone.
@@ -52,7 +52,7 @@ class DetectorConfig:
             faster; not as published.
         learning_rate: highest of AdamW.
         backbone_rate: factor of the learning rate in the backbone.
-        weight_decay: of AdamW.
+        weight_decay: weight decay of AdamW.
         warm_up: share of the steps in which the learning rate rises.
         batch_size: pictures of a step.
         epochs: passes over the training pictures.

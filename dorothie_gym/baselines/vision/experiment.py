@@ -63,7 +63,7 @@ class VisionExperiment:
         corpus: folder of the corpus.
         model: "segformer" or "detr".
         size: "small" or "paper".
-        seed: of weights, order and changes of the pictures.
+        seed: seed of weights, order and changes of the pictures.
         out: parent of the folders of all trainings.
         inputs: classes and depths that the detector reads: "predicted" by the SegFormer of this size and seed in
             `out`, or "true".

@@ -89,8 +89,8 @@ class FrameSampling:
     """Choice of pictures of a session, and their size. Pictures of a faulty camera are left out.
 
     Attributes:
-        width: of a picture [pixels].
-        height: of a picture [pixels].
+        width: width of a picture [pixels].
+        height: height of a picture [pixels].
         spacing: distance that the car drives between two pictures [m].
         wait: time after which a car that does not drive gives a further picture [s].
         most: largest number of pictures of a session, evenly thinned out.
@@ -388,10 +388,10 @@ def _boxes(number: int, drawn: CameraFrame, solid: SolidBoxes, heading: float) -
     """Returns the boxes of road users and props in a picture; the class is the commonest of their pixels.
 
     Args:
-        number: of the picture.
+        number: number of the picture.
         drawn: the picture.
         solid: boxes in space of the bodies near the camera.
-        heading: of the camera [rad].
+        heading: heading of the camera [rad].
     """
     assert drawn.boxes is not None and drawn.instance is not None and drawn.semantic is not None
     places = {key: place for place, key in enumerate(solid.keys.tolist())}

@@ -51,13 +51,13 @@ class Readings:
     """Values that the dashboard shows.
 
     Attributes:
-        action: of the last instruction; None before the first, and where a goal was named instead.
+        action: action of the last instruction; None before the first, and where a goal was named instead.
         sector: its direction, an index of `SECTORS`; None without one.
         distance: from the car to its place, negative behind it [m].
         planned: manoeuvre that the car prepares or carries out, of `ActionValue`; None for none.
         planned_sector: its direction.
         goal: place of the named goal ahead of the car and to its right [m]; None if it is not known.
-        speed: of the car [m/s].
+        speed: speed of the car [m/s].
         wanted: target speed: the cruise speed, or the speed that the path allows [m/s].
         limit: speed limit [m/s]; None where it is not known.
         hazard: whether the car brakes for a hazard.

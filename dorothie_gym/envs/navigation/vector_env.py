@@ -100,7 +100,7 @@ class DrivingVectorEnv(
         """Begins new episodes.
 
         Args:
-            seed: of the first environment; the others have the numbers that follow. Or one for each.
+            seed: seed of the first environment; the others have the numbers that follow. A sequence has one for each.
             options: `reset_mask`, a bool array (num_envs,): which environments, by default all; `scenario` as in the
                 single environment, for all of them.
 
@@ -129,7 +129,7 @@ class DrivingVectorEnv(
             Observations (num_envs, ...), rewards, terminations and truncations (num_envs,), infos.
 
         Raises:
-            ValueError: the actions are none of the action space.
+            ValueError: the actions are not in the action space.
             gymnasium.error.ResetNeeded: an environment was never reset, or is over and not reset by itself.
         """
         actions = self._checked(actions)
@@ -175,7 +175,7 @@ class DrivingVectorEnv(
 
     @abstractmethod
     def _checked(self, actions: object) -> NDArray[np.generic]:
-        """Returns actions as an array; raises `ValueError` if they are none of the action space."""
+        """Returns actions as an array; raises `ValueError` if they are not in the action space."""
 
     def _play(self, actions: NDArray[np.generic], playing: NDArray[np.bool_]) -> None:
         """Plays a decision in the environments of a mask, and records its outcome."""

@@ -197,7 +197,7 @@ def handled_by(units: Units) -> dict[int, Event]:
 def times_mentioned(units: Units) -> dict[int, list[float]]:
     """Returns when each exception is talked about [s], by `id` of its event.
 
-    Where meanings are recorded, these are the starts of the acts that are about it; otherwise those of exchanges.
+    With recorded meanings, these are the starts of the acts about the exception; otherwise the starts of exchanges.
     """
     session, found = units.session, dict[int, list[float]]()
     moves = [move for move in session.moves() if move.meaning]

@@ -290,7 +290,7 @@ def task_of(key: str) -> str:
 
 
 def metric_title(name: str) -> str:
-    """Returns the title of the metric of a key without the task's name: "slot F1 (macro)"."""
+    """Returns the title of a metric key without the name of the task: "slot F1 (macro)"."""
     base = name.removesuffix(PAPER_SUFFIX)
     words = _SHORT.get(base) or base.replace("_", " ")
     return f"{words} (paper)" if name.endswith(PAPER_SUFFIX) else words

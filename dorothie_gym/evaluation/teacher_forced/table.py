@@ -234,7 +234,7 @@ def evaluate_predictions(
     """Scores predictions and gathers them in a table.
 
     Args:
-        predictions: of any number of models, seeds and tasks.
+        predictions: predictions of any number of models, seeds and tasks.
         corpus: the labels (`labels_of`), or the corpus whose split is taken.
         split: see `labels_of`.
         missing: why models could not be run, by name.

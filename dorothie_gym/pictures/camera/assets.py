@@ -27,7 +27,7 @@ class CameraAssets:
     Attributes:
         atlas: textures, with the blades of all street names of the ontology.
         bank: models of bodies.
-        noise: of the sky.
+        noise: noise of the sky.
     """
 
     atlas: AtlasArrays

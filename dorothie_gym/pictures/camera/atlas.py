@@ -193,7 +193,7 @@ def with_street_names(base: AtlasArrays, names: Sequence[str]) -> AtlasArrays:
     Args:
         base: textures. If it is that of `street_atlas`, sessions whose names are those of the ontology share its
             texels, and only their tables differ.
-        names: of the streets of a session.
+        names: names of the streets of a session.
     """
     if len(base.table) == STREET_NAMES + len(_STREETS) and all(name in _STREETS for name in names):
         rows = [*range(STREET_NAMES), *(STREET_NAMES + _STREETS[name] for name in names)]

@@ -98,11 +98,11 @@ def draw_cells(
 
     Args:
         view: projection.
-        buffer: to be drawn to, empty.
+        buffer: empty buffer to draw to.
         mesh: sorted by cell.
-        cells: of the mesh.
+        cells: cells of the mesh.
         scratch: from `new_order`; its tiles remain those of the buffer.
-        number: of the first triangle of the mesh.
+        number: number of the first triangle of the mesh.
     """
     _sort_cells(view, cells, scratch)
     drawn, ring, due = 0, 0, _FIRST_RING

@@ -48,7 +48,7 @@ class CameraScene:
 
     Attributes:
         town: objects of every session, sorted by cell.
-        cells: of the town.
+        cells: cells of the town.
         ground: materials and colours of the ground.
         atlas: textures.
         lamps: light of street lamps.
@@ -173,7 +173,7 @@ class FirstPersonCamera:
         """Draws a picture.
 
         Args:
-            pose: of the camera.
+            pose: pose of the camera.
             weather: weather and sun.
             bodies: moving bodies, as from `model_bank.place_bodies`.
             time: simulated seconds, which move the rain.

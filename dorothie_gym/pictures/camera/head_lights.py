@@ -64,10 +64,10 @@ def draw_head_lights(
     """Draws the beams of all vehicles before a camera whose lights are on.
 
     Args:
-        lights: to be written.
-        x: of the camera [m].
-        y: of the camera [m].
-        heading: of the camera [rad].
+        lights: receives the beams.
+        x: x coordinate of the camera [m].
+        y: y coordinate of the camera [m].
+        heading: heading of the camera [rad].
         bodies: models and places.
     """
     middle_x, middle_y = x + _AHEAD * pm.cos(heading), y + _AHEAD * pm.sin(heading)

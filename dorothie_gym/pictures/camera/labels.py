@@ -59,7 +59,7 @@ def write_labels(
         bodies: moving bodies.
         ground: materials of the ground.
         samples: scratch space.
-        labels: to be written.
+        labels: receives the labels.
     """
     for y in range(view.height):
         numbers, first = buffer.triangles[y], 0

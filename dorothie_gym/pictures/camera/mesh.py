@@ -175,7 +175,7 @@ class MeshBuilder:
             corners: (4, 3) [m]: lower left, upper left, upper right, lower right, seen from its visible side.
             colour: (3,).
             kind: semantic class.
-            repeats: of the texture to the right and upwards.
+            repeats: repeats of the texture to the right and upwards.
             texture: index in the atlas.
             surface: kind of surface.
             instance: key of the body.

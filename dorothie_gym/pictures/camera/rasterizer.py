@@ -107,7 +107,7 @@ def draw_triangles(view: View, buffer: VisibilityBuffer, mesh: Mesh, first: int,
 def collect_triangles(
     view: View, buffer: VisibilityBuffer, mesh: Mesh, first: int, last: int, found: int, shift: int
 ) -> int:
-    """Adds those of a range of triangles that may cover a sample to the collected ones, and draws these if need be.
+    """Collects the triangles of a range that may cover a sample, and draws the collected ones if there is no room.
 
     Args:
         view: projection.
@@ -116,7 +116,7 @@ def collect_triangles(
         first: triangle of the range.
         last: triangle behind the range.
         found: number of the triangles that are collected already.
-        shift: is added to the row of a triangle to give its number.
+        shift: number of a triangle minus its row.
 
     Returns:
         The number of collected triangles, to be drawn with `draw_collected`.

@@ -314,8 +314,8 @@ def _follow(
         heading: [rad].
         before: row of the same actor in the record before, -1 for none.
         begun: distance of rows without one [m].
-        heights: to be written [m].
-        odometers: to be written [m].
+        heights: receives the heights [m].
+        odometers: receives the driven distances [m].
     """
     for k in range(len(x)):
         last = before[k]

@@ -18,8 +18,8 @@ def apply_faults(picture: NDArray[np.uint8], faults: Collection[Sensor], scratch
     """Applies sensor faults to a picture (h, w, 3): `Sensor.VIEW` blackens it, `Sensor.BLUR` removes details.
 
     Args:
-        picture: to be changed.
-        faults: of any sensors.
+        picture: picture to change.
+        faults: faults of any sensors.
         scratch: (max(h, w),) or longer.
     """
     if Sensor.VIEW in faults:

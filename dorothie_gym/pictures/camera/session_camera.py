@@ -92,10 +92,10 @@ class SessionCamera:
         """Returns the pose of the camera on a car, which stands tilted on slopes.
 
         Args:
-            x: of the car [m].
-            y: of the car [m].
-            z: of the road below it [m].
-            heading: of the car [rad].
+            x: x coordinate of the car [m].
+            y: y coordinate of the car [m].
+            z: z coordinate of the road below it [m].
+            heading: heading of the car [rad].
         """
         rise = rise_at(self.scene.town.slopes, x, y, z, pm.cos(heading), pm.sin(heading))
         return pose_on_car(self.config.mount, x, y, z, heading, rise)
@@ -124,8 +124,8 @@ class SessionCamera:
         """Returns the picture from a pose.
 
         Args:
-            pose: of the camera.
-            bodies: of a world.
+            pose: pose of the camera.
+            bodies: bodies of a world.
             weather: weather and light.
             time: simulated time [s].
             head_lights: whether the lights of the car are on.

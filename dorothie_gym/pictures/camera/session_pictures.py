@@ -28,7 +28,7 @@ def camera_of(town: Town, scenario: Scenario, config: CameraConfig) -> SessionCa
 
 
 def windscreen_camera(town: Town, scenario: Scenario, config: EnvConfig, size: tuple[int, int]) -> SessionCamera:
-    """Returns a camera for spectators: of a width and height [px], otherwise with the settings of the session's."""
+    """Returns a spectators' camera of a width and height [px], otherwise like the session's camera."""
     own = config.camera or CameraConfig()
     return camera_of(town, scenario, replace(own, width=size[0], height=size[1], outputs=(CameraOutput.RGB,)))
 

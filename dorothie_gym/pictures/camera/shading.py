@@ -47,9 +47,9 @@ def shade(
         overlay: static objects of this session.
         bodies: moving bodies.
         ground: materials and colours of the ground.
-        textures: of the walls.
+        textures: textures of the walls.
         light: light and air.
-        noise: of the sky.
+        noise: noise of the sky.
         lamps: light of street lamps on the ground.
         beams: light of the head lights of other vehicles, that was drawn for the picture.
         shadows: maps that were drawn for the picture.

@@ -108,14 +108,14 @@ def draw_shadows(
 
     Args:
         view: projection of the picture.
-        maps: to be drawn to.
+        maps: maps to draw to.
         town: objects of every session, sorted by cell.
         town_cells: its cells.
         overlay: static objects of this session only, sorted by cell.
         overlay_cells: its cells.
         bank: triangles of all models.
-        ranges: of `ModelBank`.
-        boxes: of `ModelBank`.
+        ranges: ranges of `ModelBank`.
+        boxes: boxes of `ModelBank`.
         bodies: models and places.
     """
     lowest = min(_lowest(town_cells), _lowest(overlay_cells))

@@ -30,13 +30,13 @@ class TownScene:
     Attributes:
         ground: lookups of heights, materials and colours of the ground.
         mesh: ground and scenery, sorted by cell.
-        cells: of the mesh.
+        cells: cells of the mesh.
         signals: lights and signs; the lenses show another state in each session.
         lenses: triangles of `signals` that show the state of traffic lights.
         lamps: light of street lamps.
-        slopes: of the roads.
+        slopes: slopes of the roads.
         lots: ground reserved for the landmarks of the sites, by their ids.
-        programmes: of the traffic lights.
+        programmes: programmes of the traffic lights.
     """
 
     ground: Ground
@@ -63,7 +63,7 @@ class SessionScene:
     Attributes:
         town: objects of every session.
         street_names: on the blades, by the indices of the streets; blades without a name are empty.
-        landmarks: of the session.
+        landmarks: landmarks of the session.
     """
 
     town: TownScene

@@ -54,7 +54,7 @@ class Border:
         points: line on the edge of the lanes in driving direction (n, 3) [m].
         heading: (n,) [rad].
         gap: distance between the edge and the lane beyond it (n,) [m]; 0 without such a lane.
-        width: of the lane (n,) [m].
+        width: width of the lane (n,) [m].
     """
 
     kind: BorderKind

@@ -81,7 +81,7 @@ def tunnel_floors(
     """Yields light asphalt with broken edges between walls for the parts of roads under streets.
 
     Args:
-        town: whose lanes.
+        town: town of the lanes.
         parts: the tunnels.
         lines: borders of the lanes.
         covered: lookup of the parts in tunnels.
@@ -284,7 +284,7 @@ def streets(
     """Yields everything on the ground, from the pavements to the medians; surfaces in tunnels come first.
 
     Args:
-        town: whose streets.
+        town: town of the streets.
         samples: samples of its lanes.
         lines: borders of its lanes.
         parts: bridges and tunnels.

@@ -45,7 +45,7 @@ class ChoiceField:
         return {"type": "string", "enum": list(self.labels), "description": self.meaning}
 
     def read(self, value: object) -> str:
-        """Returns the value; raises `CallError` if it is none of the labels."""
+        """Returns the value; raises `CallError` if it is not one of the labels."""
         if value is None:
             return self.default
         if isinstance(value, str) and value in self.labels:

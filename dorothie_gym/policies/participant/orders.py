@@ -42,7 +42,7 @@ def order(
         urgent: whether it may be said without leaving the car time to answer.
 
     Raises:
-        KeyError: the move is none of the three.
+        KeyError: the move is not one of the three.
     """
     particulars = Wording() if wording is None else wording
     wanted = act_builders.action(

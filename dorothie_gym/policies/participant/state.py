@@ -122,9 +122,9 @@ class TaskProgress:
         same_breath: whether the next task is named in the same breath as the report of the last one.
         next_at: time before which the next task is not named unless the car asks [s].
         resume_at: time at which a car that was asked to wait is sent on [s]; infinite where it does not wait.
-        put_off: subgoals that were interrupted and are to be resumed.
+        put_off: interrupted subgoals, which will be resumed.
         told: statements made about the route to the target, its place, and the speaker's feelings about it.
-        finished: landmark of the last errand that is done, and when it was done [s].
+        finished: landmark of the last completed errand, and the time of its completion [s].
     """
 
     subgoals: tuple[SeenSubgoal, ...] = ()

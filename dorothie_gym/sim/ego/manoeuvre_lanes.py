@@ -291,7 +291,7 @@ def lay_pieces(town: TownArrays, world: WorldArrays, station: float, speed: floa
         town: arrays of the town.
         world: arrays of the world.
         station: beginning of the path on the first lane [m].
-        speed: of the ego [m/s], which the length of lane switches depends on.
+        speed: speed of the ego [m/s], which the length of lane switches depends on.
         write: whether the points are written or only counted.
     """
     count, steps, at = int(world.plan[0].steps), world.steps, station

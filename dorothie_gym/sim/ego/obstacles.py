@@ -60,7 +60,7 @@ class PerceivedBody:
         length: [m].
         width: [m].
         speed: along its heading [m/s].
-        height: of the road it is on [m].
+        height: height of the road it is on [m].
     """
 
     key: int
@@ -114,7 +114,7 @@ def safe_speed(speed: float, left: float, friction: float) -> float:
     """Returns the speed from which the ego can still stop.
 
     Args:
-        speed: of the body ahead, along the path [m/s].
+        speed: speed of the body ahead, along the path [m/s].
         left: room to it [m].
         friction: share of the dry road's grip.
     """

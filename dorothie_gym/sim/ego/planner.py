@@ -119,7 +119,7 @@ class LocalPlanner(CachedViews):
 
     @property
     def path(self) -> Path:
-        """The present path, the same object until it is replaced; every manoeuvre replaces it."""
+        """The current path; every manoeuvre replaces the object."""
         plan = self._look_up()
         if plan["version"] != self._laid:
             self._laid = int(plan["version"])
@@ -223,7 +223,7 @@ class LocalPlanner(CachedViews):
         Args:
             action: one of the six navigation actions.
             angle: degrees, positive left; for JTurn and LaneSwitch.
-            speed: of the ego [m/s].
+            speed: speed of the ego [m/s].
 
         Returns:
             None, or the reason of the refusal; then nothing has changed.

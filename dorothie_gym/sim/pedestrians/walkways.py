@@ -73,7 +73,7 @@ def build_walkways(network: TownNetwork, lanes: RecordArray[LaneRecord]) -> Walk
     """Builds all footways and crosswalks, and writes passages to `lanes`.
 
     Args:
-        network: of the town.
+        network: network of the town.
         lanes: `town_records.LaneRecord`, complete but for the passages.
     """
     town = network.town

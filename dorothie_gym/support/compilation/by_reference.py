@@ -42,7 +42,7 @@ class Reference(types.Type):  # type: ignore[misc]  # numba has no type informat
     Attributes:
         members: name and type of each item, in order.
         offsets: place of each item in the table [bytes].
-        size: of the table [bytes].
+        size: size of the table [bytes].
     """
 
     def __init__(self, name: str, members: tuple[tuple[str, types.Type], ...]) -> None:

@@ -178,7 +178,7 @@ class SessionWorld:
 
         Args:
             time: [s].
-            kinds: of the actors.
+            kinds: kinds of the actors.
             distance: largest distance from the middle of the car [m].
             angle: largest angle to its heading [degrees].
         """

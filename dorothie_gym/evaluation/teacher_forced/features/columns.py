@@ -231,7 +231,7 @@ class TownGraph:
     """Lane graph of a town (L lanes, E edges, s streets); without lanes if the town is unknown.
 
     Attributes:
-        name: of the town.
+        name: name of the town.
         lanes: (L, 14) columns as in `dorothie_gym.maps.lane_graph.FEATURES` [m, degrees].
         road: (L,) number of its road within the town, 0.. without gaps.
         junction: (L,) 0 outside of junctions, else 1.. without gaps.

@@ -47,8 +47,8 @@ def build_landmarks(landmarks: Iterable[Landmark], lots: Sequence[Lot], ground: 
     """Returns the landmarks of a session; the triangles of each have its `landmark_key` as instance.
 
     Args:
-        landmarks: of the session.
-        lots: of the sites of the town, by their ids.
+        landmarks: landmarks of the session.
+        lots: lots of the sites of the town, by their ids.
         ground: heights of the ground.
     """
     parts = []
